@@ -1,15 +1,16 @@
 //! The command line: arguments in, exit code out.
 
 mod bar;
-mod batch;
 mod board;
 mod diff;
 mod drift;
+mod driver;
+mod files;
 mod impact;
+mod limits;
 mod merge;
 mod modes;
 mod output;
-mod page;
 mod place;
 mod positions;
 mod rates;
@@ -17,10 +18,11 @@ mod runs;
 mod show;
 mod thermal;
 mod tumble;
+mod units;
 mod validate;
 
 use clap::{Parser, Subcommand};
-use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
+use isotherm_cli::{Common, Exit, failed_lines, parse};
 
 use crate::error::Error;
 
@@ -75,19 +77,6 @@ fn run(cli: Cli) -> Result<Exit, Error> {
     .map(|()| Exit::Ok)
 }
 
-/// Refuses an argument that is no number above 0.
-pub(crate) fn above_0(name: &str, value: f64) -> Result<(), Error> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(Error::Usage(format!("{name} is {value}, must be a number above 0")))
-}
-
-/// Writes to standard output; a reader that has gone away is no error.
-pub(crate) fn print(text: &[u8]) -> Result<(), Error> {
-    to_stdout(text).map_err(|source| Error::Stdout { source })
-}
-
 /// Runs the program and says how it ended.
 #[must_use]
 pub fn main() -> Exit {
@@ -98,9 +87,25 @@ pub fn main() -> Exit {
 mod tests {
     use std::path::Path;
 
+    use clap::CommandFactory;
     use isotherm_protocol::document::Document;
 
     use super::*;
+
+    #[test]
+    fn rare_options_are_in_the_advanced_help() {
+        let help = |command: &str, flag: &str| {
+            let program = isotherm_cli::advanced::command::<Cli>();
+            program.try_get_matches_from(["isotherm-calibrate", command, flag]).unwrap_err().to_string()
+        };
+        for (command, rare) in
+            [("thermal", "--fit-window"), ("positions", "--still-rate"), ("merge", "--created")]
+        {
+            let (short, long) = (help(command, "--help"), help(command, "--help-advanced"));
+            assert!(short.contains("--help-advanced") && !short.contains(rare), "{command}: {short}");
+            assert!(long.contains(rare) && long.contains("--out"), "{command}: {long}");
+        }
+    }
 
     #[test]
     fn the_full_example_names_a_command_and_files_that_there_are() {
@@ -108,6 +113,7 @@ mod tests {
         let text = std::fs::read_to_string(root.join("config/calibration/example-full.toml")).unwrap();
         let origin = Document::parse(&text, None).unwrap().document.origin.unwrap();
         let command = origin.command.unwrap();
+        Cli::command().debug_assert();
         let arguments = Cli::try_parse_from(command.split_whitespace()).unwrap();
         assert!(matches!(arguments.command, Command::Thermal(_)), "{command}");
         for file in command.split_whitespace().filter(|word| word.contains('/')) {

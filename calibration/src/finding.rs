@@ -6,8 +6,8 @@ mod words;
 
 pub use accel::AccelKind;
 
-use crate::rates::plateaus::Plateau;
-use crate::swapped::Looks;
+use crate::fits::rates::plateaus::Plateau;
+use crate::runs::swapped::Looks;
 
 /// Something that was found, and where.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,49 +6,27 @@
 //! | module | holds |
 //! |---|---|
 //! | [`runs`] | what a log has of one unit, to be corrected again and again; as columns, raw and corrected |
-//! | [`written`], [`provenance`] | a document: on its way to a file, where its numbers come from |
-//! | [`drift`], [`allan`], [`spectrum`] | noise and drift of a static log |
-//! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
-//! | [`impact`] | what a drift that is left means for navigation |
-//! | [`diff`] | what has changed between two documents |
-//! | [`merge`] | parts of a calibration in one document |
-//! | [`show`] | a document in words and curves |
+//! | [`axes`] | case axes, and what sensors are called |
 //! | [`lsq`] | least squares: coefficients, covariance, cross-validation |
 //! | [`robust`], [`size`] | middle and scatter of numbers among which some may be wrong; mean, rms, deviation |
-//! | [`swapped`] | columns that look swapped |
-//! | [`validate`] | a document judged on other logs |
-//! | [`positions`], [`tumble`] | accelerometers on a stand; a unit tumbled by hand |
-//! | [`board`] | ratio of the accelerometers' board from two-position cycles |
-//! | [`modes`] | drift polynomials and switch parameters of a mode-reversed laser gyro |
-//! | [`rates`] | scale factor, asymmetry, linearity and axes from a rate table |
-//! | [`thermal`] | bias over temperature from runs at rest |
 //! | [`finding`] | what can be wrong or is worth telling, and its words |
+//! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
+//! | [`document`] | a document on its way to a file; compared, merged, shown |
+//! | [`fits`] | a fit for each command |
+//! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
-pub mod allan;
-pub mod board;
+pub mod axes;
 pub mod cli;
-pub mod diff;
-pub mod drift;
+pub mod document;
 pub mod error;
 pub mod finding;
+pub mod fits;
 #[cfg(test)]
 mod fixture;
-pub mod impact;
 pub mod lsq;
-pub mod merge;
-pub mod modes;
-pub mod positions;
-pub mod provenance;
-pub mod rates;
 pub mod report;
 pub mod robust;
 pub mod runs;
-pub mod show;
 pub mod size;
-pub mod spectrum;
-pub mod swapped;
-pub mod thermal;
-pub mod tumble;
 pub mod validate;
-pub mod written;

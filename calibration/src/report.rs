@@ -9,12 +9,14 @@
 //! | [`curve`] | before and after over time and temperature, taken from a corrected run |
 //! | [`batch`] | several units at once, and the table that closes them |
 //! | [`sheet`] | a line, tables and charts where nothing was fitted |
+//! | [`figures`] | digits, tables |
 //! | [`sigma`] | standard errors as documents keep them |
-//! | `words` | one sentence for all gyros, or logs, that it holds of |
+//! | `words` | the lines of a terminal; one sentence for all gyros, or logs, that it holds of |
 //! | `page`, `json` | the report as a page and as JSON |
 
 pub mod batch;
 pub mod curve;
+pub mod figures;
 mod json;
 mod page;
 pub mod sheet;
@@ -24,8 +26,6 @@ mod tests;
 pub mod verdict;
 pub(crate) mod words;
 
-use std::fmt::Write;
-
 use isotherm_pages::{Chart, Table};
 
 pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
@@ -34,7 +34,7 @@ pub use sheet::Sheet;
 pub use sigma::Sigmas;
 pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 
-use crate::drift::figures::{short, table};
+use figures::{counted, short};
 
 /// One fitted coefficient.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,33 +122,17 @@ impl FitReport {
         refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
     }
 
-    /// Everything as text, the verdicts in the first lines.
+    /// What a terminal shows: the verdicts in the first lines, and what is to be looked at.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut text = format!(
-            "{}\n\n{}, unit {}\n",
-            verdict::sentences(&self.verdicts).join("\n"),
+        let warnings: Vec<String> = self.warnings.iter().map(|words| format!("warning: {words}")).collect();
+        let rest = format!(
+            "{}, unit {}: what was done, {} and all tables",
             self.title,
-            self.unit
+            self.unit,
+            counted(self.coefficients.len(), "coefficient", "coefficients")
         );
-        self.notes.iter().for_each(|note| {
-            let _ = writeln!(text, "{note}");
-        });
-        self.warnings.iter().for_each(|warning| {
-            let _ = writeln!(text, "\nwarning: {warning}");
-        });
-        let own = [
-            ("Before and after", Some(self.size_rows())),
-            ("Coefficients, with their standard errors", Some(self.coefficient_rows())),
-            ("Cross-validation", self.validation.clone()),
-        ];
-        let further = self.tables.iter().map(|(heading, rows)| (heading.as_str(), Some(rows.clone())));
-        for (heading, rows) in own.into_iter().chain(further) {
-            if let Some(rows) = rows.filter(|rows| !rows.rows.is_empty()) {
-                let _ = writeln!(text, "\n{heading}\n{}", table(&rows.head, &rows.rows));
-            }
-        }
-        text
+        words::dozen(&verdict::sentences(&self.verdicts), &warnings, &rest)
     }
 
     /// Coefficients as a table; the first column numbers them as the chart does.

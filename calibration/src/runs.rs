@@ -4,10 +4,14 @@
 //! |---|---|
 //! | [`series`] | its raw readings as columns, tick by tick |
 //! | [`table`] | its corrected outputs as columns, by windows or tick by tick |
+//! | [`faults`] | columns that nothing can be made of |
+//! | [`swapped`] | columns that look swapped |
 //! | [`cut`] | where a log was cut short |
 
 pub mod cut;
+pub mod faults;
 pub mod series;
+pub mod swapped;
 pub mod table;
 mod together;
 
@@ -29,8 +33,8 @@ use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
-use crate::drift::figures::six;
 use crate::error::Error;
+use crate::report::figures::six;
 use crate::robust::median;
 use cut::Cut;
 use series::Series;
@@ -61,6 +65,15 @@ enum Source {
 enum Piece<'a> {
     Event(&'a LogEvent),
     Message(&'a Message),
+}
+
+impl Piece<'_> {
+    fn put_into(&self, series: &mut Series) -> Result<(), Error> {
+        match self {
+            Self::Event(event) => series.take_event(event),
+            Self::Message(message) => series.take_message(message),
+        }
+    }
 }
 
 /// What a correction is fed with.
@@ -160,10 +173,7 @@ impl Run {
     /// [`Error::Log`]; as [`Series::take_message`]; [`Error::Refused`] where it has no ticks, or ticks too long to be corrected.
     pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
-        self.walk(watch, |piece| match piece {
-            Piece::Event(event) => series.take_event(event),
-            Piece::Message(message) => series.take_message(message),
-        })?;
+        self.walk(watch, |piece| piece.put_into(&mut series))?;
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
             let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
             if usual_s > longest_s {
@@ -191,6 +201,33 @@ impl Run {
         &self,
         loaded: &Loaded,
         watch: impl Watch,
+        each: impl FnMut(&CorrectedTick, &Unit),
+    ) -> Result<Troubles, Error> {
+        self.correct_beside(loaded, watch, |_| (), each)
+    }
+
+    /// The same, and its readings as columns beside, from one reading of the log. The columns end where [`Run::series`] would refuse
+    /// them; the correction says what is wrong with the log.
+    ///
+    /// # Errors
+    /// As [`Run::correct`]; the columns are there all the same.
+    pub fn correct_with_series(
+        &self,
+        loaded: &Loaded,
+        watch: impl Watch,
+        each: impl FnMut(&CorrectedTick, &Unit),
+    ) -> (Series, Result<Troubles, Error>) {
+        let (mut series, mut takes) = (Series::empty(self.unit.clone()), true);
+        let beside = |piece: &Piece<'_>| takes = takes && piece.put_into(&mut series).is_ok();
+        let troubles = self.correct_beside(loaded, watch, beside, each);
+        (series, troubles)
+    }
+
+    fn correct_beside(
+        &self,
+        loaded: &Loaded,
+        watch: impl Watch,
+        beside: impl FnMut(&Piece<'_>),
         mut each: impl FnMut(&CorrectedTick, &Unit),
     ) -> Result<Troubles, Error> {
         let mut unit = Offline::new(loaded, UnitSettings::default());
@@ -201,7 +238,7 @@ impl Run {
                 each(tick, unit.unit());
             }
         };
-        self.feed(&loaded.calibration, watch, |fed| {
+        self.feed(&loaded.calibration, watch, beside, |fed| {
             fed.give(&mut unit);
             give_out(&mut unit);
         })?;
@@ -249,6 +286,7 @@ impl Run {
         &self,
         calibration: &Calibration,
         watch: impl Watch,
+        mut beside: impl FnMut(&Piece<'_>),
         mut to_unit: impl FnMut(Fed<'_>),
     ) -> Result<(), Error> {
         // A document of gyros alone is asked about gyros: their log may well have accelerometers.
@@ -259,6 +297,7 @@ impl Run {
             }
         };
         self.walk(watch, |piece| {
+            beside(&piece);
             match piece {
                 Piece::Event(event) => each(Fed::Event(&self.taken(event))),
                 Piece::Message(message) => {

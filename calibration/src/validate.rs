@@ -12,17 +12,18 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::document::{Document, Sample};
 
-use crate::drift::figures::short;
+use crate::axes::AXES;
+use crate::document::written::Written;
 use crate::error::Error;
+use crate::fits::thermal::Stand;
+use crate::fits::thermal::checks::judging;
+use crate::report::figures::short;
 use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::robust::is_white;
 use crate::runs::Watch;
+use crate::runs::swapped::{Shown, up};
 use crate::runs::table::{Rows, Table, Takes, is_one_g, usual_window_s};
 use crate::size::Size;
-use crate::swapped::{Shown, up};
-use crate::thermal::Stand;
-use crate::thermal::checks::judging;
-use crate::written::Written;
 use coverage::Coverage;
 pub use runs::JudgedLog;
 
@@ -53,13 +54,12 @@ const REST_TILT: f64 = 0.035;
 /// # Errors
 /// [`Error::Refused`] where the runs do not allow it: of another unit, nothing in them, not at rest.
 pub fn validate(
-    name: &str,
     written: &Written,
     logs: &[JudgedLog],
     wanted: Wanted,
     mut watch: impl Watch,
 ) -> Result<FitReport, Error> {
-    let document = &written.document;
+    let Written { name, document, .. } = written;
     let bare = Written::compiled(&document.nominal())?;
     let mut report = FitReport::new(format!("Judgement of {name}"), document.unit.clone());
     let mut coverage = Coverage::of(written);
@@ -194,7 +194,7 @@ fn at_rest(name: &str, means: &Table) -> Option<String> {
             "{name}: the unit was not at rest: {what}. Cut the log to the part at rest with --start and --duration"
         ))
     };
-    for (axis, of) in ["x", "y", "z"].into_iter().enumerate() {
+    for (axis, of) in AXES.into_iter().enumerate() {
         let range = Size::of(means.rate(axis)).peak_to_peak;
         if range > REST_RATE_DEG_PER_H {
             return refuse(format!(
@@ -245,7 +245,7 @@ fn missing(document: &Document, report: &mut FitReport) -> Result<(), Error> {
     let accels = document.accel.is_some().then_some("accelerometer");
     for kind in ["gyro"].into_iter().chain(accels) {
         let has = |axis: &str| report.verdicts.iter().any(|verdict| verdict.of == format!("{kind} {axis}"));
-        let gone: Vec<&str> = ["x", "y", "z"].into_iter().filter(|axis| !has(axis)).collect();
+        let gone: Vec<&str> = AXES.into_iter().filter(|axis| !has(axis)).collect();
         if !gone.is_empty() {
             let (axes, with) = (gone.join(", "), gone.len());
             report.warnings.push(format!(

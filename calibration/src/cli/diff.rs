@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::page::PageArgs;
-use super::print;
-use crate::diff::series::Series;
+use super::driver::emit;
+use super::files::PageArgs;
+use crate::document::diff::series::Series;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::written::Written;
 
 /// Compare calibration documents in order of time, such as those before, between and after shock and vibration
 #[derive(Debug, Args)]
@@ -30,9 +30,6 @@ pub(super) struct DiffArgs {
     axis_sigma: Option<f64>,
     #[command(flatten)]
     page: PageArgs,
-    /// Print everything as one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 impl DiffArgs {
@@ -42,22 +39,22 @@ impl DiffArgs {
             return Err(Error::Usage(format!("--axis-sigma is {sigma}, must be a number of ″ above 0")));
         }
         let paths: Vec<&Path> = [&self.before].into_iter().chain(&self.after).map(PathBuf::as_path).collect();
-        self.page.check(&paths)?;
-        let name = |path: &&Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // Of several folders: the folder tells them apart.
-        let mut names: Vec<String> = paths.iter().map(name).collect();
-        if names.iter().collect::<BTreeSet<_>>().len() < names.len() {
-            names = paths.iter().map(|path| path.display().to_string()).collect();
+        let files = self.page.files();
+        files.check(&paths)?;
+        let mut documents = paths.iter().map(|path| Written::read(path)).collect::<Result<Vec<_>, _>>()?;
+        let names: BTreeSet<&str> = documents.iter().map(|document| document.name.as_str()).collect();
+        if names.len() < documents.len() {
+            // Of several folders: the folder tells them apart.
+            for (document, path) in documents.iter_mut().zip(&paths) {
+                document.name = path.display().to_string();
+            }
         }
-        let read = |(name, path): (String, &&Path)| Ok::<_, Error>((name, Written::read(path)?));
-        let documents = names.into_iter().zip(&paths).map(read).collect::<Result<Vec<_>, _>>()?;
         let series = Series::of(&documents, self.axis_sigma)?;
         let (sheet, json) = match series.steps.as_slice() {
             [only] => (only.sheet(), only.to_json()),
             _ => (series.sheet(), series.to_json()),
         };
-        self.page.write(|| sheet.to_html())?;
-        let text = if self.json { format!("{json}\n") } else { sheet.to_text() };
-        print(text.as_bytes())
+        files.page(Path::to_path_buf, || sheet.to_html())?;
+        emit(files.json, || json, || sheet.to_text())
     }
 }

@@ -1,26 +1,23 @@
 //! `isotherm-calibrate drift`.
 
-use std::path::{Path, PathBuf};
-
 use clap::{Args, ValueEnum};
-use isotherm_cli::Bar;
 use isotherm_log::diff::is_csv;
 use serde_json::json;
 
-use super::above_0;
-use super::batch::{Batch, Named, Names, Unit, Work};
+use super::driver::{Done, Job, Task};
+use super::limits::above_0;
 use super::output::OutputArgs;
-use super::runs::LogArgs;
-use crate::drift::analysis::{Wanted, analyse};
-use crate::drift::columns::{Columns, Kind, unnamed};
-use crate::drift::page::page;
-use crate::drift::parameters::{Parameters, put};
-use crate::drift::pieces::Grid;
-use crate::drift::report::Report;
-use crate::drift::trend::FIT_H;
+use super::runs::{BaseArgs, LogArgs};
+use super::units::{Logs, Unit, Work};
+use crate::document::provenance::{TOOL, command_line, origin};
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::provenance::{TOOL, command_line, origin};
-use crate::written::Written;
+use crate::fits::drift::columns::{Columns, Kind, unnamed};
+use crate::fits::drift::document::{Parameters, put};
+use crate::fits::drift::fit::{Wanted, analyse};
+use crate::fits::drift::pieces::Grid;
+use crate::fits::drift::report::Report;
+use crate::fits::drift::trend::FIT_H;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]
@@ -42,17 +39,16 @@ pub(super) struct DriftArgs {
     /// Gyro angle per count (″), for counts without a document
     #[arg(long, value_name = "ARCSEC", conflicts_with = "document")]
     increment_weight: Option<f64>,
-    /// Calibration document (TOML) that corrects the log first; --out adds drift parameters to it; several units: a folder with UNIT.toml of each
-    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
-    document: Option<PathBuf>,
+    #[command(flatten)]
+    base: BaseArgs,
     /// Sigma of the constant part at start (°/h), if known from several starts
-    #[arg(long, value_name = "DEG_PER_H")]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H")]
     initial_sigma: Option<f64>,
     /// Spacing of the averaging times
-    #[arg(long, value_enum, default_value_t = Taus::Octave)]
+    #[arg(long, hide_short_help = true, value_enum, default_value_t = Taus::Octave)]
     taus: Taus,
     /// Length of the trend fit before extrapolation (h)
-    #[arg(long, value_name = "HOURS", default_value_t = FIT_H)]
+    #[arg(long, hide_short_help = true, value_name = "HOURS", default_value_t = FIT_H)]
     fit_hours: f64,
     #[command(flatten)]
     output: OutputArgs,
@@ -70,34 +66,52 @@ enum Taus {
 impl DriftArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        self.check()?;
-        let title = "Noise and drift of several units";
-        let batch = Batch { output: &self.output, title, accept_partial: false };
-        batch.carry_out(self.units()?, |work, names, bar| self.report(work, names, bar))
+        above_0([
+            ("--increment-weight", self.increment_weight.map(f64::abs)),
+            ("--initial-sigma", self.initial_sigma),
+            ("--fit-hours", Some(self.fit_hours)),
+        ])?;
+        let files = self.output.files();
+        if files.out.is_some() && (self.base.document.is_none() || self.accelerometers) {
+            return Err(Error::Usage(
+                "--out is the document with what the estimator is to expect of its gyros: give it with --calibration, and leave \
+                 --accelerometers out"
+                    .to_owned(),
+            ));
+        }
+        let logs = Logs { unnamed: Some(unnamed()?), ..Logs::together(&self.log, &self.base) };
+        let task = Task::new("Noise and drift of several units", files, logs);
+        task.run_on(|| self.units(&task.logs), |job| self.analyse(job))
     }
 
     /// The units of the logs; corrected ticks are read where they are analysed.
-    fn units(&self) -> Result<Vec<Unit>, Error> {
-        if self.is_corrected() {
-            let unit = self.log.reading.serial()?.map_or_else(unnamed, Ok)?;
-            let work = Work::new(None, Vec::new(), Vec::new());
-            return Ok(vec![(unit, Ok(work))]);
+    fn units(&self, logs: &Logs<'_>) -> Result<Vec<Unit>, Error> {
+        if !self.is_corrected() {
+            return logs.units();
         }
-        let named = Named::together(&self.log.reading, &self.log.log, self.document.as_ref());
-        Named { unnamed: Some(unnamed()?), ..named }.units()
+        let unit = self.log.reading.serial()?.map_or_else(unnamed, Ok)?;
+        Ok(vec![(unit, Ok(Work::new(None, Vec::new(), Vec::new())))])
+    }
+
+    fn analyse(&self, job: &Job<'_>) -> Result<Done<Report>, Error> {
+        let report = self.report(job)?;
+        // Where every gyro is refused there is nothing new to say.
+        let stated = self.output.files().out.is_some() && !report.parameters.is_empty();
+        let document = stated.then(|| self.document(job.work, &report)).transpose()?;
+        Ok(Done { report, document })
     }
 
     fn is_corrected(&self) -> bool {
         self.corrected || self.log.log.iter().any(|path| is_csv(path))
     }
 
-    /// Analyses a unit and writes what comes of it.
-    fn report(&self, work: &Work, names: &Names<'_>, bar: fn() -> Bar) -> Result<Report, Error> {
-        let columns = self.columns(work, names, bar)?;
+    /// Analyses a unit.
+    fn report(&self, job: &Job<'_>) -> Result<Report, Error> {
+        let columns = self.columns(job)?;
         let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
         let mut grid = Grid::of(columns)?;
-        grid.notes.extend(work.told());
-        let working = names.at_work("Allan deviations, drift, spectrum");
+        grid.notes.splice(0..0, job.work.told());
+        let working = job.at_work("Allan deviations, drift, spectrum");
         let factor = if self.taus == Taus::Decade { 10 } else { 2 };
         let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
         working.finish();
@@ -108,7 +122,7 @@ impl DriftArgs {
                 Err(why) => grid.refused.push(why),
             }
         }
-        let report = Report {
+        Ok(Report {
             unit,
             kind,
             corrected,
@@ -119,49 +133,24 @@ impl DriftArgs {
             refused: grid.refused,
             sensors,
             parameters,
-        };
-        // Where every gyro is refused there is nothing new to say.
-        let stated = !report.parameters.is_empty();
-        let document = || stated.then(|| self.document(work, &report)).transpose();
-        self.output.write(document, || page(&report), names)?;
-        Ok(report)
+        })
     }
 
-    /// What the arguments must hold before anything is read.
-    fn check(&self) -> Result<(), Error> {
-        let positive = [
-            ("--increment-weight", self.increment_weight.map(f64::abs)),
-            ("--initial-sigma", self.initial_sigma),
-            ("--fit-hours", Some(self.fit_hours)),
-        ];
-        positive
-            .into_iter()
-            .try_for_each(|(name, value)| value.map_or(Ok(()), |value| above_0(name, value)))?;
-        if self.output.writes() && (self.document.is_none() || self.accelerometers) {
-            return Err(Error::Usage(
-                "--out writes drift parameters of gyros into a document: add --calibration, and remove \
-                 --accelerometers"
-                    .to_owned(),
-            ));
-        }
-        let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        self.output.check(&inputs)
-    }
-
-    fn columns(&self, work: &Work, names: &Names<'_>, bar: fn() -> Bar) -> Result<Columns, Error> {
+    fn columns(&self, job: &Job<'_>) -> Result<Columns, Error> {
+        let work = job.work;
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
         if self.is_corrected() {
             let unit = self.log.reading.serial()?;
-            let mut bar = names.at_work("reading");
+            let mut bar = job.at_work("reading");
             let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, &work.cut, || bar.step());
             bar.finish();
             return columns;
         }
         let run = work.run()?;
         if let Some(document) = &work.base {
-            return Columns::corrected_by(run, &document.loaded, kind, [bar(), bar()]);
+            return Columns::corrected_by(run, &document.loaded, kind, job.bar());
         }
-        let series = run.series(bar())?;
+        let series = run.series(job.bar())?;
         if self.accelerometers {
             Columns::of_accelerometers(series)
         } else {
@@ -177,7 +166,7 @@ impl DriftArgs {
         let mut document = base.document.clone();
         // What the document says of the constant part holds, unless something else was stated.
         put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
-        self.output.put_date(&mut document)?;
+        document.created = Some(self.output.date()?);
         let of_log = origin(&work.logs(), &command_line())?;
         let mut whole = document.origin.take().unwrap_or_default();
         let mut details = whole.details.take().unwrap_or_default();

@@ -15,16 +15,17 @@ use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Document;
 
 use super::bar;
-use super::page::PageArgs;
-use super::print;
+use super::driver::emit;
+use super::files::PageArgs;
+use super::limits::within;
 use super::runs::{LogArgs, Reading};
-use crate::drift::HOUR_S;
-use crate::drift::columns::{Columns, Kind};
-use crate::drift::figures::short;
 use crate::error::Error;
-use crate::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
-use crate::impact::over_starts;
-use crate::impact::scenario::Voyage;
+use crate::fits::drift::HOUR_S;
+use crate::fits::drift::columns::{Columns, Kind};
+use crate::fits::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
+use crate::fits::impact::over_starts;
+use crate::fits::impact::scenario::Voyage;
+use crate::report::figures::short;
 use crate::runs::cut::Cut;
 
 /// Most hours of either part.
@@ -71,7 +72,7 @@ pub(super) struct ImpactArgs {
     #[arg(long, value_name = "LOG")]
     start_log: Vec<PathBuf>,
     /// The first seed
-    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    #[arg(long, hide_short_help = true, value_name = "SEED", default_value_t = 1)]
     seed: u64,
     /// Latitude (°)
     #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true)]
@@ -83,19 +84,16 @@ pub(super) struct ImpactArgs {
     #[arg(long, value_name = "HOURS", default_value_t = 21.0)]
     calibration_hours: f64,
     /// Rate of the platform about the vertical (multiples of the Earth's)
-    #[arg(long, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
     turn_ratio: f64,
     /// Standard error of the reference rate per minute (°/h)
-    #[arg(long, value_name = "DEG_PER_H", default_value_t = 0.001)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H", default_value_t = 0.001)]
     reference_sigma: f64,
     /// No velocity log: level gyros are not observed during the voyage
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_log_aid: bool,
     #[command(flatten)]
     page: PageArgs,
-    /// Print everything as one JSON object, with the curves
-    #[arg(long)]
-    json: bool,
 }
 
 /// A gyro of the platform.
@@ -135,32 +133,23 @@ impl ImpactArgs {
             return Err(Error::Usage(words.to_owned()));
         };
         report.notes.extend(starts);
-        self.page.write(|| report.to_html())?;
-        if self.json {
-            print(format!("{}\n", report.to_json()).as_bytes())?;
-        } else {
-            print(report.to_text().as_bytes())?;
-        }
+        let files = self.page.files();
+        files.page(Path::to_path_buf, || report.to_html())?;
+        emit(files.json, || report.to_json(), || report.to_text())?;
         Error::end(Vec::new(), cut.words().map(str::to_owned).into_iter().collect())
     }
 
     /// Checks the numbers.
     fn voyage(&self) -> Result<Voyage, Error> {
-        let limits = [
-            ("--latitude", self.latitude, [-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG]),
-            ("--hours", self.hours, [0.5, MOST_HOURS]),
-            ("--calibration-hours", self.calibration_hours, [0.5, MOST_HOURS]),
-            ("--turn-ratio", self.turn_ratio, [-1000.0, 1000.0]),
-            ("--reference-sigma", self.reference_sigma, [0.0, 1000.0]),
-            ("--trend", self.trend.unwrap_or(0.0), [-100.0, 100.0]),
-            ("--constant", self.constant.unwrap_or(0.0), [-1000.0, 1000.0]),
-        ];
-        for (name, value, [low, high]) in limits {
-            // False for NaN too.
-            if !(low..=high).contains(&value) {
-                return Err(Error::Usage(format!("{name} is {value}, must be from {low} to {high}")));
-            }
-        }
+        within([
+            ("--latitude", Some(self.latitude), [-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG], ""),
+            ("--hours", Some(self.hours), [0.5, MOST_HOURS], ""),
+            ("--calibration-hours", Some(self.calibration_hours), [0.5, MOST_HOURS], ""),
+            ("--turn-ratio", Some(self.turn_ratio), [-1000.0, 1000.0], ""),
+            ("--reference-sigma", Some(self.reference_sigma), [0.0, 1000.0], ""),
+            ("--trend", self.trend, [-100.0, 100.0], ""),
+            ("--constant", self.constant, [-1000.0, 1000.0], ""),
+        ])?;
         if self.gyro.is_some() && self.trend.is_none() && self.constant.is_none() {
             let words = "--gyro needs --trend or --constant: it names the gyro that has them";
             return Err(Error::Usage(words.to_owned()));
@@ -172,7 +161,7 @@ impl ImpactArgs {
         }
         let inputs: Vec<&Path> =
             self.log.iter().chain(&self.start_log).chain(&self.document).map(PathBuf::as_path).collect();
-        self.page.check(&inputs)?;
+        self.page.files().check(&inputs)?;
         Ok(Voyage {
             latitude_deg: self.latitude,
             turn_ratio: self.turn_ratio,
@@ -252,7 +241,7 @@ impl ImpactArgs {
         };
         let loaded = load_calibration(document)?;
         let run = args.run(Some(&loaded.unit))?;
-        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, [bar::reading(), bar::reading()]);
+        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, bar::reading());
         run.hand_on(cut);
         columns
     }

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_protocol::document::Created;
 
-use super::output::date;
-use super::page::writable;
-use super::print;
+use super::driver::emit;
+use super::files::Files;
+use super::output::{a_date, date};
+use crate::document::merge::{Merged, Take, merge};
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::merge::{Merged, Named, Take, merge};
-use crate::written::Written;
 
 /// Put parts of a calibration that different commands have made into one document
 #[derive(Debug, Args)]
@@ -34,8 +35,8 @@ pub(super) struct MergeArgs {
     #[arg(long)]
     overwrite: bool,
     /// Date of the new document (YYYY-MM-DD; default: today, UTC)
-    #[arg(long, value_name = "DATE")]
-    created: Option<String>,
+    #[arg(long, hide_short_help = true, value_name = "DATE", value_parser = a_date)]
+    created: Option<Created>,
     /// Print the origin of each section as one JSON object
     #[arg(long)]
     json: bool,
@@ -45,23 +46,18 @@ impl MergeArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> = self.part.iter().chain([&self.base]).map(PathBuf::as_path).collect();
-        writable(&self.out, &inputs, self.overwrite)?;
-        let base = named(&self.base)?;
-        let parts = self.part.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
+        let files = Files { out: Some(&self.out), html: None, overwrite: self.overwrite, json: self.json };
+        files.check(&inputs)?;
+        let base = Written::read(&self.base)?;
+        let parts = self.part.iter().map(|path| Written::read(path)).collect::<Result<Vec<_>, _>>()?;
         let mut merged: Merged = merge(&base, &parts, &self.take)?;
         let mut document = merged.written.document.clone();
-        document.created = Some(date(self.created.as_deref())?);
+        document.created = Some(date(self.created)?);
         merged.written = Written::of(&document)?;
         merged.written.save(&self.out, self.overwrite)?;
         let name = name_of(&self.out);
-        let text =
-            if self.json { format!("{}\n", merged.to_json(&name)) } else { merged.sheet(&name).to_text() };
-        print(text.as_bytes())
+        emit(self.json, || merged.to_json(&name), || merged.sheet(&name).to_text())
     }
-}
-
-fn named(path: &Path) -> Result<Named, Error> {
-    Ok(Named { name: name_of(path), written: Written::read(path)? })
 }
 
 fn name_of(path: &Path) -> String {

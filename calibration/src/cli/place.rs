@@ -4,7 +4,7 @@ use clap::Args;
 use isotherm_correction::earth::Place;
 
 use crate::error::Error;
-use crate::positions::gravity;
+use crate::fits::positions::gravity;
 
 /// Place and attitude, for the Earth rate.
 #[derive(Debug, Clone, Args)]

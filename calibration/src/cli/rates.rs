@@ -1,6 +1,6 @@
 //! `isotherm-calibrate rates`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use isotherm_cli::Bar;
@@ -8,14 +8,16 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{Document, GyroOutput};
 
-use super::batch::{Batch, Named, Work};
+use super::driver::{Job, Task};
+use super::limits::within;
 use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
-use super::runs::LogArgs;
+use super::runs::{BaseArgs, JudgeArgs, LogArgs};
+use super::units::Logs;
 use crate::error::Error;
-use crate::rates::document::{details, nominal, sigmas};
-use crate::rates::make::{Wanted, make};
-use crate::rates::steps::{Step, listed, read};
+use crate::fits::rates::document::{details, nominal, sigmas};
+use crate::fits::rates::fit::{Wanted, make};
+use crate::fits::rates::steps::{Step, listed, read};
 use crate::runs::Run;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
@@ -28,9 +30,8 @@ use crate::runs::Run;
 pub(super) struct RatesArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Log to judge by, out of sample; repeatable
-    #[arg(long, value_name = "LOG")]
-    judge: Vec<PathBuf>,
+    #[command(flatten)]
+    judge: JudgeArgs,
     /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log, then for each judging log
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rates")]
     axis: Vec<String>,
@@ -49,16 +50,15 @@ pub(super) struct RatesArgs {
     /// Table of the steps (CSV or TOML)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates", "judge_rates"])]
     steps: Option<PathBuf>,
-    /// Calibration document (TOML) to start from (default: nominal scale and axes); several units: a folder with UNIT.toml of each
-    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
-    document: Option<PathBuf>,
+    #[command(flatten)]
+    base: BaseArgs,
     #[command(flatten)]
     place: PlaceArgs,
     /// Standard deviation of the table's rates (ppm)
-    #[arg(long, value_name = "PPM", default_value_t = 0.0)]
+    #[arg(long, hide_short_help = true, value_name = "PPM", default_value_t = 0.0)]
     table_ppm: f64,
     /// Add the remaining bias to the document's static bias
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     with_bias: bool,
     #[command(flatten)]
     output: OutputArgs,
@@ -67,28 +67,23 @@ pub(super) struct RatesArgs {
 impl RatesArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let inputs = self.log.log.iter().chain(&self.judge).chain(&self.document).chain(&self.steps);
-        self.output.check(&inputs.map(PathBuf::as_path).collect::<Vec<&Path>>())?;
-        if !(0.0..=1e6).contains(&self.table_ppm) {
-            return Err(Error::Usage(format!(
-                "--table-ppm is {}, must be from 0 to 1000000",
-                self.table_ppm
-            )));
-        }
+        within([("--table-ppm", Some(self.table_ppm), [0.0, 1e6], "")])?;
         let place = self.place.place()?;
-        let named = Named::apart(&self.log.reading, &self.log.log, &self.judge, self.document.as_ref());
-        let batch = Batch { output: &self.output, title: "Rate table, several units", accept_partial: false };
-        batch.carry_out(named.units()?, |work, names, bar| {
-            self.output.keep(self.fit(work, place.as_slice(), bar)?, work, names)
-        })
+        let logs = Logs::apart(&self.log, &self.judge, &self.base);
+        let task = Task {
+            beside: self.steps.as_deref(),
+            ..Task::new("Rate table, several units", self.output.files(), logs)
+        };
+        task.run(|job| self.fit(job, place.as_slice())?.done(&self.output, job))
     }
 
-    fn fit(&self, work: &Work, place: &[Place], bar: fn() -> Bar) -> Result<Fitted, Error> {
+    fn fit(&self, job: &Job<'_>, place: &[Place]) -> Result<Fitted, Error> {
+        let work = job.work;
         let nominal;
         let base = match (&work.base, work.runs.first()) {
             (Some(base), _) => &base.document,
             (None, Some(first)) => {
-                nominal = without_document(first, bar())?;
+                nominal = without_document(first, job.bar())?;
                 &nominal
             }
             (None, None) => return Err(Error::Usage("no log is given".to_owned())),
@@ -104,14 +99,13 @@ impl RatesArgs {
             table_ppm: self.table_ppm,
             with_bias: self.with_bias,
         };
-        let made = make(&wanted, bar)?;
+        let made = make(&wanted, || job.bar())?;
         let about = About {
             method: "rate table, weighted least squares",
             key: "rates",
             details: details(&made),
             sigmas: sigmas(&made),
             range_deg_c: made.range_deg_c(),
-            logs: work.logs(),
         };
         Ok(Fitted { report: made.report(), written: made.written, about })
     }

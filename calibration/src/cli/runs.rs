@@ -12,8 +12,8 @@ use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
 use super::bar;
+use crate::document::provenance::recordings_in;
 use crate::error::Error;
-use crate::provenance::recordings_in;
 use crate::runs::{Run, units_of};
 
 /// Gyro ticks in a batch of a text log.
@@ -21,37 +21,53 @@ const BATCH_TICKS: usize = 512;
 
 /// Logs, of one unit or of several.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct LogArgs {
-    /// Recordings (.mcap), the files of a text log in the mapping's order, or their folder
+pub(super) struct LogArgs {
+    /// Recordings (.mcap), the files of a text log in the order of its mapping, or a folder that has them
     #[arg(required = true, value_name = "LOG")]
-    pub(crate) log: Vec<PathBuf>,
+    pub(super) log: Vec<PathBuf>,
     #[command(flatten)]
-    pub(crate) reading: Reading,
+    pub(super) reading: Reading,
+}
+
+/// Logs that a document is judged on.
+#[derive(Debug, Clone, Args)]
+pub(super) struct JudgeArgs {
+    /// Log to judge the new document on, which it is not fitted to; repeatable
+    #[arg(long, value_name = "LOG")]
+    pub(super) judge: Vec<PathBuf>,
+}
+
+/// The document that a fit starts from.
+#[derive(Debug, Clone, Args)]
+pub(super) struct BaseArgs {
+    /// Calibration document (TOML) that the fit starts from and completes; for several units the folder that has UNIT.toml of each
+    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
+    pub(super) document: Option<PathBuf>,
 }
 
 /// How logs are read.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct Reading {
-    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
+/// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
+pub(super) struct Reading {
     #[arg(long, short, value_name = "FILE")]
-    pub(crate) mapping: Option<PathBuf>,
+    pub(super) mapping: Option<PathBuf>,
     /// Unit serial, if a recording has several; text log: the serial to assign (default: the document's)
     #[arg(long, short, value_name = "SERIAL")]
-    pub(crate) unit: Option<String>,
+    pub(super) unit: Option<String>,
     /// Start this long after each log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
-    pub(crate) start: Span,
+    pub(super) start: Span,
     /// Length to take of each log (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub(crate) duration: Option<Span>,
+    pub(super) duration: Option<Span>,
     /// Stop this long after each log's beginning (s)
     #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "duration")]
-    pub(crate) end: Option<Span>,
+    pub(super) end: Option<Span>,
 }
 
 impl LogArgs {
     /// The one run of one unit that the files are together; a text log that is given no serial is of `fallback`.
-    pub(crate) fn run(&self, fallback: Option<&UnitId>) -> Result<Run, Error> {
+    pub(super) fn run(&self, fallback: Option<&UnitId>) -> Result<Run, Error> {
         let mut units = self.reading.runs_in(&self.log, fallback)?;
         match (units.pop_first(), units.keys().next()) {
             (Some((_, run)), None) => Ok(run),
@@ -68,12 +84,12 @@ impl LogArgs {
 
 impl Reading {
     /// The serial that was given.
-    pub(crate) fn serial(&self) -> Result<Option<UnitId>, Error> {
+    pub(super) fn serial(&self) -> Result<Option<UnitId>, Error> {
         Ok(self.unit.as_deref().map(unit_id).transpose()?)
     }
 
     /// Runs by unit, each log for itself: every recording is a run, and of text logs as many files as the mapping has.
-    pub(crate) fn runs(
+    pub(super) fn runs(
         &self,
         logs: &[PathBuf],
         fallback: Option<&UnitId>,

@@ -1,14 +1,14 @@
 //! `isotherm-calibrate show`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::page::PageArgs;
-use super::print;
+use super::driver::emit;
+use super::files::PageArgs;
+use crate::document::show::show;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::show::show;
-use crate::written::Written;
 
 /// Show a calibration document in words, as tables and as curves
 #[derive(Debug, Args)]
@@ -21,20 +21,15 @@ pub(super) struct ShowArgs {
     document: PathBuf,
     #[command(flatten)]
     page: PageArgs,
-    /// Print document and curves as one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 impl ShowArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        self.page.check(&[&self.document])?;
-        let written = Written::read(&self.document)?;
-        let name = self.document.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let shown = show(&name, &written)?;
-        self.page.write(|| shown.sheet.to_html())?;
-        let text = if self.json { format!("{}\n", shown.to_json()) } else { shown.sheet.to_text() };
-        print(text.as_bytes())
+        let files = self.page.files();
+        files.check(&[&self.document])?;
+        let shown = show(&Written::read(&self.document)?)?;
+        files.page(Path::to_path_buf, || shown.sheet.to_html())?;
+        emit(files.json, || shown.to_json(), || shown.sheet.to_text())
     }
 }

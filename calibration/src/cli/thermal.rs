@@ -2,18 +2,20 @@
 
 mod stands;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use isotherm_correction::units::Span;
 
-use super::batch::{Batch, Named, Names, Work};
+use super::driver::{Done, Job, Task};
+use super::limits::within;
 use super::output::OutputArgs;
-use super::runs::{LogArgs, Reading};
+use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
+use super::units::{Logs, Work};
+use crate::document::provenance::{command_line, origin};
 use crate::error::Error;
-use crate::provenance::{command_line, origin};
+use crate::fits::thermal::{Fitted, Method, Settings, Terms, fit};
 use crate::report::FitReport;
-use crate::thermal::{Fitted, Method, Settings, Terms, fit};
 pub(super) use stands::StandArgs;
 
 /// Bias and scale factor over temperature from chamber runs of units at rest or on a rate table
@@ -37,18 +39,16 @@ pub(super) struct ThermalArgs {
     /// Choice of terms: cross-validation, or the largest model
     #[arg(long, value_enum, default_value_t = TermsArg::Auto)]
     terms: TermsArg,
-    /// Log to judge by, out of sample; repeatable
-    #[arg(long, value_name = "LOG")]
-    judge: Vec<PathBuf>,
+    #[command(flatten)]
+    judge: JudgeArgs,
     /// Start this long after each judging log's beginning (s)
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_start: Option<f64>,
     /// Length to take of each judging log (s) (default: all)
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_duration: Option<f64>,
-    /// Calibration document (TOML) to start from and complete; several units: a folder with UNIT.toml of each
-    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
-    document: Option<PathBuf>,
+    #[command(flatten)]
+    base: BaseArgs,
     /// Exit code 0 although a sensor was refused
     #[arg(long)]
     accept_partial: bool,
@@ -57,13 +57,13 @@ pub(super) struct ThermalArgs {
     #[command(flatten)]
     stands: StandArgs,
     /// Length of the windows of the fit (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0)]
     fit_window: f64,
     /// Windows of the stated residuals (s) (default: those of the fit, up to ten of them in runs of hours)
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS")]
     window: Option<f64>,
     /// Smoothing of the temperature (s) (default: by cross-validation)
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS")]
     smoothing: Option<f64>,
 }
 
@@ -89,41 +89,36 @@ enum TermsArg {
 impl ThermalArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let settings = self.settings()?;
-        self.check()?;
+        within([
+            ("--fit-window", Some(self.fit_window), [1.0, 600.0], "s"),
+            ("--window", self.window, [1.0, 3600.0], "s"),
+            ("--smoothing", self.smoothing, [0.0, 3600.0], "s"),
+            ("--judge-start", self.judge_start, [0.0, 1e9], "s"),
+            ("--judge-duration", self.judge_duration, [1.0, 1e9], "s"),
+        ])?;
+        self.each_once()?;
         let judging = Reading {
             start: self.judge_start.map_or(Span::ZERO, Span::from_s),
             duration: self.judge_duration.map(Span::from_s),
             end: None,
             ..self.log.reading.clone()
         };
-        let named = Named {
-            judging: &judging,
-            ..Named::apart(&self.log.reading, &self.log.log, &self.judge, self.document.as_ref())
-        };
+        let logs = Logs { judging: &judging, ..Logs::apart(&self.log, &self.judge, &self.base) };
         let title = "Thermal calibration of several units";
-        let batch = Batch { output: &self.output, title, accept_partial: self.accept_partial };
-        batch.carry_out(named.units()?, |work, names, _| self.fit(work, names, &settings))
+        let task =
+            Task { accept_partial: self.accept_partial, ..Task::new(title, self.output.files(), logs) };
+        task.run(|job| self.fit(job))
     }
 
-    /// Fits a unit and writes what comes of it.
-    fn fit(&self, work: &Work, names: &Names<'_>, settings: &Settings) -> Result<FitReport, Error> {
-        let stands = self.stands.stands(work.runs.len(), work.judges.len())?;
-        let settings = Settings { stands, ..settings.clone() };
+    fn fit(&self, job: &Job<'_>) -> Result<Done<FitReport>, Error> {
+        let work = job.work;
+        let settings = self.settings(work)?;
         let origin = origin(&work.logs(), &command_line())?;
         let base = work.base.as_ref().map(|base| &base.document);
-        let bar = names.at_work("fitting");
+        let bar = job.at_work("fitting");
         let Fitted { written, report, any_accepted } =
             fit(base, (&work.runs, &work.judges), &settings, origin, bar)?;
-        self.output.put(any_accepted, |_| Ok(written), report, work, names)
-    }
-
-    /// What the arguments must hold before anything is read.
-    fn check(&self) -> Result<(), Error> {
-        let inputs: Vec<&Path> =
-            self.log.log.iter().chain(&self.judge).chain(&self.document).map(PathBuf::as_path).collect();
-        self.output.check(&inputs)?;
-        self.each_once()
+        self.output.done(any_accepted, report, job, |_| Ok(written))
     }
 
     /// A log counts once, and judges nothing that was fitted to it.
@@ -147,7 +142,7 @@ impl ThermalArgs {
         if fitted[0] >= judged[1] || judged[0] >= fitted[1] {
             return Ok(());
         }
-        match self.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
+        match self.judge.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
             None => Ok(()),
             Some(judge) => Err(Error::Usage(format!(
                 "--judge {}: the document is fitted to the same part of it: give another log, or another part \
@@ -157,20 +152,7 @@ impl ThermalArgs {
         }
     }
 
-    fn settings(&self) -> Result<Settings, Error> {
-        let lengths = [
-            ("--fit-window", Some(self.fit_window), 1.0, 600.0),
-            ("--window", self.window, 1.0, 3600.0),
-            ("--smoothing", self.smoothing, 0.0, 3600.0),
-            ("--judge-start", self.judge_start, 0.0, 1e9),
-            ("--judge-duration", self.judge_duration, 1.0, 1e9),
-        ];
-        for (name, value, low, high) in lengths {
-            if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
-                return Err(Error::Usage(format!("{name} is {value} s, must be from {low} to {high} s")));
-            }
-        }
-        let created = Some(self.output.date()?);
+    fn settings(&self, work: &Work) -> Result<Settings, Error> {
         Ok(Settings {
             method: match self.method {
                 MethodArg::Sequential => Method::Sequential,
@@ -178,11 +160,11 @@ impl ThermalArgs {
                 MethodArg::Joint => Method::Joint,
             },
             terms: if self.terms == TermsArg::All { Terms::All } else { Terms::Auto },
-            stands: Vec::new(),
+            stands: self.stands.stands(work.runs.len(), work.judges.len())?,
             fit_window_s: self.fit_window,
             window_s: self.window,
             smoothing_s: self.smoothing,
-            created,
+            created: Some(self.output.date()?),
         })
     }
 }

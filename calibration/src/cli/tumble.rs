@@ -1,26 +1,25 @@
 //! `isotherm-calibrate tumble`.
 
-use std::path::{Path, PathBuf};
-
 use clap::Args;
 use isotherm_cli::Bar;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
-use super::above_0;
-use super::batch::{Batch, Named, Names, Work};
+use super::driver::{Job, Task};
+use super::limits::above_0;
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
-use super::runs::LogArgs;
+use super::runs::{BaseArgs, LogArgs};
+use super::units::Logs;
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::positions::bare::bare;
-use crate::positions::still::StillLimits;
-use crate::positions::track::Track;
+use crate::fits::positions::bare::bare;
+use crate::fits::positions::still::StillLimits;
+use crate::fits::positions::track::Track;
+use crate::fits::tumble::document::{before, complete};
+use crate::fits::tumble::fit::{Settings, analyse};
+use crate::fits::tumble::report::{Left, details, report, sigmas};
 use crate::runs::Run;
-use crate::tumble::analysis::{Settings, analyse};
-use crate::tumble::document::{before, complete};
-use crate::tumble::report::{Left, details, report, sigmas};
-use crate::written::Written;
 
 /// Axes, scale factors and biases of a unit that was put down in many ways by hand: accelerometers from |f| = g, gyros against them
 #[derive(Debug, Args)]
@@ -31,25 +30,24 @@ use crate::written::Written;
 pub(super) struct TumbleArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Calibration document (TOML) to complete (default: everything else as in the log); several units: a folder with UNIT.toml of each
-    #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
-    document: Option<PathBuf>,
+    #[command(flatten)]
+    base: BaseArgs,
     #[command(flatten)]
     gravity: GravityArgs,
     /// Still time at the beginning (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
     still_start: f64,
     /// Window of the search for still poses (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0)]
     window: f64,
     /// Largest variance of a still window, relative to the still start (default: the best of 2 to 10)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, hide_short_help = true, value_name = "FACTOR")]
     threshold: Option<f64>,
     /// Rate above which the unit turns (°/s)
-    #[arg(long, value_name = "DEG_PER_S", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 1.0)]
     still_rate: f64,
     /// Shortest pose (s), less half a window at either end
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0)]
     least: f64,
     /// Unit of the accelerometers' means without a document: "V" (converter readings too) or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
@@ -61,24 +59,21 @@ pub(super) struct TumbleArgs {
 impl TumbleArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        self.check()?;
+        above_0([
+            ("--still-start", Some(self.still_start)),
+            ("--window", Some(self.window)),
+            ("--threshold", self.threshold),
+            ("--still-rate", Some(self.still_rate)),
+            ("--least", Some(self.least)),
+        ])?;
         let gravity = self.gravity.stated()?;
-        let named = Named::together(&self.log.reading, &self.log.log, self.document.as_ref());
-        let batch =
-            Batch { output: &self.output, title: "Several units tumbled by hand", accept_partial: false };
-        batch.carry_out(named.units()?, |work, names, bar| {
-            self.output.keep(self.fit(work, names, &gravity, bar)?, work, names)
-        })
+        let logs = Logs::together(&self.log, &self.base);
+        let task = Task::new("Several units tumbled by hand", self.output.files(), logs);
+        task.run(|job| self.fit(job, &gravity)?.done(&self.output, job))
     }
 
-    fn fit(
-        &self,
-        work: &Work,
-        names: &Names<'_>,
-        (gravity, about_gravity): &(f64, Option<String>),
-        bar: fn() -> Bar,
-    ) -> Result<Fitted, Error> {
-        let (run, gravity) = (work.run()?, *gravity);
+    fn fit(&self, job: &Job<'_>, (gravity, about_gravity): &(f64, Option<String>)) -> Result<Fitted, Error> {
+        let (work, run, gravity) = (job.work, job.work.run()?, *gravity);
         let first;
         let base = match &work.base {
             Some(base) if base.document.accel.is_some() => base,
@@ -88,11 +83,11 @@ impl TumbleArgs {
                 ]));
             }
             None => {
-                first = self.first_document(run, bar())?;
+                first = self.first_document(run, job.bar())?;
                 &first
             }
         };
-        let track = Track::of(run, &base.loaded, bar())?;
+        let track = Track::of(run, &base.loaded, job.bar())?;
         let settings = Settings {
             gravity,
             limits: StillLimits {
@@ -105,7 +100,7 @@ impl TumbleArgs {
             search: self.threshold.is_none(),
             start_s: self.still_start,
         };
-        let fitting = names.at_work("fitting");
+        let fitting = job.at_work("fitting");
         let found = analyse(&track, &settings);
         fitting.finish();
         let mut tumble = found.map_err(Error::Refused)?;
@@ -113,7 +108,7 @@ impl TumbleArgs {
         let (document, warnings) = complete(&base.document, &tumble).map_err(Error::Refused)?;
         tumble.warnings.extend(warnings);
         let left = |written: &Written| -> Result<Left, Error> {
-            let track = Track::of(run, &written.loaded, bar())?;
+            let track = Track::of(run, &written.loaded, job.bar())?;
             Ok(Left::of(&track, &tumble.poses, gravity))
         };
         let (before, about_before) = before(&base.document, &tumble, work.base.is_some());
@@ -128,26 +123,11 @@ impl TumbleArgs {
             details: details(&tumble, &settings, &report)?,
             sigmas: sigmas(&document, &tumble),
             range_deg_c: None,
-            logs: work.logs(),
         };
         // Gyros are relative to the axes of the accelerometers that were found with them.
         let accepted = report.verdicts.first().is_some_and(|accel| accel.accepted);
         let written = if accepted { written } else { Written::of(&base.document)? };
         Ok(Fitted { written, report, about })
-    }
-
-    /// What the arguments must hold before anything is read.
-    fn check(&self) -> Result<(), Error> {
-        let positive = [
-            ("--still-start", self.still_start),
-            ("--window", self.window),
-            ("--threshold", self.threshold.unwrap_or(1.0)),
-            ("--still-rate", self.still_rate),
-            ("--least", self.least),
-        ];
-        positive.into_iter().try_for_each(|(name, value)| above_0(name, value))?;
-        let inputs: Vec<&Path> = self.log.log.iter().chain(&self.document).map(PathBuf::as_path).collect();
-        self.output.check(&inputs)
     }
 
     /// A document where there is none.

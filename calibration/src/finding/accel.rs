@@ -2,8 +2,8 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use super::words::AXES;
-use crate::drift::figures::{fixed, short};
+use crate::axes::AXES;
+use crate::report::figures::{fixed, short};
 
 /// What was found of an accelerometer. Temperatures are in °C, forces in m/s², angles in ″.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,11 +3,10 @@
 use std::fmt::{self, Display, Formatter};
 
 use super::{Finding, Instead, Kind, Place};
-use crate::drift::figures::{counted, fixed, short};
-use crate::modes::document::main_axis;
-use crate::rates::plateaus::Plateau;
+use crate::axes::{AXES, main_axis};
+use crate::fits::rates::plateaus::Plateau;
+use crate::report::figures::{counted, fixed, short};
 
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;
 const SEEN: f64 = 0.01;
@@ -260,7 +259,7 @@ fn plateaus(found: &[&Plateau]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::swapped::Looks;
+    use crate::runs::swapped::Looks;
 
     fn examples() -> Vec<Finding> {
         let plateau = |from: f64, rate: [f64; 3]| Plateau {

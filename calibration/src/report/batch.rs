@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::FitReport;
 use super::verdict::Verdict;
-use crate::drift::figures::{short, table};
+use crate::report::figures::{short, table};
 
 /// What a report gives to a batch: what is said of one unit by itself, and its rows in the table that closes all of them.
 pub trait UnitReport {
@@ -22,6 +22,8 @@ pub trait UnitReport {
     fn to_text(&self) -> String;
     /// Everything as JSON.
     fn to_json(&self) -> Value;
+    /// Everything as a page.
+    fn to_html(&self) -> String;
     /// What was refused and why, for the end of a command.
     fn refusals(&self) -> Vec<String>;
     /// A row for each sensor.
@@ -144,6 +146,10 @@ impl UnitReport for FitReport {
 
     fn to_json(&self) -> Value {
         Self::to_json(self)
+    }
+
+    fn to_html(&self) -> String {
+        Self::to_html(self)
     }
 
     fn refusals(&self) -> Vec<String> {

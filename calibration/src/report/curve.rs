@@ -6,13 +6,11 @@ use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{AccelOutput, Document, Sample};
 
 use super::verdict::Verdict;
+use crate::axes::output_name;
 use crate::error::Error;
 use crate::runs::table::{Rows, Table, Takes};
 use crate::runs::{Run, Troubles, Watch};
 use crate::size::Size;
-
-/// Names of the case axes.
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// One sensor or axis over one run, before and after. A window that either lacks is a gap in both.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,9 +100,8 @@ impl Curve {
             let [before, after_values] = common(values, truth.or(carried))?;
             let channel = channel_of(document, gyro, axis);
             let temperature = channel.and_then(|channel| after.temperature_deg_c.get(&channel).cloned());
-            let kind = if gyro { "gyro" } else { "accelerometer" };
             Some(Self {
-                of: format!("{kind} {}", AXES.get(axis)?),
+                of: output_name(gyro, axis),
                 measure: if gyro { "°/h" } else { "m/s²" }.to_owned(),
                 run: run.to_owned(),
                 sample,

@@ -6,7 +6,7 @@ use isotherm_pages::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples
 use isotherm_protocol::document::Sample;
 
 use super::{Coefficient, Curve, FitReport, Verdict, stated};
-use crate::spectrum::Spectrum;
+use crate::fits::drift::spectrum::Spectrum;
 
 /// Most points of a curve on the page; of more, the smallest and the largest of each group are there.
 const POINTS: usize = 4096;

@@ -91,7 +91,7 @@ impl Sigmas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::written::Written;
+    use crate::document::written::Written;
 
     #[test]
     fn what_is_written_is_read_back() {

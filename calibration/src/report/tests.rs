@@ -3,9 +3,9 @@ use std::path::Path;
 use isotherm_protocol::document::{Document, Sample};
 
 use super::*;
+use crate::document::written::Written;
 use crate::fixture::simulated;
 use crate::size::Size;
-use crate::written::Written;
 
 fn size(peak_to_peak: f64) -> Size {
     Size { count: 10, rms: 0.25 * peak_to_peak, peak_to_peak, ..Size::default() }
@@ -65,7 +65,8 @@ fn a_report_says_the_same_in_every_form() {
         "{text}"
     );
     assert!(
-        text.contains("1.2346") && text.contains("-2.50e-5") && text.contains("warning: only one"),
+        text.contains("\nwarning: only one plateau")
+            && text.contains("2 coefficients and all tables: --html"),
         "{text}"
     );
     let json = report.to_json();
@@ -74,9 +75,14 @@ fn a_report_says_the_same_in_every_form() {
     assert_eq!(json["verdicts"][0]["out_of_sample"]["after"]["peak_to_peak"], 0.17);
     assert_eq!(json["coefficients"][1]["sigma"], serde_json::Value::Null);
     let html = report.to_html();
-    for part in
-        ["class=\"headline\">\n<li>gyro x", "plateau &lt; 3", "Over temperature", "Spectrum of the residual"]
-    {
+    for part in [
+        "1.2346",
+        "-2.50e-5",
+        "class=\"headline\">\n<li>gyro x",
+        "plateau &lt; 3",
+        "Over temperature",
+        "Spectrum of the residual",
+    ] {
         assert!(html.contains(part), "{part}");
     }
     // A unit of measure by itself is said once.
@@ -87,6 +93,16 @@ fn a_report_says_the_same_in_every_form() {
     assert!(html.contains("; refused <span>worse</span></li>"), "{html}");
     assert!(html.len() < 600_000, "{}", html.len());
     assert_eq!(report.refusals(), ["FOG-0001: gyro y: worse"]);
+}
+
+#[test]
+fn a_terminal_shows_a_dozen_lines() {
+    let mut report = FitReport::new("Thermal calibration, method joint", "FOG-0001");
+    report.verdicts = vec![verdict(); 6];
+    report.warnings = (0..9).map(|k| format!("number {k}")).collect();
+    let text = report.to_text();
+    assert_eq!(text.lines().count(), 12, "{text}");
+    assert!(text.contains("warning: number 4\n4 more things are to be looked at; Thermal"), "{text}");
 }
 
 #[test]

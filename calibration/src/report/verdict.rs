@@ -4,7 +4,7 @@ use isotherm_pages::Table;
 use isotherm_protocol::document::{Measure, Residual, Sample};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::drift::figures::short;
+use crate::report::figures::short;
 use crate::size::Size;
 
 /// Which figure of a [`Size`] the sentence states.

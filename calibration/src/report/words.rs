@@ -1,4 +1,23 @@
-//! One sentence for all gyros, or logs, that it holds of.
+//! The lines of a terminal; one sentence for all gyros, or logs, that it holds of.
+
+use crate::report::figures::counted;
+
+/// Lines of a terminal that a unit has at most: what an engineer decides by. The page and the JSON have the rest.
+const LINES: usize = 12;
+/// Fewest of them for what is to be looked at.
+const LEAST_TOLD: usize = 2;
+
+/// What was found, what is to be looked at, as much of it as there is room for, and where the rest is.
+#[must_use]
+pub(crate) fn dozen(found: &[String], told: &[String], rest: &str) -> String {
+    let room = LINES.saturating_sub(found.len() + 1).max(LEAST_TOLD);
+    let lines: Vec<&str> = found.iter().chain(told.iter().take(room)).map(String::as_str).collect();
+    let more = match told.len().saturating_sub(room) {
+        0 => String::new(),
+        more => format!("{} to be looked at; ", counted(more, "more thing is", "more things are")),
+    };
+    format!("{}\n{more}{rest}: --html FILE, or --json.\n", lines.join("\n"))
+}
 
 /// Sentences of gyros, each with the names of all that it holds of, in the order of the first.
 #[must_use]

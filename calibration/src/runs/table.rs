@@ -260,9 +260,9 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::document::written::Written;
     use crate::fixture::simulated;
     use crate::size::Size;
-    use crate::written::Written;
 
     #[test]
     fn windows_hold_the_mean_of_their_ticks() {

@@ -52,7 +52,7 @@ impl Run {
     ) -> Result<Vec<Troubles>, Error> {
         let Some(first) = loaded.first() else { return Ok(Vec::new()) };
         let mut units = Together::new(loaded, each);
-        self.feed(&first.calibration, watch, |fed| units.take(&fed))?;
+        self.feed(&first.calibration, watch, |_| (), |fed| units.take(&fed))?;
         units.units.iter_mut().for_each(Offline::finish);
         units.give_out();
         units.units.iter().map(|unit| self.judge_troubles(units.count, unit.troubles())).collect()

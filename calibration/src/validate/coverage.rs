@@ -3,10 +3,10 @@
 use isotherm_correction::sample::SensorFlags;
 use isotherm_pages::Table;
 
-use crate::drift::figures::short;
+use crate::document::written::Written;
 use crate::error::Error;
+use crate::report::figures::short;
 use crate::runs::{Run, Watch};
-use crate::written::Written;
 
 /// Share of the fitted range that a judgement should cover.
 const ENOUGH: f64 = 0.5;

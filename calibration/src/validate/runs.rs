@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::document::Document;
 use toml::Value;
 
+use crate::document::provenance::{files_of, origin};
 use crate::error::Error;
-use crate::provenance::{files_of, origin};
 use crate::runs::Run;
 
 /// A run, and whether the document was made from it.

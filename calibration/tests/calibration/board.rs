@@ -1,11 +1,11 @@
 //! `board`: the ratio of the electronics from cycles of a simulated chamber in two positions.
 
-use isotherm_calibration::board::{Wanted, fit};
+use isotherm_calibration::document::written::Written;
 use isotherm_calibration::error::Error;
 use isotherm_calibration::finding::{AccelKind, Kind};
+use isotherm_calibration::fits::board::{Wanted, fit};
+use isotherm_calibration::fits::thermal::{Site, Stand};
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::thermal::{Site, Stand};
-use isotherm_calibration::written::Written;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use isotherm_calibration::allan::deviation::lengths;
-use isotherm_calibration::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
-use isotherm_calibration::drift::markov::{Beside, Fit};
-use isotherm_calibration::drift::parameters::Trend;
-use isotherm_calibration::drift::slow::Slow;
-use isotherm_calibration::impact::monte_carlo::drift;
-use isotherm_calibration::impact::scenario::Care;
+use isotherm_calibration::fits::drift::allan::deviation::lengths;
+use isotherm_calibration::fits::drift::allan::{Coefficient, Estimator, NoiseFit, Phase, Term};
+use isotherm_calibration::fits::drift::document::Trend;
+use isotherm_calibration::fits::drift::markov::{Beside, Fit};
+use isotherm_calibration::fits::drift::slow::Slow;
+use isotherm_calibration::fits::impact::monte_carlo::drift;
+use isotherm_calibration::fits::impact::scenario::Care;
 use isotherm_protocol::document::Document;
 use serde_json::Value;
 

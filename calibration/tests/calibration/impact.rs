@@ -1,7 +1,7 @@
 //! `impact`: the figures of 002, and the command as its user calls it.
 
-use isotherm_calibration::impact::monte_carlo::{drift, sail_all};
-use isotherm_calibration::impact::scenario::{CARES, Care, Drift, Figures, Voyage};
+use isotherm_calibration::fits::impact::monte_carlo::{drift, sail_all};
+use isotherm_calibration::fits::impact::scenario::{CARES, Care, Drift, Figures, Voyage};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use isotherm_calibration::document::written::Written;
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::written::Written;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::rows::{write_header, write_tick};
 use isotherm_log::offline::{Offline, unit_id};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_protocol::document::Document;
 use isotherm_simulator::chamber::Profile;
 

@@ -1,13 +1,13 @@
 //! `positions`: a simulated stand with its errors, from the log to the document.
 
-use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
-use isotherm_calibration::positions::document::complete;
-use isotherm_calibration::positions::judged::judge;
-use isotherm_calibration::positions::model::SMALL;
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::positions::times::Times;
-use isotherm_calibration::positions::track::Track;
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::document::complete;
+use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
+use isotherm_calibration::fits::positions::judged::judge;
+use isotherm_calibration::fits::positions::model::SMALL;
+use isotherm_calibration::fits::positions::plan::Plan;
+use isotherm_calibration::fits::positions::times::Times;
+use isotherm_calibration::fits::positions::track::Track;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::Offline;
 use nalgebra::DVector;
@@ -268,7 +268,7 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let short = refused(&all, &Stand { hold_s: 3.0, ..driven(3) }, &none);
     assert!(short.contains("is never still") && short.contains("--least"), "{short}");
     let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
-    assert!(dead.contains("accelerometer y: one value in every tick, 0: dead"), "{dead}");
+    assert!(dead.contains("accelerometer y: every reading is 0: the sensor is dead"), "{dead}");
     let gaps = refused(&all, &driven(3), &|track| {
         track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN);
     });

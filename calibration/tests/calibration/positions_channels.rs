@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Shape};

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::Output;
 
-use isotherm_calibration::positions::plan::Plan;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::report::Sigmas;
-use isotherm_calibration::written::Written;
 use isotherm_protocol::document::Document;
 
 use crate::command::program;
@@ -59,10 +59,9 @@ fn the_command_writes_the_document_and_says_what_it_did() {
     assert!(done.status.success(), "{}", text(&done.stderr));
     let said = text(&done.stdout);
     assert!(said.starts_with("accelerometer x: ") && said.contains("out of sample; accepted"), "{said}");
-    assert!(said.contains("stand δ1") && said.contains("Axes by temperature"), "{said}");
-    println!("{said}");
     let page = std::fs::read_to_string(at("new.html")).unwrap();
     assert!(page.contains("Axes over temperature") && page.contains("class=\"headline\""));
+    assert!(page.contains("stand δ1") && page.contains("Axes by temperature"));
     let written = Written::read(&at("new.toml")).unwrap();
     let thermal = written.document.accel.as_ref().unwrap().orientation.thermal.as_ref().unwrap();
     assert_eq!(

@@ -1,10 +1,10 @@
 //! `positions` on logs that are damaged: what is told, and what is refused.
 
-use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
+use isotherm_calibration::fits::positions::plan::Plan;
+use isotherm_calibration::fits::positions::track::Track;
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::written::Written;
 use isotherm_protocol::document::Document;
 
 use crate::stand::judging::{quick, settings, times, tracks};

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use isotherm_calibration::positions::document::complete;
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::document::complete;
+use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{AccelOutput, AccelSensor, Curve, Document, GyroSensor, Shape};
 use isotherm_simulator::Scenario;

@@ -7,9 +7,9 @@ pub(crate) mod judging;
 
 use std::collections::BTreeMap;
 
-use isotherm_calibration::positions::plan::{Attitude, Plan};
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::plan::{Attitude, Plan};
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::written::Written;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;

@@ -18,9 +18,9 @@ mod scale;
 mod service;
 mod sparse;
 
+use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, fit};
 use isotherm_calibration::report::FitReport;
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::thermal::{Fitted, Method, Settings, Site, fit};
 use isotherm_correction::earth::Place;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;

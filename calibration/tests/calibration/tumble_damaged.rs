@@ -1,11 +1,11 @@
 //! `tumble` on logs that are damaged and can be fitted all the same: what is told, and what is refused.
 
-use isotherm_calibration::positions::bare::bare;
-use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::fits::positions::bare::bare;
+use isotherm_calibration::fits::positions::track::Track;
+use isotherm_calibration::fits::tumble::document::complete;
+use isotherm_calibration::fits::tumble::fit::{Tumble, analyse};
+use isotherm_calibration::fits::tumble::report::{Left, report};
 use isotherm_calibration::report::Verdict;
-use isotherm_calibration::tumble::analysis::{Tumble, analyse};
-use isotherm_calibration::tumble::document::complete;
-use isotherm_calibration::tumble::report::{Left, report};
 use isotherm_protocol::document::{AccelOutput, Document};
 
 use crate::stand;

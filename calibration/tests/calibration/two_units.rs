@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
 use isotherm_log::text::LogEvent;
 use serde_json::Value;
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use isotherm_calibration::provenance::origin;
+use isotherm_calibration::document::provenance::origin;
+use isotherm_calibration::document::written::Written;
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::runs::table::Table;
-use isotherm_calibration::written::Written;
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
@@ -258,7 +258,7 @@ fn faults_of_the_log_that_judges_are_told() {
         "{clean}"
     );
     let zero = warnings("zero.mcap", &|_, event| Some(gyro(event, &|tick| tick.readings[1] = 0.0)));
-    assert!(zero.contains("zero.mcap: gyro y: it reads zero throughout: dead, not connected"), "{zero}");
+    assert!(zero.contains("zero.mcap: gyro y: every reading is 0: the sensor is dead"), "{zero}");
     let nan = warnings("nan.mcap", &|_, event| {
         Some(gyro(event, &|tick| {
             if tick.sequence % 300 == 7 {

@@ -5,14 +5,14 @@ use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 
 use super::{Gyro, ImpactArgs, sizes};
-use crate::drift::HOUR_S;
 use crate::error::Error;
-use crate::impact::estimate::TICK_S;
-use crate::impact::logged;
-use crate::impact::models::Choice;
-use crate::impact::monte_carlo::{Voyages, sail_all};
-use crate::impact::report::{Report, Row};
-use crate::impact::scenario::{CARES, Drift, Voyage};
+use crate::fits::drift::HOUR_S;
+use crate::fits::impact::estimate::TICK_S;
+use crate::fits::impact::logged;
+use crate::fits::impact::models::Choice;
+use crate::fits::impact::monte_carlo::{Voyages, sail_all};
+use crate::fits::impact::report::{Report, Row};
+use crate::fits::impact::scenario::{CARES, Drift, Voyage};
 use crate::runs::cut::Cut;
 
 /// Seeds where nobody says.

@@ -4,14 +4,14 @@ use isotherm_cli::Bar;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{AccelOutput, Document};
 
+use crate::document::written::Written;
 use crate::error::Error;
-use crate::positions::analysis::{Analysis, Settings};
-use crate::positions::bare::bare;
-use crate::positions::judged::{Judgement, judge};
-use crate::positions::pose::Pose;
-use crate::positions::track::Track;
+use crate::fits::positions::bare::bare;
+use crate::fits::positions::fit::{Analysis, Settings};
+use crate::fits::positions::judged::{Judgement, judge};
+use crate::fits::positions::pose::Pose;
+use crate::fits::positions::track::Track;
 use crate::runs::Run;
-use crate::written::Written;
 
 /// A document where there is none.
 pub(super) fn first_document(runs: &[Run], output: AccelOutput, bar: Bar) -> Result<Document, Error> {
@@ -22,7 +22,11 @@ pub(super) fn first_document(runs: &[Run], output: AccelOutput, bar: Bar) -> Res
 }
 
 /// Runs tick by tick, corrected with a document.
-pub(super) fn tracks(runs: &[Run], written: &Written, bar: fn() -> Bar) -> Result<Vec<Track>, Error> {
+pub(super) fn tracks(
+    runs: &[Run],
+    written: &Written,
+    bar: impl Fn() -> Bar + Copy,
+) -> Result<Vec<Track>, Error> {
     runs.iter().map(|run| Track::of(run, &written.loaded, bar())).collect()
 }
 
@@ -33,7 +37,7 @@ pub(super) fn judged(
     poses: &[(Pose, usize)],
     runs: &[Run],
     [before, after]: [&Written; 2],
-    bar: fn() -> Bar,
+    bar: impl Fn() -> Bar + Copy,
 ) -> Result<Vec<Judgement>, Error> {
     let (before, after) = (tracks(runs, before, bar)?, tracks(runs, after, bar)?);
     let errors = analysis.fit.stand.map(|(error, _)| error);

@@ -3,9 +3,9 @@
 use clap::Args;
 
 use crate::error::Error;
-use crate::positions::gravity;
-use crate::rates::steps::axis;
-use crate::thermal::{Site, Stand, Turning};
+use crate::fits::positions::gravity;
+use crate::fits::rates::steps::axis;
+use crate::fits::thermal::{Site, Stand, Turning};
 
 /// Rates of a table that can be used (°/s).
 const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];

@@ -1,12 +1,12 @@
 //! How what was found on the stand is held against the truth.
 
-use isotherm_calibration::positions::analysis::{Analysis, Settings, analyse};
-use isotherm_calibration::positions::plan::Plan;
-use isotherm_calibration::positions::still::StillLimits;
-use isotherm_calibration::positions::times::Times;
-use isotherm_calibration::positions::track::Track;
+use isotherm_calibration::document::written::Written;
+use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
+use isotherm_calibration::fits::positions::plan::Plan;
+use isotherm_calibration::fits::positions::still::StillLimits;
+use isotherm_calibration::fits::positions::times::Times;
+use isotherm_calibration::fits::positions::track::Track;
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::written::Written;
 use isotherm_simulator::instrument::Instrument;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
-use isotherm_calibration::written::Written;
+use isotherm_calibration::document::written::Written;
 use isotherm_correction::units::Span;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
@@ -144,6 +144,26 @@ fn folders_recordings_and_several_units() {
         "{words}"
     );
     assert!(!at.join("none.toml").exists() && at.join("none.html").exists());
+
+    // One gyro is dead: the others are written, and the command says whether that is enough.
+    let log = read("log.csv");
+    let dead = log.lines().enumerate().map(|(row, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if row > 0 {
+            cells[2] = "0";
+        }
+        cells.join(",") + "\n"
+    });
+    std::fs::write(at.join("dead.csv"), dead.collect::<String>()).unwrap();
+    for (accept, wanted) in [(&[][..], 1), (&["--accept-partial"], 0)] {
+        let out = format!("part-{wanted}.toml");
+        let args =
+            [&["dead.csv", "--mapping", "mapping.toml", "--unit", "UNIT", "--out", &out], accept].concat();
+        let (words, code) = said(at, &args);
+        assert!(code == Some(wanted) && words.contains("gyro y: refused: every reading is 0"), "{words}");
+        let gyros = Written::read(&at.join(&out)).unwrap().document.gyro.sensor;
+        assert_eq!([0, 1].map(|gyro| gyros[gyro].static_bias.is_some()), [true, false]);
+    }
 
     // Of several units one is not judged: it is fitted, and that is said.
     let (words, _) = said(

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use isotherm_calibration::fits::thermal::{Method, Settings, fit};
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::thermal::{Method, Settings, fit};
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};

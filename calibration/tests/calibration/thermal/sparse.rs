@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, fit};
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::thermal::{Fitted, Method, Settings, fit};
 use isotherm_correction::sample::OutputKind;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;

@@ -1,0 +1,227 @@
+//! The units of a command's logs, and what each has to work on.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use isotherm_protocol::key::UnitId;
+
+use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::runs::Run;
+use crate::runs::cut::Cut;
+
+/// What a command has to work on of one unit.
+pub(super) struct Work {
+    /// Document that it starts from.
+    pub(super) base: Option<Written>,
+    /// Runs that it sees.
+    pub(super) runs: Vec<Run>,
+    /// Runs that it is judged on.
+    pub(super) judges: Vec<Run>,
+    /// What is to be said of the logs.
+    pub(super) warnings: Vec<String>,
+    /// Where a log that is not read as runs was found to be cut short.
+    pub(super) cut: Cut,
+}
+
+/// Logs and documents as a command line names them.
+pub(super) struct Logs<'a> {
+    /// How logs are read.
+    pub(super) reading: &'a Reading,
+    /// Logs.
+    pub(super) logs: &'a [PathBuf],
+    /// Whether all files of a unit are one run; else each log is one.
+    pub(super) together: bool,
+    /// How logs to judge on are read.
+    pub(super) judging: &'a Reading,
+    /// Logs to judge on.
+    pub(super) judge: &'a [PathBuf],
+    /// A document, or the folder that has UNIT.toml of each unit.
+    pub(super) document: Option<&'a Path>,
+    /// What a text log's unit is called where nothing is written of it and nobody says.
+    pub(super) unnamed: Option<UnitId>,
+}
+
+/// A unit with its work, or with why there is none.
+pub(super) type Unit = (UnitId, Result<Work, Error>);
+
+type Runs = BTreeMap<UnitId, Vec<Run>>;
+
+const NOTHING: &str = "the logs have no raw readings of any unit: give recordings of the bus (isotherm-replay \
+                       record), or text logs with --mapping; a ROS 2 bag has other messages";
+
+impl Work {
+    /// A unit's work with nothing to be said of its logs yet.
+    pub(super) fn new(base: Option<Written>, runs: Vec<Run>, judges: Vec<Run>) -> Self {
+        Self { base, runs, judges, warnings: Vec::new(), cut: Cut::default() }
+    }
+
+    /// Where its logs are cut short, as far as they have been read.
+    pub(super) fn cuts(&self) -> Vec<String> {
+        let mut cuts: Vec<String> = Vec::new();
+        let runs = self.runs.iter().chain(&self.judges).filter_map(Run::cut_short);
+        for words in runs.chain(self.cut.words()) {
+            if cuts.iter().all(|known| known != words) {
+                cuts.push(words.to_owned());
+            }
+        }
+        cuts
+    }
+
+    /// What is to be said of its logs once they have been read.
+    pub(super) fn told(&self) -> Vec<String> {
+        [self.warnings.clone(), self.cuts()].concat()
+    }
+
+    /// The logs of its runs as they were given, each once.
+    pub(super) fn logs(&self) -> Vec<PathBuf> {
+        let mut logs: Vec<PathBuf> = Vec::new();
+        for log in self.runs.iter().flat_map(Run::logs) {
+            if !logs.contains(log) {
+                logs.push(log.clone());
+            }
+        }
+        logs
+    }
+
+    /// Its only run, where all files of a unit are one.
+    pub(super) fn run(&self) -> Result<&Run, Error> {
+        self.runs.first().ok_or_else(|| Error::Refused(vec![NOTHING.to_owned()]))
+    }
+}
+
+impl<'a> Logs<'a> {
+    /// Logs that are one run of each unit.
+    pub(super) fn together(log: &'a LogArgs, base: &'a BaseArgs) -> Self {
+        Self { together: true, document: base.document.as_deref(), ..Self::of(log) }
+    }
+
+    /// Logs of which each is a run, and others to judge on.
+    pub(super) fn apart(log: &'a LogArgs, judge: &'a JudgeArgs, base: &'a BaseArgs) -> Self {
+        Self { judge: &judge.judge, document: base.document.as_deref(), ..Self::of(log) }
+    }
+
+    /// Logs to judge a document on, or the documents of a folder.
+    pub(super) fn judging(log: &'a LogArgs, document: &'a Path) -> Self {
+        Self { document: Some(document), ..Self::of(log) }
+    }
+
+    fn of(log: &'a LogArgs) -> Self {
+        let LogArgs { log, reading } = log;
+        Self {
+            reading,
+            logs: log,
+            together: false,
+            judging: reading,
+            judge: &[],
+            document: None,
+            unnamed: None,
+        }
+    }
+
+    /// All that is read.
+    pub(super) fn inputs(&self) -> Vec<&'a Path> {
+        self.logs.iter().chain(self.judge).map(PathBuf::as_path).chain(self.document).collect()
+    }
+
+    /// The units that there is something to do of: that of the document, else all that the logs have.
+    pub(super) fn units(&self) -> Result<Vec<Unit>, Error> {
+        let folder = self.document.filter(|path| path.is_dir());
+        if let Some(document) = self.document.filter(|_| folder.is_none()) {
+            let base = Written::read(document)?;
+            let unit = base.loaded.unit.clone();
+            let (runs, others) = self.of_document(self.runs(Some(&unit))?, &unit)?;
+            let judges = match self.judges(Some(&unit))? {
+                Some(judges) => self.of_document(judges, &unit)?.0,
+                None => Vec::new(),
+            };
+            let mut work = Work::new(Some(base), runs, judges);
+            if !others.is_empty() {
+                work.warnings.push(format!(
+                    "the logs also have unit {}, which is left out: the document is of {unit}. For all units give \
+                     --calibration a folder with UNIT.toml of each",
+                    others.join(", ")
+                ));
+            }
+            return Ok(vec![(unit, Ok(work))]);
+        }
+        let of_units = self.runs(self.unnamed.as_ref())?;
+        if of_units.is_empty() {
+            return Err(Error::Refused(vec![NOTHING.to_owned()]));
+        }
+        let mut judging = self.judges(of_units.keys().next())?.unwrap_or_default();
+        let several = of_units.len() > 1;
+        let mut work = |unit: &UnitId, runs| {
+            let base = folder.map(|folder| of_folder(folder, unit)).transpose()?;
+            let judges = judging.remove(unit).unwrap_or_default();
+            let unjudged = judges.is_empty() && !self.judge.is_empty();
+            if unjudged && !several {
+                return Err(Error::Refused(vec![format!("--judge: the logs have nothing of unit {unit}")]));
+            }
+            let mut work = Work::new(base, runs, judges);
+            if unjudged {
+                work.warnings.push(format!(
+                    "the logs of --judge have nothing of unit {unit}: it is fitted, but judged in sample only"
+                ));
+            }
+            Ok(work)
+        };
+        let units = of_units.into_iter().map(|(unit, runs)| {
+            let work = work(&unit, runs);
+            (unit, work)
+        });
+        Ok(units.collect())
+    }
+
+    fn runs(&self, fallback: Option<&UnitId>) -> Result<Runs, Error> {
+        if !self.together {
+            return self.reading.runs(self.logs, fallback);
+        }
+        let one = self.reading.runs_in(self.logs, fallback)?.into_iter();
+        Ok(one.map(|(unit, run)| (unit, vec![run])).collect())
+    }
+
+    /// What the judging logs have, where there are any.
+    fn judges(&self, fallback: Option<&UnitId>) -> Result<Option<Runs>, Error> {
+        let given = (!self.judge.is_empty()).then_some(self.judge);
+        given.map(|logs| self.judging.runs(logs, fallback)).transpose()
+    }
+
+    /// The runs of the unit that a document is of, or that --unit names, and the other units that there are.
+    fn of_document(&self, mut runs: Runs, unit: &UnitId) -> Result<(Vec<Run>, Vec<String>), Error> {
+        let wanted = self.reading.serial()?.unwrap_or_else(|| unit.clone());
+        let own = runs.remove(&wanted);
+        let others: Vec<String> = runs.keys().map(ToString::to_string).collect();
+        match own {
+            Some(own) => Ok((own, others)),
+            None if others.is_empty() => Err(Error::Refused(vec![NOTHING.to_owned()])),
+            None => Err(Error::Refused(vec![format!(
+                "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit if \
+                 the serial has changed",
+                others.join(", ")
+            )])),
+        }
+    }
+}
+
+/// The document of a unit in a folder, which must be of that unit.
+fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
+    let path = folder.join(format!("{unit}.toml"));
+    if !path.exists() {
+        return Err(Error::Refused(vec![format!(
+            "{} does not exist: the folder of --calibration needs a document of each unit; leave the unit out with \
+             --unit",
+            path.display()
+        )]));
+    }
+    let written = Written::read(&path)?;
+    if written.loaded.unit != *unit {
+        return Err(Error::Refused(vec![format!(
+            "{} is of unit {}: correct its name or its unit",
+            path.display(),
+            written.loaded.unit
+        )]));
+    }
+    Ok(written)
+}

@@ -1,0 +1,266 @@
+//! What has changed between two documents of a unit, such as before and after shock or vibration.
+//!
+//! Axes are compared as 004 does in its third table: by how many seconds of arc each input axis has turned, towards each of
+//! the case axes, beside the uncertainty of the two calibrations. Biases and scale factors are compared over the range of
+//! temperature that both were fitted over; then comes every entry that differs.
+
+pub mod series;
+mod sheet;
+#[cfg(test)]
+mod tests;
+
+use isotherm_correction::calibration::Steady;
+use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
+use isotherm_protocol::control::DocumentChange;
+use isotherm_protocol::document::difference;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::document::show::terms::{terms, tree};
+use crate::document::show::{places, range_of, steady};
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::report::Sigmas;
+
+/// Standard errors beyond which an axis has turned.
+pub const BEYOND: f64 = 3.0;
+/// Temperatures that changes are taken at.
+const POINTS: usize = 101;
+
+/// How an input axis has turned.
+#[derive(Debug, Clone, Serialize)]
+pub struct AxisChange {
+    /// "gyro x".
+    pub of: String,
+    /// Change of its direction cosines at the reference temperature (″).
+    pub change_arcsec: [f64; 3],
+    /// Their standard errors, of both documents together (″); 0 where not known.
+    pub sigma_arcsec: [f64; 3],
+    /// Angle that it has turned by at the reference temperature (″).
+    pub turned_arcsec: f64,
+    /// Standard error of the angle (″); `None` where not known.
+    pub turned_sigma_arcsec: Option<f64>,
+    /// The largest change of a cosine in standard errors; `None` where not known.
+    pub significance: Option<f64>,
+    /// Largest angle over the range of temperature (″).
+    pub largest_arcsec: f64,
+}
+
+/// How a bias, an increment weight or a scale factor has changed.
+#[derive(Debug, Clone, Serialize)]
+pub struct ValueChange {
+    /// "gyro x bias".
+    pub of: String,
+    /// Symbol of the unit.
+    pub unit: &'static str,
+    /// Change at each temperature of the comparison.
+    pub change: Vec<f64>,
+    /// Change at the reference temperature.
+    pub at_reference: f64,
+    /// Its standard error, of both documents together; `None` where not known.
+    pub sigma: Option<f64>,
+}
+
+/// All changes.
+#[derive(Debug, Clone, Serialize)]
+pub struct Changes {
+    /// Names of both documents.
+    pub names: [String; 2],
+    /// Units that they are for.
+    pub units: [String; 2],
+    /// Temperature that axes are compared at (°C).
+    pub reference_deg_c: f64,
+    /// Temperatures of the comparison (°C).
+    pub temperature_deg_c: Vec<f64>,
+    /// Axes.
+    pub axes: Vec<AxisChange>,
+    /// Biases, increment weights, scale factors; only those that differ somewhere.
+    pub values: Vec<ValueChange>,
+    /// Entries that differ.
+    pub entries: Vec<DocumentChange>,
+}
+
+/// Compares two documents; `axis_sigma` is the standard error of a direction cosine (″) where a document states none.
+///
+/// # Errors
+/// [`Error::Document`] where a document cannot be written as a tree.
+pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Result<Changes, Error> {
+    let ranges = [before, after].map(|written| Ok::<_, Error>(range_of(&terms(&tree(&written.document)?))));
+    let [first, second] = ranges;
+    let ([a, b], [c, d]) = (first?, second?);
+    let range = if a.max(c) < b.min(d) { [a.max(c), b.min(d)] } else { [a.min(c), b.max(d)] };
+    let reference = after.document.temperature.assumed_deg_c.clamp(range[0], range[1]);
+    let at = places(range, POINTS);
+    let pair = |x: f64| [steady(before, x, 0.0), steady(after, x, 0.0)];
+    let compared = Compared {
+        reference: pair(reference),
+        over: at.iter().map(|x| pair(*x)).collect(),
+        sigmas: [Sigmas::of(&before.document), Sigmas::of(&after.document)],
+        axis_sigma,
+    };
+    let (mut axes, mut values) = (Vec::new(), Vec::new());
+    let gyros = |written: &Written| -> Vec<String> {
+        written.document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect()
+    };
+    let same = before.document.gyro.output == after.document.gyro.output;
+    for (name, places) in matched(&gyros(before), &gyros(after)) {
+        axes.push(compared.axis(&format!("gyro {name}"), ("gyro", &name), places, |s| &s.gyro_axes));
+        compared.gyro(&name, places, same, &mut values);
+    }
+    if let (Some(first), Some(second)) = (&before.document.accel, &after.document.accel) {
+        let accels = |accel: &isotherm_protocol::document::Accel| -> Vec<String> {
+            accel.sensor.iter().map(|sensor| sensor.name.clone()).collect()
+        };
+        let same = first.output == second.output;
+        for (name, places) in matched(&accels(first), &accels(second)) {
+            let of = format!("accelerometer {name}");
+            axes.push(compared.axis(&of, ("accel", &name), places, |s| &s.accel_axes));
+            compared.accel(&name, places, same, &mut values);
+        }
+    }
+    values.retain(|value| value.change.iter().chain([&value.at_reference]).any(|change| *change != 0.0));
+    let entries = difference(&before.document, &after.document);
+    let names = [before, after].map(|written| written.name.clone());
+    let units = [before, after].map(|written| written.document.unit.clone());
+    Ok(Changes { names, units, reference_deg_c: reference, temperature_deg_c: at, axes, values, entries })
+}
+
+/// Names that both have, with their places in either.
+fn matched(before: &[String], after: &[String]) -> Vec<(String, [usize; 2])> {
+    let places = after.iter().enumerate().filter_map(|(j, name)| {
+        before.iter().position(|other| other == name).map(|i| (name.clone(), [i, j]))
+    });
+    places.collect()
+}
+
+struct Compared {
+    reference: [Steady; 2],
+    over: Vec<[Steady; 2]>,
+    sigmas: [Sigmas; 2],
+    axis_sigma: Option<f64>,
+}
+
+impl Compared {
+    fn axis(
+        &self,
+        of: &str,
+        (kind, sensor): (&str, &str),
+        [i, j]: [usize; 2],
+        rows: impl Fn(&Steady) -> &[[f64; 3]],
+    ) -> AxisChange {
+        let both = |[before, after]: &[Steady; 2]| {
+            let row =
+                |steady: &Steady, place: usize| rows(steady).get(place).copied().unwrap_or([f64::NAN; 3]);
+            (row(before, i), row(after, j))
+        };
+        let (old, new) = both(&self.reference);
+        let mut change = [0.0; 3];
+        for ((change, old), new) in change.iter_mut().zip(old).zip(new) {
+            *change = Angle::from_rad(new - old).as_arcsec();
+        }
+        let stated = self.sigmas.each_ref().map(|sigmas| self.row_sigma(sigmas, kind, sensor));
+        let mut sigma = [0.0; 3];
+        if let [Some(a), Some(b)] = stated {
+            for ((sigma, a), b) in sigma.iter_mut().zip(a).zip(b) {
+                *sigma = libm::hypot(a, b);
+            }
+        }
+        let known = stated.iter().all(Option::is_some) && sigma.iter().any(|sigma| *sigma > 0.0);
+        let turned = angle(old, new);
+        let significance = change
+            .iter()
+            .zip(sigma)
+            .filter(|(_, sigma)| *sigma > 0.0)
+            .map(|(change, sigma)| change.abs() / sigma)
+            .fold(0.0, f64::max);
+        let length = change.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let turned_sigma = if length > 0.0 {
+            change.iter().zip(sigma).map(|(x, s)| (x * s / length) * (x * s / length)).sum::<f64>().sqrt()
+        } else {
+            sigma.iter().copied().fold(0.0, f64::max)
+        };
+        let over = self.over.iter().map(|pair| {
+            let (old, new) = both(pair);
+            angle(old, new)
+        });
+        AxisChange {
+            of: of.to_owned(),
+            change_arcsec: change,
+            sigma_arcsec: sigma,
+            turned_arcsec: turned,
+            turned_sigma_arcsec: known.then_some(turned_sigma),
+            significance: known.then_some(significance),
+            largest_arcsec: over.fold(turned, f64::max),
+        }
+    }
+
+    /// Standard errors of the direction cosines of one document.
+    fn row_sigma(&self, sigmas: &Sigmas, kind: &str, sensor: &str) -> Option<[f64; 3]> {
+        let stated = sigmas.get(kind, sensor, "axis_arcsec").and_then(|row| <[f64; 3]>::try_from(row).ok());
+        stated.or_else(|| self.axis_sigma.map(|sigma| [sigma; 3]))
+    }
+
+    fn gyro(&self, name: &str, places: [usize; 2], same_output: bool, values: &mut Vec<ValueChange>) {
+        let deg_per_h = |[a, b]: [f64; 2]| AngularRate::from_rad_per_s(b - a).as_deg_per_h();
+        let sigma = self.first_sigma("gyro", name, "static_bias", [1.0; 2]);
+        let of = format!("gyro {name} bias");
+        values.extend(self.value(of, "°/h", places, |s| &s.gyro_bias, deg_per_h, sigma));
+        if same_output {
+            let of = format!("gyro {name} increment weight");
+            let sigma = self.first_sigma("gyro", name, "increment_weight_ppm", [1.0; 2]);
+            values.extend(self.value(of, "ppm", places, |s| &s.gyro_weight, ppm, sigma));
+        }
+    }
+
+    fn accel(&self, name: &str, places: [usize; 2], same_output: bool, values: &mut Vec<ValueChange>) {
+        let milli_g = |force: f64| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
+        let scales = self.reference.each_ref().map(|steady| &steady.accel_scale);
+        let scale = [0, 1].map(|side| {
+            let (scales, place) = if side == 0 { (scales[0], places[0]) } else { (scales[1], places[1]) };
+            scales.get(place).copied().unwrap_or(f64::NAN)
+        });
+        // A standard error of the output is one of the specific force by the scale factor.
+        let sigma = self.first_sigma("accel", name, "bias", scale.map(|scale| milli_g(1.0 / scale)));
+        let change = |[a, b]: [f64; 2]| milli_g(b - a);
+        let of = format!("accelerometer {name} bias");
+        values.extend(self.value(of, "mg", places, |s| &s.accel_bias, change, sigma));
+        if same_output {
+            let of = format!("accelerometer {name} scale factor");
+            let sigma = self.first_sigma("accel", name, "scale_factor", scale.map(|scale| 1e6 / scale));
+            values.extend(self.value(of, "ppm", places, |s| &s.accel_scale, ppm, sigma));
+        }
+    }
+
+    /// Standard error of the difference of first coefficients, each by its factor.
+    fn first_sigma(&self, kind: &str, sensor: &str, term: &str, factors: [f64; 2]) -> Option<f64> {
+        let first = |sigmas: &Sigmas| sigmas.get(kind, sensor, term).and_then(|row| row.first().copied());
+        let [a, b] = self.sigmas.each_ref().map(first);
+        let sigma = libm::hypot(a? * factors[0], b? * factors[1]);
+        (sigma > 0.0).then_some(sigma)
+    }
+
+    fn value(
+        &self,
+        of: String,
+        unit: &'static str,
+        [i, j]: [usize; 2],
+        column: impl Fn(&Steady) -> &[f64],
+        change: impl Fn([f64; 2]) -> f64,
+        sigma: Option<f64>,
+    ) -> Option<ValueChange> {
+        let at =
+            |[before, after]: &[Steady; 2]| Some(change([*column(before).get(i)?, *column(after).get(j)?]));
+        let change = self.over.iter().map(at).collect::<Option<Vec<f64>>>()?;
+        Some(ValueChange { of, unit, change, at_reference: at(&self.reference)?, sigma })
+    }
+}
+
+fn ppm([before, after]: [f64; 2]) -> f64 {
+    (after - before) / before * 1e6
+}
+
+/// Angle between two axes (″).
+fn angle(old: [f64; 3], new: [f64; 3]) -> f64 {
+    let [old, new] = [old, new].map(Vector3::from);
+    Angle::from_rad(libm::atan2(old.cross(&new).norm(), old.dot(&new))).as_arcsec()
+}

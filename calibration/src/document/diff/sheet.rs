@@ -1,0 +1,192 @@
+//! Changes in words, tables and charts.
+
+use isotherm_pages::{Axis, Chart, Ink};
+use serde_json::{Value, json};
+
+use super::{AxisChange, BEYOND, Changes, ValueChange};
+use crate::document::show::charts::{line, panel};
+use crate::report::Sheet;
+use crate::report::figures::short;
+
+/// Entries of an origin that are shown one by one.
+const MOST_ABOUT: usize = 12;
+
+impl Changes {
+    /// Whether an axis has turned beyond what the two calibrations can tell.
+    #[must_use]
+    pub fn turned(&self) -> Vec<&AxisChange> {
+        let beyond = |axis: &&AxisChange| axis.significance.is_some_and(|sigmas| sigmas > BEYOND);
+        self.axes.iter().filter(beyond).collect()
+    }
+
+    /// The first line.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        let [before, after] = &self.names;
+        if self.entries.is_empty() {
+            return format!("{before} and {after} are the same.");
+        }
+        let largest = self.axes.iter().max_by(|a, b| a.turned_arcsec.total_cmp(&b.turned_arcsec));
+        let axes = match largest {
+            Some(axis) if axis.turned_arcsec > 0.0 => {
+                let beyond = self.turned();
+                let names: Vec<&str> = beyond.iter().map(|axis| axis.of.as_str()).collect();
+                let judged = if self.axes.iter().all(|axis| axis.significance.is_none()) {
+                    "no document states its uncertainty".to_owned()
+                } else if names.is_empty() {
+                    format!("no axis beyond {BEYOND} σ")
+                } else {
+                    format!("beyond {BEYOND} σ: {}", names.join(", "))
+                };
+                format!("axes turn by up to {} ({}); {judged}", plus_minus(axis), axis.of)
+            }
+            _ => "no axis turns".to_owned(),
+        };
+        let mut parts = vec![axes];
+        for (kind, what) in [("°/h", "gyro bias"), ("mg", "accelerometer bias"), ("ppm", "scale")] {
+            let of = |value: &&ValueChange| value.unit == kind;
+            let most = self.values.iter().filter(of).map(|value| (largest_of(value), &value.of));
+            if let Some((most, of)) = most.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                parts.push(format!("{what} changes by up to {} {kind} ({of})", short(most)));
+            }
+        }
+        format!("{before} → {after}: {}.", parts.join("; "))
+    }
+
+    /// Everything.
+    #[must_use]
+    pub fn sheet(&self) -> Sheet {
+        let [before, after] = &self.names;
+        let mut sheet =
+            Sheet { title: format!("{before} → {after}"), headline: self.headline(), ..Sheet::default() };
+        let [old, new] = &self.units;
+        if old != new {
+            sheet.notes.push(format!("warning: {before} is for unit {old}, {after} for unit {new}"));
+        }
+        let range = self.temperature_deg_c.first().zip(self.temperature_deg_c.last());
+        if let Some((low, high)) = range {
+            sheet.notes.push(format!(
+                "Changes are {after} less {before}, at {} °C and over {}…{} °C, all channels at one temperature, lags settled.",
+                short(self.reference_deg_c),
+                short(*low),
+                short(*high)
+            ));
+        }
+        if self.axes.iter().any(|axis| axis.significance.is_none() && axis.turned_arcsec > 0.0) {
+            sheet.notes.push(
+                "If a document does not state standard errors of its axes ([origin.details.sigma]), give that of \
+                 your stand with --axis-sigma."
+                    .to_owned(),
+            );
+        }
+        self.axes_table(&mut sheet);
+        self.values_table(&mut sheet);
+        self.entries_table(&mut sheet);
+        self.charts(&mut sheet);
+        sheet
+    }
+
+    fn axes_table(&self, sheet: &mut Sheet) {
+        let row = |axis: &AxisChange| {
+            let cosine = |(change, sigma): (f64, f64)| {
+                if sigma > 0.0 { format!("{change:+.1} ± {sigma:.1}") } else { format!("{change:+.1}") }
+            };
+            let mut cells = vec![axis.of.clone()];
+            cells.extend(axis.change_arcsec.into_iter().zip(axis.sigma_arcsec).map(cosine));
+            cells.push(match axis.turned_sigma_arcsec {
+                Some(sigma) => format!("{:.1} ± {sigma:.1}", axis.turned_arcsec),
+                None => format!("{:.1}", axis.turned_arcsec),
+            });
+            cells.push(axis.significance.map_or_else(|| "–".to_owned(), |sigmas| format!("{sigmas:.1}")));
+            cells.push(format!("{:.1}", axis.largest_arcsec));
+            cells.push(
+                match axis.significance {
+                    _ if axis.turned_arcsec <= 0.0 => "as it was",
+                    None => "not known",
+                    Some(sigmas) if sigmas > BEYOND => "turned",
+                    Some(_) => "within the uncertainty",
+                }
+                .to_owned(),
+            );
+            cells
+        };
+        let head =
+            ["input axis, ″", "towards x", "towards y", "towards z", "turned", "in σ", "largest over T", ""];
+        sheet.table("Input axes", &head, self.axes.iter().map(row).collect());
+    }
+
+    fn values_table(&self, sheet: &mut Sheet) {
+        let count = self.temperature_deg_c.len();
+        let at: Vec<usize> = (0..5).map(|k| k * count.saturating_sub(1) / 4).collect();
+        let mut head = vec![String::new()];
+        let shown = at.iter().filter_map(|index| self.temperature_deg_c.get(*index));
+        head.extend(shown.map(|x| format!("{} °C", short(*x))));
+        head.push(format!("at {} °C", short(self.reference_deg_c)));
+        let row = |value: &ValueChange| {
+            let mut cells = vec![format!("{}, {}", value.of, value.unit)];
+            cells.extend(at.iter().filter_map(|index| value.change.get(*index)).map(|change| short(*change)));
+            cells.push(match value.sigma {
+                Some(sigma) => format!("{} ± {}", short(value.at_reference), short(sigma)),
+                None => short(value.at_reference),
+            });
+            cells
+        };
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        sheet.table("Changes of biases and scale factors", &head, self.values.iter().map(row).collect());
+    }
+
+    fn entries_table(&self, sheet: &mut Sheet) {
+        let about = |key: &str| ["origin", "note", "created"].iter().any(|about| key.starts_with(about));
+        let or_dash = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
+        let row = |entry: &isotherm_protocol::control::DocumentChange| {
+            vec![entry.key.clone(), or_dash(&entry.before), or_dash(&entry.after)]
+        };
+        let matter = self.entries.iter().filter(|entry| !about(&entry.key)).map(row);
+        sheet.table("Entries that differ", &["key", "before", "after"], matter.collect());
+        let rest: Vec<_> = self.entries.iter().filter(|entry| about(&entry.key)).collect();
+        let shown = rest.iter().take(MOST_ABOUT).map(|entry| row(entry)).collect();
+        sheet.table("Origins", &["key", "before", "after"], shown);
+        if rest.len() > MOST_ABOUT {
+            sheet.notes.push(format!(
+                "Of {} entries about origins, {MOST_ABOUT} are shown; --json has all.",
+                rest.len()
+            ));
+        }
+    }
+
+    fn charts(&self, sheet: &mut Sheet) {
+        let panels = self.values.iter().filter(|value| value.change.iter().any(|change| *change != 0.0));
+        let panels = panels.map(|value| {
+            let points = self.temperature_deg_c.iter().copied().zip(value.change.iter().copied());
+            panel(&value.of, value.unit, vec![line("change".to_owned(), Ink::First, points)])
+        });
+        let panels: Vec<_> = panels.collect();
+        if !panels.is_empty() {
+            let caption = "Change of each bias and scale factor.".to_owned();
+            let x = Axis::of("temperature", "°C");
+            let chart = Chart { caption, x, panels, marks: Vec::new() };
+            sheet.charts.push(("Over temperature".to_owned(), chart));
+        }
+    }
+
+    /// Everything as JSON.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let mut value = json!(self);
+        if let Some(object) = value.as_object_mut() {
+            object.insert("verdict".to_owned(), json!(self.headline()));
+        }
+        value
+    }
+}
+
+fn plus_minus(axis: &AxisChange) -> String {
+    match axis.turned_sigma_arcsec {
+        Some(sigma) => format!("{:.1} ± {sigma:.1} ″", axis.turned_arcsec),
+        None => format!("{:.1} ″", axis.turned_arcsec),
+    }
+}
+
+fn largest_of(value: &ValueChange) -> f64 {
+    value.change.iter().map(|change| change.abs()).fold(value.at_reference.abs(), f64::max)
+}

@@ -1,0 +1,220 @@
+//! Parts of a calibration, made by different commands, put into one document.
+//!
+//! A part is compared with the base that it was made from. What it states otherwise than the base, it has made; what it
+//! states as the base does, or not at all, it has not. Terms that one fit makes together (all terms of a gyro's bias; scale
+//! factor and bias of an accelerometer; the axes of a kind) are replaced together: a lag that takes the place of K1 takes
+//! K1 away, and that is told. Where two parts have made the same otherwise, neither is taken: the keys are told, and the
+//! user decides.
+
+mod check;
+mod origin;
+mod sections;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use isotherm_protocol::document::Document;
+use toml::Value;
+
+use crate::document::show::terms::tree;
+use crate::document::written::Written;
+use crate::error::Error;
+use check::{check, same_unit};
+use sections::{Sections, build, group, sections};
+
+/// Which part decides over keys that begin so.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Take {
+    /// A key, or what keys begin with.
+    pub key: String,
+    /// Name of the part, or of the base.
+    pub from: String,
+}
+
+/// What came of a merge.
+#[derive(Debug)]
+pub struct Merged {
+    /// The new document.
+    pub written: Written,
+    /// Where each section is from, in the order of the keys: key and name.
+    pub taken: Vec<(String, String)>,
+    /// Sections of the base that a part has done without, and which part.
+    pub gone: Vec<(String, String)>,
+    /// What is to be looked at.
+    pub warnings: Vec<String>,
+}
+
+/// Puts parts together.
+///
+/// # Errors
+/// [`Error::Refused`] with every conflict, or where the documents are not of one unit with the same sensors;
+/// [`Error::Usage`] for a `take` that names nothing; [`Error::Document`] where the result does not hold.
+pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged, Error> {
+    same_unit(base, parts)?;
+    check(base, parts, take)?;
+    let old = sections(&tree(&base.document)?);
+    let new: Vec<Sections> =
+        parts.iter().map(|part| Ok(sections(&tree(&part.document)?))).collect::<Result<_, Error>>()?;
+    let mut picked = Picked { sections: old.clone(), ..Picked::default() };
+    for key in old.keys() {
+        picked.from.insert(key.clone(), base.name.clone());
+    }
+    let mut groups: BTreeSet<String> = old.keys().map(|key| group(key)).collect();
+    groups.extend(new.iter().flatten().map(|(key, _)| group(key)));
+    let mut conflicts = Vec::new();
+    for group in groups {
+        picked.decide(&group, (base, &old), (parts, &new), take, &mut conflicts);
+    }
+    picked.filters(base, parts, &mut conflicts);
+    if !conflicts.is_empty() {
+        return Err(Error::Refused(conflicts));
+    }
+    let Picked { sections, from, gone, warnings } = picked;
+    let mut tree = build(&tree(&base.document)?, &sections);
+    tree.insert("origin".to_owned(), origin::origin(base, parts, &from)?);
+    let words = |found: Vec<isotherm_protocol::document::Problem>| {
+        Error::Document(found.iter().map(ToString::to_string).collect())
+    };
+    let document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
+    let taken = from.into_iter().filter(|(key, _)| sections.contains_key(key)).collect();
+    Ok(Merged { written: Written::of(&document)?, taken, gone, warnings })
+}
+
+/// What has been decided so far.
+#[derive(Debug, Default)]
+struct Picked {
+    sections: Sections,
+    from: BTreeMap<String, String>,
+    gone: Vec<(String, String)>,
+    warnings: Vec<String>,
+}
+
+impl Picked {
+    /// Decides over what is replaced together.
+    fn decide(
+        &mut self,
+        of: &str,
+        (base, old): (&Written, &Sections),
+        (parts, new): (&[Written], &[Sections]),
+        take: &[Take],
+        conflicts: &mut Vec<String>,
+    ) {
+        let mine = |sections: &Sections| -> Sections {
+            let inside = sections.iter().filter(|(key, _)| group(key) == of);
+            inside.map(|(key, value)| (key.clone(), value.clone())).collect()
+        };
+        let before = mine(old);
+        // Of each part, what it has made of the group: new values, and what it does without.
+        let mut made: Vec<(&Written, Sections, Vec<String>)> = Vec::new();
+        for (part, sections) in parts.iter().zip(new) {
+            let after = mine(sections);
+            let changed: Sections =
+                after.iter().filter(|(key, value)| before.get(*key) != Some(*value)).map(own).collect();
+            let without: Vec<String> =
+                before.keys().filter(|key| !after.contains_key(*key)).cloned().collect();
+            if !changed.is_empty() {
+                made.push((part, changed, without));
+            } else if !without.is_empty() {
+                self.warnings.push(format!(
+                    "{} lacks {}: kept as in {}",
+                    part.name,
+                    without.join(", "),
+                    base.name
+                ));
+            }
+        }
+        let keys: BTreeSet<&String> =
+            made.iter().flat_map(|(_, changed, without)| changed.keys().chain(without)).collect();
+        for key in keys {
+            let says = |(part, changed, without): &(&Written, Sections, Vec<String>)| {
+                let touched = changed.contains_key(key) || without.contains(key);
+                touched.then(|| (part.name.clone(), changed.get(key).cloned()))
+            };
+            let said: Vec<(String, Option<Value>)> = made.iter().filter_map(says).collect();
+            let chosen = take.iter().rev().find(|take| covers(&take.key, key));
+            let Some((first, value)) = said.first() else { continue };
+            let decided = match chosen {
+                Some(take) if take.from == base.name => continue,
+                Some(take) => said.iter().find(|(name, _)| *name == take.from).map(|(n, v)| (n, v)),
+                None if said.iter().all(|(_, other)| other == value) => Some((first, value)),
+                None => None,
+            };
+            let Some((name, value)) = decided else {
+                conflicts.push(conflict(key, &said, chosen));
+                continue;
+            };
+            self.set(key, name, value.as_ref());
+        }
+        let fits: BTreeSet<&String> = self
+            .from
+            .iter()
+            .filter(|(key, from)| group(key) == of && **from != base.name)
+            .map(|(_, from)| from)
+            .collect();
+        if of.ends_with(" bias") && fits.len() > 1 {
+            let names: Vec<&str> = fits.into_iter().map(String::as_str).collect();
+            self.warnings.push(format!(
+                "the terms of {of} are from several separate fits ({}): judge the result with validate",
+                names.join(", ")
+            ));
+        }
+    }
+
+    fn set(&mut self, key: &str, from: &str, value: Option<&Value>) {
+        if let Some(value) = value {
+            self.sections.insert(key.to_owned(), value.clone());
+            self.from.insert(key.to_owned(), from.to_owned());
+            return;
+        }
+        if self.sections.remove(key).is_some() {
+            self.gone.push((key.to_owned(), from.to_owned()));
+        }
+        self.from.remove(key);
+    }
+
+    /// Terms of Ṫ, T̈ and lags hold with the filter that they were fitted with, and with no other.
+    fn filters(&self, base: &Written, parts: &[Written], conflicts: &mut Vec<String>) {
+        let filter_of = |document: &Written| document.document.temperature.filter.clone();
+        let Some(from) = self.from.get("temperature.filter") else { return };
+        let find = |name: &str| parts.iter().chain([base]).find(|document| document.name == name);
+        let filter = find(from).and_then(filter_of);
+        for (key, source) in &self.from {
+            let dynamic = ["thermal_rate", "thermal_acceleration", "lag"];
+            let bound = dynamic.iter().any(|term| key.ends_with(&format!(".{term}")));
+            if bound && find(source).and_then(filter_of) != filter {
+                conflicts.push(format!(
+                    "temperature.filter is taken from {from}, but {key} of {source} was fitted with another filter \
+                     and is wrong with this one: repeat one of the fits with the other's filter"
+                ));
+            }
+        }
+    }
+}
+
+fn own((key, value): (&String, &Value)) -> (String, Value) {
+    (key.clone(), value.clone())
+}
+
+/// Whether a choice is about a key.
+fn covers(choice: &str, key: &str) -> bool {
+    key.strip_prefix(choice).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
+fn conflict(key: &str, said: &[(String, Option<Value>)], chosen: Option<&Take>) -> String {
+    let names: Vec<String> = said
+        .iter()
+        .map(|(name, value)| if value.is_some() { name.clone() } else { format!("{name} (does without it)") })
+        .collect();
+    match chosen {
+        Some(take) => {
+            format!("{key}: --take names {}, but only {} changed it", take.from, names.join(" and "))
+        }
+        None => format!(
+            "{key}: made differently by {}; choose with --take {key}={}",
+            names.join(" and "),
+            said.first().map_or("", |(name, _)| name)
+        ),
+    }
+}

@@ -1,0 +1,154 @@
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{Curve, GyroOutput, Shape, StatedTerm};
+
+use super::*;
+use crate::report::Sigmas;
+
+fn named(name: &str, change: impl FnOnce(&mut Document)) -> Written {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
+    let mut document = Written::read(path.as_ref()).unwrap().document;
+    for gyro in &mut document.gyro.sensor {
+        let thermal = [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+        gyro.terms.retain(|feature| !thermal.contains(&feature));
+    }
+    change(&mut document);
+    Written { name: name.into(), ..Written::of(&document).unwrap() }
+}
+
+fn constant(value: f64) -> Curve {
+    Curve::new(Shape::Constant { value })
+}
+
+fn bias(value: f64) -> impl FnOnce(&mut Document) {
+    move |document| document.gyro.sensor[0].set(Feature::One, constant(value))
+}
+
+fn from<'a>(merged: &'a Merged, key: &str) -> &'a str {
+    merged.taken.iter().find(|(taken, _)| taken == key).map_or("", |(_, from)| from)
+}
+
+#[test]
+fn what_the_readings_stand_for_is_told_in_words_of_documents() {
+    let mut counts = named("counts.toml", |_| ());
+    counts.document.gyro.output = GyroOutput::Counts;
+    let error = same_unit(&named("base.toml", |_| ()), &[counts]).unwrap_err().to_string();
+    assert!(error.contains("gyro.output is mean rate in base.toml and counts in counts.toml"), "{error}");
+}
+
+#[test]
+fn parts_made_from_one_base_go_together() {
+    let base = named("base.toml", |_| ());
+    let thermal = named("thermal.toml", |document| {
+        bias(7.0)(document);
+        document.origin.get_or_insert_default().method = Some("joint".into());
+    });
+    let positions = named("positions.toml", |document| {
+        document.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 1e-5, 0.0];
+        let mut details = toml::Table::new();
+        let mut sigmas = Sigmas::default();
+        sigmas.put("accel", "x", "axis_arcsec", vec![0.0, 4.0, 4.0]);
+        sigmas.put("gyro", "x", "static_bias", vec![9.0]);
+        sigmas.write(&mut details);
+        document.origin.get_or_insert_default().details = Some(details);
+    });
+    let merged = merge(&base, &[thermal.clone(), positions.clone()], &[]).unwrap();
+    let document = &merged.written.document;
+    assert_eq!(
+        document.gyro.sensor[0].terms.curve(Feature::One),
+        thermal.document.gyro.sensor[0].terms.curve(Feature::One)
+    );
+    assert_eq!(
+        document.accel.as_ref().unwrap().orientation,
+        positions.document.accel.as_ref().unwrap().orientation
+    );
+    assert_eq!(from(&merged, "gyro.sensor.x.static_bias"), "thermal.toml");
+    assert_eq!(from(&merged, "accel.orientation.rows"), "positions.toml");
+    assert_eq!(from(&merged, "gyro.sensor.y.static_bias"), "base.toml");
+    let origin = document.origin.as_ref().unwrap();
+    let parts = origin.details.as_ref().unwrap()["parts"].as_table().unwrap();
+    assert_eq!(parts["thermal.toml"]["method"].as_str(), Some("joint"));
+    assert_eq!(parts.len(), 3);
+    // Standard errors follow what was taken, and nothing else.
+    let sigmas = Sigmas::of(document);
+    assert_eq!(sigmas.get("accel", "x", "axis_arcsec"), Some([0.0, 4.0, 4.0].as_slice()));
+    assert_eq!(sigmas.get("gyro", "x", "static_bias"), None);
+    // All of the base that nobody touched is there as it was.
+    let mut back = document.clone();
+    back.origin.clone_from(&base.document.origin);
+    bias(7.0)(&mut back);
+    let mut expected = base.document.clone();
+    bias(7.0)(&mut expected);
+    expected.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 1e-5, 0.0];
+    assert_eq!(back, expected);
+}
+
+#[test]
+fn the_same_key_made_twice_is_a_conflict_until_someone_decides() {
+    let base = named("base.toml", |_| ());
+    let parts = [named("a.toml", bias(7.0)), named("b.toml", bias(8.0))];
+    let Err(Error::Refused(conflicts)) = merge(&base, &parts, &[]) else { panic!("a conflict") };
+    assert_eq!(conflicts.len(), 1, "{conflicts:?}");
+    assert!(conflicts[0].starts_with("gyro.sensor.x.static_bias: made differently by a.toml and b.toml"));
+    let take = |from: &str| Take { key: "gyro.sensor.x".into(), from: from.into() };
+    let merged = merge(&base, &parts, &[take("b.toml")]).unwrap();
+    assert_eq!(from(&merged, "gyro.sensor.x.static_bias"), "b.toml");
+    let merged = merge(&base, &parts, &[take("base.toml")]).unwrap();
+    assert_eq!(merged.written.document.gyro, base.document.gyro);
+    assert!(matches!(merge(&base, &parts, &[take("c.toml")]), Err(Error::Usage(_))));
+    // What both made alike is no conflict.
+    let alike = [named("a.toml", bias(7.0)), named("b.toml", bias(7.0))];
+    assert!(merge(&base, &alike, &[]).is_ok());
+}
+
+#[test]
+fn a_term_that_takes_the_place_of_another_takes_it_away_and_a_missing_one_is_kept() {
+    let rate = |document: &mut Document| {
+        let branches = [constant(3.0), constant(2.0)];
+        document.gyro.sensor[0].put(StatedTerm::branched(Feature::ThermalRate, branches));
+        if let Some(filter) = &mut document.temperature.filter {
+            filter.branch_dead_band_deg_c2_per_s3 = Some(1e-8);
+        }
+    };
+    let base = named("base.toml", rate);
+    let lags = named("lag.toml", |document| {
+        if let Some(filter) = &mut document.temperature.filter {
+            filter.branch_dead_band_deg_c2_per_s3 = Some(1e-8);
+        }
+        document.gyro.sensor[0].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
+    });
+    let merged = merge(&base, std::slice::from_ref(&lags), &[]).unwrap();
+    assert_eq!(merged.gone, [("gyro.sensor.x.thermal_rate".to_owned(), "lag.toml".to_owned())]);
+    assert!(!merged.written.document.gyro.sensor[0].terms.has(Feature::ThermalRate));
+    let without = named("positions.toml", |document| {
+        rate(document);
+        document.gyro.sensor[0].terms.remove(Feature::ThermalRate);
+    });
+    let merged = merge(&base, &[without], &[]).unwrap();
+    assert!(merged.written.document.gyro.sensor[0].terms.has(Feature::ThermalRate));
+    assert!(merged.warnings[0].contains("lacks gyro.sensor.x.thermal_rate"), "{:?}", merged.warnings);
+    let text = merged.sheet("new.toml").to_text();
+    assert!(text.contains("warning: positions.toml lacks"), "{text}");
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_by_key() {
+    let base = named("base.toml", |document| {
+        document.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
+    });
+    let other = named("other.toml", |document| {
+        document.unit = "MEMS-0002".into();
+        document.gyro.sensor[2].name = "w".into();
+    });
+    let Err(Error::Refused(reasons)) = merge(&base, &[other], &[]) else { panic!("refused") };
+    assert!(reasons[0].starts_with("unit is MEMS-0001 in base.toml") && reasons.len() == 2, "{reasons:?}");
+    let filter = named("filter.toml", |document| {
+        document.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
+        document.temperature.filter.as_mut().unwrap().smoothing_s += 1.0;
+        bias(7.0)(document);
+    });
+    let Err(Error::Refused(reasons)) = merge(&base, &[filter], &[]) else { panic!("refused") };
+    assert!(
+        reasons[0].contains("gyro.sensor.y.lag of base.toml was fitted with another filter"),
+        "{reasons:?}"
+    );
+}

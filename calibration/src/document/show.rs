@@ -1,0 +1,200 @@
+//! A document in people's words and as curves.
+
+mod about;
+pub(crate) mod charts;
+mod parts;
+pub mod terms;
+
+use isotherm_correction::calibration::Steady;
+use isotherm_correction::channel::ThermalState;
+use isotherm_correction::sample::ChannelName;
+use isotherm_correction::units::{AngularRate, SpecificForce};
+use serde_json::{Value, json};
+
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::report::Sheet;
+use crate::report::figures::{alike, short};
+use terms::{Term, terms, tree};
+
+/// Temperatures of the tables.
+const COLUMNS: usize = 7;
+/// Temperatures that are shown where no term has a range (°C).
+const USUAL: [f64; 2] = [-40.0, 60.0];
+/// Digits that the change of a term over the range has in a table.
+const RANGE_DIGITS: f64 = 3.0;
+/// Ramps that the sums are shown on (°C/min).
+const RAMPS: [f64; 3] = [0.0, 1.0, -1.0];
+
+/// What is shown of a document.
+#[derive(Debug)]
+pub struct Shown {
+    /// Text and page.
+    pub sheet: Sheet,
+    json: Value,
+}
+
+impl Shown {
+    /// Everything as JSON: the document, and its terms as points.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        self.json.clone()
+    }
+}
+
+/// Shows a document.
+///
+/// # Errors
+/// [`Error::Document`] where it cannot be written as a tree.
+pub fn show(written: &Written) -> Result<Shown, Error> {
+    let Written { name, document, .. } = written;
+    let tree = tree(document)?;
+    let terms = terms(&tree);
+    let range = range_of(&terms);
+    let mut sheet = Sheet { title: format!("Calibration of unit {}", document.unit), ..Sheet::default() };
+    sheet.headline = about::headline(name, document);
+    sheet.notes = about::notes(document, &terms);
+    sheet.notes.extend(written.loaded.warnings.iter().map(|warning| format!("warning: {warning}")));
+    about::tables(&mut sheet, document);
+    let formulas = terms.iter().map(|term| {
+        let range = term.range.map_or_else(
+            || "everywhere".to_owned(),
+            |[low, high]| format!("{}…{} {}", short(low), short(high), term.argument),
+        );
+        vec![title(term), term.words.clone(), term.unit.clone(), range]
+    });
+    sheet.table("Terms", &["term", "formula", "unit", "fitted over"], formulas.collect());
+    over_temperature(&mut sheet, &terms, range);
+    sums(&mut sheet, written, range);
+    charts::charts(&mut sheet, written, &terms, range);
+    let json = json!({
+        "verdict": sheet.headline,
+        "document": serde_json::to_value(document).map_err(|error| Error::Document(vec![error.to_string()]))?,
+        "warnings": written.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "terms": terms.iter().map(|term| term_json(term, range)).collect::<Vec<_>>(),
+    });
+    Ok(Shown { sheet, json })
+}
+
+/// The term as people call it: "gyro x lag of 300 s".
+pub(crate) fn title(term: &Term) -> String {
+    let kind = if term.kind == "gyro" { "gyro" } else { "accelerometer" };
+    format!("{kind} {} {}", term.sensor, spoken(&term.name))
+}
+
+/// The name of a term as people say it: "static bias".
+pub(crate) fn spoken(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// The range of temperature that all terms over it reach over together.
+pub(crate) fn range_of(terms: &[Term]) -> [f64; 2] {
+    let ranges = terms.iter().filter(|term| term.argument == "°C").filter_map(|term| term.range);
+    let all = ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+    all.filter(|[low, high]| high > low).unwrap_or(USUAL)
+}
+
+/// So many places from one end to the other.
+#[expect(clippy::cast_precision_loss, reason = "few places")]
+pub(crate) fn places([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+    let step = (high - low) / (count.max(2) - 1) as f64;
+    (0..count).map(|index| low + step * index as f64).collect()
+}
+
+fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
+    for argument in ["°C", "°C/s", "°C/s²"] {
+        let mine = || {
+            terms
+                .iter()
+                .filter(|term| term.argument == argument && (term.range.is_some() || argument == "°C"))
+        };
+        let range = if argument == "°C" {
+            range
+        } else {
+            let ranges = mine().filter_map(|term| term.range);
+            ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]).unwrap_or_default()
+        };
+        let at = places(range, COLUMNS);
+        let mut head = vec![String::new()];
+        head.extend(at.iter().map(|x| format!("{} {argument}", short(*x))));
+        let row = |term: &Term| {
+            let values: Vec<(f64, bool)> = at.iter().map(|x| term.at(*x)).collect();
+            let words = alike(&values.iter().map(|(value, _)| *value).collect::<Vec<_>>(), RANGE_DIGITS);
+            let cell = |(word, (_, clamped)): (String, &(f64, bool))| {
+                if *clamped { format!("({word})") } else { word }
+            };
+            let cells = words.into_iter().zip(&values).map(cell);
+            std::iter::once(format!("{}, {}", title(term), term.unit)).chain(cells).collect()
+        };
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        let heading = match argument {
+            "°C" => "Over temperature (in brackets: clamped, outside the fitted range)",
+            "°C/s" => "Over the temperature's rate",
+            _ => "Over the temperature's acceleration",
+        };
+        sheet.table(heading, &head, mine().map(row).collect());
+    }
+}
+
+/// The correction at one temperature of all channels, on a ramp.
+pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f64) -> Steady {
+    let state = ThermalState { temperature, rate: ramp_deg_c_per_min / 60.0, ..ThermalState::default() };
+    // An auxiliary channel has no temperature: what rests on it is left out.
+    let calibration = &written.loaded.calibration;
+    let known = |name: &ChannelName| calibration.channels().iter().any(|channel| channel.name() == name);
+    calibration.steady(|name| known(name).then_some(state), None)
+}
+
+/// The sums of all terms.
+fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
+    let at = places(range, COLUMNS);
+    let mut head = vec![String::new()];
+    head.extend(at.iter().map(|x| format!("{} °C", short(*x))));
+    let mut rows = Vec::new();
+    let mut row = |name: String, of: &dyn Fn(f64) -> Option<f64>| {
+        let values: Vec<f64> = at.iter().map(|x| of(*x).unwrap_or(f64::NAN)).collect();
+        let cells = alike(&values, RANGE_DIGITS).into_iter().zip(&values);
+        let cells = cells.map(|(word, value)| if value.is_nan() { "–".to_owned() } else { word });
+        rows.push(std::iter::once(name).chain(cells).collect::<Vec<_>>());
+    };
+    for (index, gyro) in written.document.gyro.sensor.iter().enumerate() {
+        for ramp in RAMPS {
+            let words = ramp_words(ramp);
+            row(format!("gyro {}, °/h, {words}", gyro.name), &|x| {
+                let bias = *steady(written, x, ramp).gyro_bias.get(index)?;
+                Some(AngularRate::from_rad_per_s(bias).as_deg_per_h())
+            });
+        }
+    }
+    for (index, accel) in written.document.accel.iter().flat_map(|accel| &accel.sensor).enumerate() {
+        row(format!("accelerometer {}, mg", accel.name), &|x| {
+            let bias = *steady(written, x, 0.0).accel_bias.get(index)?;
+            Some(SpecificForce::from_m_per_s2(bias).as_g() * 1e3)
+        });
+    }
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    sheet.table(&format!("Bias in all, lags settled{}", lasing_mode(written)), &head, rows);
+}
+
+/// The lasing mode that a sum is in, of a unit that reverses it.
+fn lasing_mode(written: &Written) -> &'static str {
+    if written.document.mode_reversal.is_some() { ", lasing mode +" } else { "" }
+}
+
+pub(crate) fn ramp_words(ramp: f64) -> String {
+    if ramp == 0.0 { "steady".to_owned() } else { format!("{ramp:+} °C/min") }
+}
+
+fn term_json(term: &Term, range: [f64; 2]) -> Value {
+    let range = if term.argument == "°C" { range } else { term.range.unwrap_or_default() };
+    let points: Vec<[f64; 2]> = places(range, 101).into_iter().map(|x| [x, term.at(x).0]).collect();
+    json!({
+        "kind": term.kind,
+        "sensor": term.sensor,
+        "term": term.name,
+        "unit": term.unit,
+        "argument": term.argument,
+        "range": term.range,
+        "points": points,
+    })
+}

@@ -1,0 +1,199 @@
+//! The curves of a document, wherever they stand in it.
+//!
+//! They are found by their form, not by a list of keys: a term that is new to the document is shown like all others.
+
+use std::fmt::Write;
+
+use isotherm_correction::curve::{Curve, CurveParts};
+use isotherm_protocol::document::{Argument, Document, Unit};
+use toml::{Table, Value};
+
+use crate::error::Error;
+use crate::report::figures::{six, superscript};
+
+/// One curve of one sensor, in the document's units.
+#[derive(Debug, Clone)]
+pub struct Term {
+    /// "gyro" or "accel".
+    pub kind: &'static str,
+    /// Name of the sensor.
+    pub sensor: String,
+    /// Its key, with the branch or the time constant: "`thermal_rate` run-up", "lag of 300 s".
+    pub name: String,
+    /// Symbol of the unit of its values.
+    pub unit: String,
+    /// What it is over: "°C", "°C/s" or "°C/s²".
+    pub argument: &'static str,
+    /// Fitted range; `None` for a constant.
+    pub range: Option<[f64; 2]>,
+    /// The formula.
+    pub words: String,
+    curve: Curve,
+}
+
+impl Term {
+    /// Its value, held outside the fitted range; and whether it is held.
+    #[must_use]
+    pub fn at(&self, x: f64) -> (f64, bool) {
+        let at = self.curve.at(x);
+        (at.value, at.clamped && self.range.is_some())
+    }
+}
+
+/// A document as a tree, defaults filled in.
+///
+/// # Errors
+/// [`Error::Document`] where it cannot be written.
+pub fn tree(document: &Document) -> Result<Table, Error> {
+    let words = |error: &dyn std::fmt::Display| Error::Document(vec![error.to_string()]);
+    let text = document.to_toml().map_err(|error| words(&error))?;
+    text.parse::<Table>().map_err(|error| words(&error))
+}
+
+/// All curves of the sensors, in the order of the document.
+#[must_use]
+pub fn terms(tree: &Table) -> Vec<Term> {
+    let mut terms = Vec::new();
+    for kind in ["gyro", "accel"] {
+        let sensors = tree.get(kind).and_then(|kind| kind.get("sensor")?.as_array());
+        for sensor in sensors.into_iter().flatten().filter_map(Value::as_table) {
+            let name = sensor.get("name").and_then(Value::as_str).unwrap_or_default();
+            for (key, value) in sensor {
+                gather((kind, name), key, value, &mut terms);
+            }
+        }
+    }
+    terms
+}
+
+fn gather(of: (&'static str, &str), path: &str, value: &Value, terms: &mut Vec<Term>) {
+    match value {
+        Value::Table(table) => match term(of, path, table) {
+            Some(term) => terms.push(term),
+            None => table.iter().for_each(|(key, value)| {
+                let path = match key.as_str() {
+                    "gain" => path.to_owned(),
+                    key => format!("{path} {}", key.replace("run_up", "run-up")),
+                };
+                gather(of, &path, value, terms);
+            }),
+        },
+        Value::Array(values) => {
+            for (index, value) in values.iter().enumerate() {
+                let stated = |key, unit| Some((number(value.get(key)?)?, unit));
+                let parameter = stated("time_constant_s", "s").or(stated("half_width_deg_c", "°C"));
+                let name = |key| value.get(key).and_then(Value::as_str);
+                let path = match (parameter, name("channel"), name("minus")) {
+                    (Some((number, unit)), ..) => format!("{path} of {number} {unit}"),
+                    (None, Some(channel), None) => format!("{path} {channel}"),
+                    (None, Some(channel), Some(minus)) => format!("{path} {channel} − {minus}"),
+                    (None, None, _) => format!("{path} {}", index + 1),
+                };
+                gather(of, &path, value, terms);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// A curve, where the table is one.
+fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Option<Term> {
+    let form = table.get("kind")?.as_str()?;
+    let find = |prefix: &str| table.iter().find_map(|(key, value)| Some((key.strip_prefix(prefix)?, value)));
+    let numbers = |value: &Value| value.as_array()?.iter().map(number).collect::<Option<Vec<f64>>>();
+    let argument_of = |suffix: &str| match suffix {
+        _ if suffix.ends_with(Argument::DegCPerS2.suffix()) => Argument::DegCPerS2,
+        _ if suffix.ends_with(Argument::DegCPerS.suffix()) => Argument::DegCPerS,
+        _ if suffix.ends_with(Argument::DegPerS.suffix()) => Argument::DegPerS,
+        _ => Argument::DegC,
+    };
+    let symbol = |suffix: &str| {
+        let known = Unit::of_suffix(suffix);
+        known.map_or_else(|| suffix.replace("_per_", "/").replace('_', " "), Unit::symbol)
+    };
+    let (unit, argument, range, words, parts);
+    match form {
+        "constant" => {
+            let (suffix, value) = find("value_")?;
+            let value = number(value)?;
+            (unit, argument, range) = (symbol(suffix), Argument::DegC, None);
+            words = six(value);
+            let everywhere = [-1e9, 1e9];
+            parts = CurveParts::Polynomial { reference: 0.0, coefficients: vec![value], range: everywhere };
+        }
+        "polynomial" => {
+            let (suffix, coefficients) = find("coefficients_")?;
+            let (over, reference) = find("reference_")?;
+            let (coefficients, reference) = (numbers(coefficients)?, number(reference)?);
+            let [low, high]: [f64; 2] = numbers(find("range_")?.1)?.try_into().ok()?;
+            (unit, argument, range) = (symbol(suffix), argument_of(over), Some([low, high]));
+            words = polynomial(&coefficients, reference, argument);
+            parts = CurveParts::Polynomial { reference, coefficients, range: [low, high] };
+        }
+        "piecewise-linear" | "spline" => {
+            let (suffix, knots) = find("knots_")?;
+            let (of, over) = suffix.split_once("_over_").unwrap_or((suffix, "deg_c"));
+            let pair = |knot: &Value| -> Option<[f64; 2]> { numbers(knot)?.try_into().ok() };
+            let knots = knots.as_array()?.iter().map(pair).collect::<Option<Vec<_>>>()?;
+            (unit, argument) = (symbol(of), argument_of(over));
+            range = Some([knots.first()?[0], knots.last()?[0]]);
+            words = format!("{form}, {} knots", knots.len());
+            parts = if form == "spline" {
+                CurveParts::Spline { knots }
+            } else {
+                CurveParts::PiecewiseLinear { knots }
+            };
+        }
+        _ => return None,
+    }
+    Some(Term {
+        kind,
+        sensor: sensor.to_owned(),
+        name: name.to_owned(),
+        unit,
+        argument: argument.symbol(),
+        range,
+        words,
+        curve: Curve::new(&parts).ok()?,
+    })
+}
+
+/// Any number of a tree.
+pub(crate) fn number(value: &Value) -> Option<f64> {
+    #[expect(clippy::cast_precision_loss, reason = "whole numbers that people write")]
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> String {
+    let symbol = match argument {
+        Argument::DegC => "T",
+        Argument::DegCPerS => "Ṫ",
+        Argument::DegCPerS2 => "T̈",
+        Argument::DegPerS => "ω",
+    };
+    let of = if reference == 0.0 {
+        symbol.to_owned()
+    } else if reference < 0.0 {
+        format!("({symbol} + {})", six(-reference))
+    } else {
+        format!("({symbol} − {})", six(reference))
+    };
+    let mut words = String::new();
+    for (power, coefficient) in
+        coefficients.iter().enumerate().filter(|(_, coefficient)| **coefficient != 0.0)
+    {
+        let sign = match (words.is_empty(), *coefficient < 0.0) {
+            (true, false) => "",
+            (true, true) => "−",
+            (false, false) => " + ",
+            (false, true) => " − ",
+        };
+        let _ = write!(words, "{sign}{}", six(coefficient.abs()));
+        let power = match power {
+            0 => String::new(),
+            power => format!("·{of}{}", superscript(power)),
+        };
+        words.push_str(&power);
+    }
+    if words.is_empty() { "0".to_owned() } else { words }
+}

@@ -1,0 +1,296 @@
+//! From runs to a document with the ratio of the board, and its report.
+
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples as Points, Series};
+use isotherm_protocol::document::{AccelSensor, Document, Sample};
+use toml::{Table, Value};
+
+use super::model::{Ratio, Rows};
+use crate::axes::{main_axis, output_name};
+use crate::document::written::{Written, tidy};
+use crate::error::Error;
+use crate::finding::AccelKind;
+use crate::fits::thermal::samples::Samples;
+use crate::fits::thermal::target::axes;
+use crate::fits::thermal::{Site, Stand};
+use crate::report::figures::{fixed, short};
+use crate::report::{Coefficient, Curve, Figure, FitReport, Judged, Rest, Sigmas, judge};
+use crate::runs::{Run, Watch};
+
+/// Height of a panel (CSS pixels).
+const HEIGHT: u32 = 220;
+/// Points of a curve over temperature.
+const POINTS: u32 = 60;
+
+/// What the fit starts from.
+#[derive(Debug, Clone)]
+pub struct Wanted<'a> {
+    /// Runs.
+    pub runs: &'a [Run],
+    /// Runs that the fit does not see and is judged on.
+    pub judges: &'a [Run],
+    /// How the unit stands in all of them, those of the fit first.
+    pub stands: &'a [Stand],
+    /// Document with the accelerometers and the channel of their board.
+    pub base: &'a Document,
+    /// Temperature of the board at which r is 1 (°C); the middle of what was seen where absent.
+    pub reference_deg_c: Option<f64>,
+    /// Windows (s).
+    pub window_s: f64,
+}
+
+/// What came of it.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// The document.
+    pub written: Written,
+    /// The ratio of each accelerometer, or why there is none.
+    pub found: Vec<Result<Ratio, AccelKind>>,
+    /// The report.
+    pub report: FitReport,
+}
+
+/// Fits the ratio of the board of each accelerometer.
+///
+/// # Errors
+/// [`Error::Refused`] and [`Error::Found`] with every reason; [`Error::Log`], [`Error::Document`].
+pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
+    let sensors = wanted.base.accel.as_ref().map_or(&[][..], |accel| &accel.sensor);
+    if sensors.is_empty() {
+        let words = "the document has no accelerometers: add [accel] with their channels and board_channel";
+        return Err(Error::Refused(vec![words.to_owned()]));
+    }
+    let mut bare = wanted.base.clone();
+    for sensor in bare.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
+        sensor.board_ratio_error = None;
+    }
+    let mut samples = Vec::new();
+    for run in wanted.runs {
+        let series = run.series(&mut watch)?;
+        samples.push(Samples::of(run, &series, &bare, wanted.window_s, &mut watch)?);
+    }
+    let mut found: Vec<Result<Ratio, AccelKind>> = sensors
+        .iter()
+        .enumerate()
+        .map(|(index, sensor)| {
+            let (rows, channels) = rows(wanted, &samples, index, sensor)?;
+            rows.fit(wanted.reference_deg_c, &channels)
+        })
+        .collect();
+    if found.iter().all(Result::is_err) {
+        let reasons =
+            sensors.iter().zip(found).filter_map(|(sensor, found)| Some(found.err()?.of(&sensor.name)));
+        return Err(Error::Found(reasons.collect()));
+    }
+    let given = Written::of(wanted.base)?;
+    let mut written = Written::of(&with(wanted.base, &found))?;
+    let mut troubled = Vec::new();
+    let mut curves = judged(wanted, [&given, &written], &mut troubled, &mut watch)?;
+    let mains: Vec<usize> =
+        wanted.base.accel.iter().flat_map(|accel| accel.orientation.rows.iter().map(main_axis)).collect();
+    let mut verdicts = Curve::verdicts(&curves);
+    let worse: Vec<usize> = (0..3)
+        .filter(|axis| {
+            verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == output_name(false, *axis))
+        })
+        .collect();
+    if !worse.is_empty() {
+        // Verdicts of these axes stay; the others are judged again, without them.
+        let kept: Vec<_> = verdicts.iter().filter(|verdict| !verdict.accepted).cloned().collect();
+        for (found, axis) in found.iter_mut().zip(&mains).filter(|(_, axis)| worse.contains(axis)) {
+            if found.is_ok() {
+                *found = Err(AccelKind::MadeWorse { axis: *axis });
+            }
+        }
+        written = Written::of(&with(wanted.base, &found))?;
+        curves = judged(wanted, [&given, &written], &mut troubled, &mut watch)?;
+        verdicts = Curve::verdicts(&curves);
+        for verdict in &mut verdicts {
+            if let Some(refused) = kept.iter().find(|kept| kept.of == verdict.of) {
+                *verdict = refused.clone();
+            }
+        }
+    }
+    let mut report =
+        FitReport::new("Ratio of the accelerometers' board over its temperature", &wanted.base.unit);
+    report.residuals = curves;
+    report.verdicts = verdicts.into_iter().map(|verdict| verdict.stated_as(Figure::Rms)).collect();
+    report.warnings = troubled;
+    tell(&mut report, (wanted, sensors, &mains), &found);
+    Ok(Made { written, found, report })
+}
+
+/// What the windows of all runs have of one accelerometer, and the channels of its board and its own.
+fn rows(
+    wanted: &Wanted<'_>,
+    samples: &[Samples],
+    index: usize,
+    sensor: &AccelSensor,
+) -> Result<(Rows, [String; 2]), AccelKind> {
+    let board = sensor.board_channel.clone().ok_or(AccelKind::NoBoardChannel)?;
+    let mut rows = Rows::default();
+    for (number, (run, stand)) in samples.iter().zip(wanted.stands).enumerate() {
+        let Site::Known { force_m_per_s2: Some(force), .. } = &stand.site else { continue };
+        let turned = wanted.base.accel.as_ref().map(|accel| axes(&accel.orientation, index, run));
+        let along = |row: &[f64; 3]| force.iter().zip(row).map(|(f, c)| f * c).sum::<f64>();
+        let input: Vec<f64> = turned.iter().flatten().map(along).collect();
+        let of = |channel: &String| {
+            run.deg_c.get(channel).ok_or_else(|| AccelKind::NoReadings { channel: channel.clone() })
+        };
+        let board_deg_c = of(&board)?;
+        let count = board_deg_c.len();
+        let own = sensor.channel.as_ref().map(of).transpose()?.cloned();
+        // An accelerometer without a channel is one that nothing warms.
+        rows.own_deg_c.extend(own.unwrap_or_else(|| vec![wanted.base.temperature.assumed_deg_c; count]));
+        rows.board_deg_c.extend(board_deg_c);
+        let shown = run.forces.get(index).ok_or(AccelKind::FewWindows { windows: 0 })?;
+        rows.error.extend(shown.iter().zip(&input).map(|(shown, input)| shown - input));
+        rows.input.extend(input);
+        rows.run.extend(std::iter::repeat_n(number, count));
+    }
+    let own = sensor.channel.clone().unwrap_or_default();
+    Ok((rows, [board, own]))
+}
+
+/// The document with what was found.
+fn with(base: &Document, found: &[Result<Ratio, AccelKind>]) -> Document {
+    let mut document = base.clone();
+    let sensors = document.accel.iter_mut().flat_map(|accel| &mut accel.sensor);
+    for (sensor, found) in sensors.zip(found) {
+        if let Ok(found) = found {
+            sensor.board_ratio_error = Some(found.curve());
+        }
+    }
+    document
+}
+
+/// Forces along the case axes before and after, each run less its mean, which the ratio does not know.
+fn judged(
+    wanted: &Wanted<'_>,
+    [before, after]: [&Written; 2],
+    troubled: &mut Vec<String>,
+    mut watch: impl Watch,
+) -> Result<Vec<Curve>, Error> {
+    let mut curves = Vec::new();
+    let inside = wanted.runs.iter().map(|run| (run, Sample::In));
+    for (run, sample) in inside.chain(wanted.judges.iter().map(|run| (run, Sample::Out))) {
+        let documents = (&before.loaded, &after.loaded);
+        let about = (&after.document, &Rest::default());
+        let Judged { curves: of_run, troubles } =
+            judge(run, sample, documents, about, wanted.window_s, &mut watch)?;
+        curves.extend(of_run.into_iter().filter(|curve| curve.of.starts_with("accelerometer")));
+        let words = troubles.iter().map(|words| format!("{}: {words}", run.name));
+        let new: Vec<String> = words.filter(|words| !troubled.contains(words)).collect();
+        troubled.extend(new);
+    }
+    Ok(curves)
+}
+
+/// Puts into the report what was found of each accelerometer.
+fn tell(
+    report: &mut FitReport,
+    (wanted, sensors, mains): (&Wanted<'_>, &[AccelSensor], &[usize]),
+    found: &[Result<Ratio, AccelKind>],
+) {
+    let mut curves = Vec::new();
+    for (((sensor, found), axis), ink) in sensors.iter().zip(found).zip(mains).zip(Ink::several()) {
+        let name = &sensor.name;
+        match found {
+            Err(kind) => {
+                report.warnings.push(format!("{}; its ratio does not change", kind.clone().of(name)));
+                let verdict =
+                    report.verdicts.iter_mut().find(|verdict| verdict.of == output_name(false, *axis));
+                if let Some(verdict) = verdict.filter(|verdict| verdict.accepted) {
+                    *verdict = verdict.clone().refused(kind.to_string());
+                }
+            }
+            Ok(ratio) => {
+                report.warnings.extend(ratio.doubt.clone().map(|kind| kind.of(name).to_string()));
+                for (power, (x, sigma)) in ratio.x.iter().zip(&ratio.sigmas).enumerate() {
+                    let unit = crate::report::figures::per_deg_c("ppm", power + 1);
+                    let what = format!("accelerometer {name} board ratio, power {}", power + 1);
+                    report.coefficients.push(Coefficient::new(what, unit, -1e6 * x, Some(1e6 * sigma)));
+                }
+                let [low, high] = ratio.range_deg_c;
+                report.notes.push(format!(
+                    "Accelerometer {name}: r − 1 is {} to {} ppm from {} to {} °C of the board{}.",
+                    short(ratio.error_ppm(low)),
+                    short(ratio.error_ppm(high)),
+                    fixed(low, 1),
+                    fixed(high, 1),
+                    if ratio.beside_own {
+                        ", fitted together with slopes of K and S, which are not written"
+                    } else {
+                        ""
+                    }
+                ));
+                let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(POINTS);
+                let points = (0..=POINTS).map(|step| (at(step), ratio.error_ppm(at(step))));
+                curves.push(Series {
+                    name: format!("accelerometer {name}"),
+                    ink,
+                    form: Form::Line,
+                    samples: Points::points(points),
+                });
+            }
+        }
+    }
+    report.notes.push(format!(
+        "Each of {} runs less its mean; r is 1 at {}.",
+        wanted.runs.len(),
+        wanted
+            .reference_deg_c
+            .map_or("the middle of the board's range".to_owned(), |t| format!("{} °C", short(t)))
+    ));
+    let panel = Panel {
+        title: "r − 1".to_owned(),
+        unit: "ppm".to_owned(),
+        height: HEIGHT,
+        logarithmic: false,
+        content: Content::Series(curves),
+    };
+    let chart = Chart {
+        caption: "Ratio of the board over its temperature.".to_owned(),
+        x: Axis::of("temperature of the board", "°C"),
+        panels: vec![panel],
+        marks: Vec::new(),
+    };
+    report.charts.push(("Ratio of the board".to_owned(), chart));
+}
+
+impl Made {
+    fn each(&self) -> impl Iterator<Item = (&AccelSensor, &Ratio)> {
+        let sensors = self.written.document.accel.iter().flat_map(|accel| &accel.sensor);
+        sensors.zip(&self.found).filter_map(|(sensor, found)| Some((sensor, found.as_ref().ok()?)))
+    }
+
+    /// Standard errors of the ratios, by powers from 0.
+    #[must_use]
+    pub fn sigmas(&self) -> Sigmas {
+        let mut sigmas = Sigmas::default();
+        for (sensor, ratio) in self.each() {
+            let ppm = std::iter::once(0.0).chain(ratio.sigmas.iter().map(|sigma| tidy(1e6 * sigma)));
+            sigmas.put("accel", &sensor.name, "board_ratio_error", ppm.collect());
+        }
+        sigmas
+    }
+
+    /// What goes into `origin.details`.
+    #[must_use]
+    pub fn details(&self) -> Table {
+        let of = |(sensor, ratio): (&AccelSensor, &Ratio)| {
+            let mut table = Table::new();
+            table.insert("name".into(), sensor.name.clone().into());
+            table.insert("reference_deg_c".into(), ratio.reference_deg_c.into());
+            table.insert("beside_own_temperature".into(), ratio.beside_own.into());
+            Value::Table(table)
+        };
+        Table::from_iter([("accel".to_owned(), Value::Array(self.each().map(of).collect()))])
+    }
+
+    /// Lowest and highest temperature of the boards (°C).
+    #[must_use]
+    pub fn range_deg_c(&self) -> Option<[f64; 2]> {
+        let ranges = self.each().map(|(_, ratio)| ratio.range_deg_c);
+        ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|range| range.map(tidy))
+    }
+}

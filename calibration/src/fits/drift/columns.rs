@@ -1,0 +1,306 @@
+//! A static log as columns of one kind of reading, ready for analysis.
+
+use std::path::PathBuf;
+
+use isotherm_correction::sample::{CorrectedTick, OutputKind, SensorFlags};
+use isotherm_log::diff::CorrectedLog;
+use isotherm_log::offline::{Loaded, unit_id};
+use isotherm_protocol::key::UnitId;
+
+use super::DEG_PER_H_IN_RAD_PER_S;
+use super::allan::Term;
+use super::pieces::checks;
+use crate::axes::{AXES, sensor_name};
+use crate::error::Error;
+use crate::runs::cut::Cut;
+use crate::runs::series::{Series, Ticks};
+use crate::runs::{Run, Watch};
+
+/// What a column measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Angular rate (°/h).
+    Rate,
+    /// Specific force (m/s²), or the accelerometer's output (V) where the log has that.
+    Force,
+}
+
+/// Factor from readings and seconds to the unit of measure that a coefficient is stated in, and its symbol.
+pub(super) fn stated_in(term: Term, kind: Kind) -> (f64, &'static str) {
+    match (term, kind) {
+        (Term::Quantization, Kind::Rate) => (1.0, "″"),
+        (Term::AngleRandomWalk, Kind::Rate) => (1.0 / 60.0, "°/√h"),
+        (Term::BiasInstability, Kind::Rate) => (1.0, "°/h"),
+        (Term::RateRandomWalk, Kind::Rate) => (60.0, "°/h/√h"),
+        (Term::RateRamp, Kind::Rate) => (3600.0, "°/h²"),
+        (Term::Quantization, Kind::Force) => (1.0, "m/s"),
+        (Term::AngleRandomWalk, Kind::Force) => (60.0, "m/s/√h"),
+        (Term::BiasInstability, Kind::Force) => (1.0, "m/s²"),
+        (Term::RateRandomWalk, Kind::Force) => (60.0, "m/s²/√h"),
+        (Term::RateRamp, Kind::Force) => (3600.0, "m/s²/h"),
+    }
+}
+
+/// Readings of several sensors at the same ticks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// The unit.
+    pub unit: UnitId,
+    /// What they measure.
+    pub kind: Kind,
+    /// Names of the sensors or axes.
+    pub names: Vec<String>,
+    /// Whether they are along the case axes, after a correction.
+    pub corrected: bool,
+    /// Ends of the ticks (ns on the producer's clock).
+    pub end_ns: Vec<i64>,
+    /// How long the ticks last (s), as the mapping or the producer states it.
+    pub duration_s: Vec<f64>,
+    /// Readings by sensor; what is no good reading is no number.
+    pub values: Vec<Vec<f64>>,
+    /// Where raw readings stay exactly the same for long.
+    pub frozen: Vec<String>,
+    /// What is to be said of the reading.
+    pub notes: Vec<String>,
+}
+
+/// What the unit of a log is called that has no serial, where nobody says one and no document is written of it.
+///
+/// # Errors
+/// None: the name is a serial as others are.
+pub fn unnamed() -> Result<UnitId, Error> {
+    Ok(unit_id("unnamed")?)
+}
+
+/// ″ per count and s in °/h: 1 ″/s is 1 °/h.
+const DEG_PER_H_IN_ARCSEC_PER_S: f64 = 1.0;
+
+impl Columns {
+    /// From raw gyro ticks; counts need the angle that one stands for (″).
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where there are no ticks, or counts without a weight.
+    pub fn of_gyros(series: Series, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
+        let Series { unit, gyros, .. } = series;
+        let scale = match (gyros.output, increment_weight_arcsec) {
+            (None, _) => return Err(nothing("gyro ticks", "for the accelerometers use --accelerometers")),
+            (Some(OutputKind::Counts), None) => {
+                return Err(Error::Refused(vec![
+                    "the gyro readings are counts: give the angle per count with --increment-weight ARCSEC, or a \
+                     calibration document with --calibration"
+                        .to_owned(),
+                ]));
+            }
+            (Some(OutputKind::Counts), Some(weight)) => Scale::PerSecond(weight * DEG_PER_H_IN_ARCSEC_PER_S),
+            (Some(OutputKind::Mean), _) => Scale::Mean(DEG_PER_H_IN_RAD_PER_S),
+        };
+        Ok(Self::build(unit, Kind::Rate, gyros, scale))
+    }
+
+    /// From raw accelerometer ticks; counts become counts per second.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where there are none.
+    pub fn of_accelerometers(series: Series) -> Result<Self, Error> {
+        let Series { unit, accels, .. } = series;
+        let scale = match accels.output {
+            None => {
+                return Err(nothing("accelerometer ticks", "for the gyros remove --accelerometers"));
+            }
+            Some(OutputKind::Counts) => {
+                return Err(Error::Refused(vec![
+                    "the accelerometer readings are counts: give a calibration document with --calibration"
+                        .to_owned(),
+                ]));
+            }
+            Some(OutputKind::Mean) => Scale::Mean(1.0),
+        };
+        let mut columns = Self::build(unit, Kind::Force, accels, scale);
+        columns.notes.push(
+            "The readings are the accelerometers' mean outputs in the log. If they are volts, read V for m/s²; \
+             --calibration converts them to specific force."
+                .to_owned(),
+        );
+        Ok(columns)
+    }
+
+    fn build(unit: UnitId, kind: Kind, ticks: Ticks, scale: Scale) -> Self {
+        let Ticks { end_ns, duration_s, readings, .. } = ticks;
+        let names: Vec<String> =
+            (0..readings.len()).map(|index| sensor_name(index, readings.len())).collect();
+        let looked = names.iter().zip(&readings);
+        let frozen = looked
+            .filter_map(|(name, column)| {
+                checks::frozen(&format!("{} {name}", kind.sensor()), &end_ns, column)
+            })
+            .collect();
+        let values = readings.into_iter().map(|mut column| {
+            match scale {
+                Scale::Mean(factor) => column.iter_mut().for_each(|reading| *reading *= factor),
+                Scale::PerSecond(factor) => {
+                    column
+                        .iter_mut()
+                        .zip(&duration_s)
+                        .for_each(|(reading, duration)| *reading *= factor / duration);
+                }
+            }
+            column
+        });
+        let values = values.collect();
+        Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes: Vec::new() }
+    }
+
+    /// From the run of a unit, corrected with a document by the same stream as the service's.
+    ///
+    /// The raw readings decide first: behind a correction a dead sensor still shows a little of the others.
+    ///
+    /// # Errors
+    /// As [`Run::correct`] and [`checks::raw`].
+    pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
+        let mut columns = Self::empty(loaded.unit.clone(), kind);
+        let (series, troubles) = run.correct_with_series(loaded, watch, |tick, _| columns.push(tick));
+        columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
+        columns.notes = troubles?;
+        if run.unit != loaded.unit {
+            columns.notes.push(format!("The log is of unit {}, the document for {}.", run.unit, loaded.unit));
+        }
+        columns.finish()
+    }
+
+    /// From a log of corrected ticks, as `isotherm-replay correct` writes it; `cut` learns where it is cut short.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where it has none, or of several units; [`Error::Log`].
+    pub fn of_corrected(
+        paths: &[PathBuf],
+        unit: Option<&UnitId>,
+        kind: Kind,
+        cut: &Cut,
+        mut progress: impl FnMut(),
+    ) -> Result<Self, Error> {
+        let unnamed = unnamed()?;
+        let units = unit.cloned().into_iter().collect();
+        let mut columns: Option<Self> = None;
+        for path in paths {
+            let mut log = CorrectedLog::open(path, &units, &unnamed)?;
+            while let Some(ticks) = log.next_ticks()? {
+                let columns = columns.get_or_insert_with(|| Self::empty(ticks.unit.clone(), kind));
+                if columns.unit != ticks.unit {
+                    let (first, second) = (&columns.unit, &ticks.unit);
+                    return Err(Error::Refused(vec![format!(
+                        "the log is of several units ({first}, {second}): choose one with --unit"
+                    )]));
+                }
+                ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
+                progress();
+            }
+            log.cut_short().iter().for_each(|words| cut.recording(words));
+        }
+        columns.map_or_else(
+            || {
+                let none =
+                    nothing("corrected ticks", "make them from a raw log with isotherm-replay correct");
+                Err(none.beside(cut.words().map(str::to_owned).as_slice()))
+            },
+            Self::finish,
+        )
+    }
+
+    fn empty(unit: UnitId, kind: Kind) -> Self {
+        Self {
+            unit,
+            kind,
+            names: AXES.map(str::to_owned).to_vec(),
+            corrected: true,
+            end_ns: Vec::new(),
+            duration_s: Vec::new(),
+            values: vec![Vec::new(); AXES.len()],
+            frozen: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Takes a corrected tick.
+    fn push(&mut self, tick: &CorrectedTick) {
+        let (increments, flags, factor) = match self.kind {
+            Kind::Rate => (&tick.delta_angle, &tick.gyro_flags, DEG_PER_H_IN_RAD_PER_S),
+            Kind::Force => (&tick.delta_velocity, &tick.accel_flags, 1.0),
+        };
+        let good = !flags.is_empty() && flags.iter().all(|flags| flags.contains(SensorFlags::VALID));
+        let duration_s = tick.duration.as_s();
+        self.end_ns.push(tick.end_time.as_ns());
+        self.duration_s.push(duration_s);
+        for (column, increment) in self.values.iter_mut().zip(increments) {
+            column.push(if good { increment * factor / duration_s } else { f64::NAN });
+        }
+    }
+
+    fn finish(self) -> Result<Self, Error> {
+        if self.end_ns.is_empty() {
+            return Err(nothing(
+                "ticks that could be corrected",
+                "check that the document is for this unit, and the mapping",
+            ));
+        }
+        Ok(self)
+    }
+
+    /// Time of a tick since the first (s).
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
+    pub fn since_s(&self, tick: usize) -> f64 {
+        let time = self.end_ns.get(tick).zip(self.end_ns.first());
+        time.map_or(0.0, |(end, first)| end.saturating_sub(*first) as f64 * 1e-9)
+    }
+
+    /// Symbol of the readings' unit of measure.
+    #[must_use]
+    pub fn measure(&self) -> &'static str {
+        self.kind.measure()
+    }
+}
+
+impl Kind {
+    /// Symbol of the unit of measure.
+    #[must_use]
+    pub const fn measure(self) -> &'static str {
+        match self {
+            Self::Rate => "°/h",
+            Self::Force => "m/s²",
+        }
+    }
+
+    /// Symbol of the unit of measure of a slope (power 1) or a bend (power 2), over hours.
+    #[must_use]
+    pub const fn over_hours(self, power: usize) -> &'static str {
+        match (self, power) {
+            (_, 0) => self.measure(),
+            (Self::Rate, 1) => "°/h²",
+            (Self::Rate, _) => "°/h³",
+            (Self::Force, 1) => "m/s²/h",
+            (Self::Force, _) => "m/s²/h²",
+        }
+    }
+
+    /// What a sensor of the kind is called.
+    #[must_use]
+    pub const fn sensor(self) -> &'static str {
+        match self {
+            Self::Rate => "gyro",
+            Self::Force => "accelerometer",
+        }
+    }
+}
+
+/// How readings become rates.
+#[derive(Debug, Clone, Copy)]
+enum Scale {
+    /// Means: times this.
+    Mean(f64),
+    /// Counts: times this over the tick's duration.
+    PerSecond(f64),
+}
+
+fn nothing(what: &str, advice: &str) -> Error {
+    Error::Refused(vec![format!("the log has no {what}: {advice}")])
+}

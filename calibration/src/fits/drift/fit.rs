@@ -1,0 +1,248 @@
+//! Everything that is said of one sensor, made for all of them on every processor core.
+
+use super::markov::{Beside, DailyLine, Fit};
+use super::pieces::{Grid, Sensor};
+use super::slow::{Autocorrelation, Slow};
+use super::trend::Extrapolation;
+use crate::fits::drift::allan::confidence::degrees_of_freedom;
+use crate::fits::drift::allan::deviation::lengths;
+use crate::fits::drift::allan::fit::interval;
+use crate::fits::drift::allan::{Estimator, NoiseFit, Phase, PowerLaw, Variance};
+use crate::fits::drift::spectrum::{Line, Spectrum};
+use crate::report::in_parallel;
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Factor from one averaging time to the next: 2 or 10.
+    pub factor: usize,
+    /// Hours that the extrapolation is fitted to.
+    pub fit_h: f64,
+}
+
+/// Deviations at one averaging time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deviations {
+    /// Averaging time (s).
+    pub tau_s: f64,
+    /// Plain, overlapping, modified; `None` where the log is too short.
+    pub of: [Option<Deviation>; 3],
+}
+
+/// One deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deviation {
+    /// The deviation.
+    pub value: f64,
+    /// Ends of its 95 % interval, by χ².
+    pub interval: [f64; 2],
+    /// Equivalent degrees of freedom.
+    pub degrees_of_freedom: f64,
+}
+
+/// Everything of one sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// Its name.
+    pub name: String,
+    /// Mean of the readings.
+    pub mean: f64,
+    /// Standard deviation of the readings.
+    pub deviation: f64,
+    /// Standard deviation of the means over bins.
+    pub slow_deviation: f64,
+    /// Allan deviations.
+    pub allan: Vec<Deviations>,
+    /// Overlapping variances in octaves, which the coefficients were fitted to.
+    pub fitted: Vec<Variance>,
+    /// The noise coefficients.
+    pub noise: Option<NoiseFit>,
+    /// The slow part.
+    pub slow: Slow,
+    /// Markov part and straight trend, and the lines of the day.
+    pub markov: Option<(Fit, Vec<DailyLine>)>,
+    /// Slope of the straight trend (readings per h) and the standard error that it must stand out of.
+    pub slope: Option<(f64, f64)>,
+    /// The same noise with a trend of second order.
+    pub second_order: Option<Fit>,
+    /// Autocorrelation of what is left of the slow part after trend and lines.
+    pub autocorrelation: Option<Autocorrelation>,
+    /// Spectrum of the readings.
+    pub spectrum: Option<Spectrum>,
+    /// Lines that stand out of it.
+    pub lines: Vec<Line>,
+    /// What a straight line through the beginning says of the rest.
+    pub extrapolation: Option<Extrapolation>,
+}
+
+impl Analysis {
+    /// The noise coefficients, where they describe the log: others are not stated.
+    #[must_use]
+    pub fn stated_noise(&self) -> Option<&NoiseFit> {
+        self.noise.as_ref().filter(|noise| noise.describes())
+    }
+}
+
+/// The estimators, in the order of the tables.
+pub const ESTIMATORS: [Estimator; 3] = [Estimator::Plain, Estimator::Overlapping, Estimator::Modified];
+
+/// What there is of a sensor before its Allan variances.
+struct Prepared {
+    mean: f64,
+    deviation: f64,
+    phase: Phase,
+    slow: Slow,
+    spectrum: Option<Spectrum>,
+}
+
+/// Analyses every sensor of a log.
+#[must_use]
+pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
+    let sensors = &grid.sensors;
+    let prepared = in_parallel(sensors, |_| (), |sensor| prepare(grid, sensor));
+    // One thing of work per sensor and averaging time, the slow ones first.
+    let mut work = Vec::new();
+    for (index, of) in prepared.iter().enumerate() {
+        let longest = of.phase.longest();
+        for estimator in [Estimator::Modified, Estimator::Overlapping, Estimator::Plain] {
+            let mut ticks = lengths(longest, wanted.factor);
+            if estimator == Estimator::Overlapping && wanted.factor != 2 {
+                ticks.extend(lengths(longest, 2));
+                ticks.sort_unstable();
+                ticks.dedup();
+            }
+            work.extend(ticks.into_iter().map(|m| (index, estimator, m)));
+        }
+    }
+    let variances = in_parallel(
+        &work,
+        |_| (),
+        |(index, estimator, m)| prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m)),
+    );
+    let found: Vec<_> = work.into_iter().zip(variances).collect();
+    let indices: Vec<usize> = (0..sensors.len()).collect();
+    let finished = in_parallel(
+        &indices,
+        |_| (),
+        |index| {
+            let of_sensor: Vec<(Estimator, Variance)> = found
+                .iter()
+                .filter(|((sensor, ..), _)| sensor == index)
+                .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
+                .collect();
+            let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
+            Some(finish(grid, sensor, prepared, &of_sensor, wanted))
+        },
+    );
+    finished.into_iter().flatten().collect()
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
+fn prepare(grid: &Grid, sensor: &Sensor) -> Prepared {
+    let pieces: Vec<&[f64]> = sensor.pieces.iter().map(|piece| piece.readings.as_slice()).collect();
+    let count = pieces.iter().map(|piece| piece.len()).sum::<usize>() as f64;
+    // About the first reading, so that a large constant takes no digits.
+    let first = pieces.first().and_then(|piece| piece.first()).copied().unwrap_or(0.0);
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for reading in pieces.iter().copied().flatten() {
+        let off = reading - first;
+        sum += off;
+        squares += off * off;
+    }
+    let mean = sum / count;
+    let deviation = ((squares - sum * mean) / (count - 1.0).max(1.0)).max(0.0).sqrt();
+    let mean = first + mean;
+    let placed: Vec<(usize, &[f64])> =
+        sensor.pieces.iter().map(|piece| (piece.start, piece.readings.as_slice())).collect();
+    Prepared {
+        mean,
+        deviation,
+        phase: Phase::new(pieces.iter().copied(), mean),
+        slow: Slow::of(&placed, grid.ticks, grid.tick_s),
+        spectrum: Spectrum::of(&pieces, mean, grid.tick_s),
+    }
+}
+
+fn finish(
+    grid: &Grid,
+    sensor: &Sensor,
+    prepared: &Prepared,
+    variances: &[(Estimator, Variance)],
+    wanted: Wanted,
+) -> Analysis {
+    let octaves = |variance: &Variance| variance.ticks.is_power_of_two();
+    let overlapping = variances.iter().filter(|(estimator, _)| *estimator == Estimator::Overlapping);
+    let fitted: Vec<Variance> = overlapping.map(|(_, variance)| *variance).filter(octaves).collect();
+    let noise = NoiseFit::of(&fitted, grid.tick_s);
+    let slow = prepared.slow.clone();
+    let markov = Fit::with_daily_lines(&slow, 1);
+    let beside = markov.as_ref().map(|(fit, _)| fit.beside.periods_h.clone());
+    let second_order = markov.as_ref().zip(beside).and_then(|((fit, _), periods_h)| {
+        Fit::with_noise(&slow, &Beside { degree: 2, periods_h }, fit.noise)
+    });
+    let autocorrelation = markov.as_ref().map(|(fit, _)| {
+        let left: Vec<f64> =
+            slow.time_h.iter().zip(&slow.mean).map(|(time, mean)| mean - fit.beside_at(*time)).collect();
+        Autocorrelation::of(&slow.time_h, &left, slow.width_h)
+    });
+    Analysis {
+        name: sensor.name.clone(),
+        mean: prepared.mean,
+        deviation: prepared.deviation,
+        slow_deviation: deviation_of(&slow.mean),
+        allan: table(grid.tick_s, variances, noise.as_ref(), wanted.factor),
+        fitted,
+        noise,
+        slope: markov.as_ref().and_then(|(fit, _)| fit.slope(&slow)),
+        extrapolation: Extrapolation::of(&slow, wanted.fit_h),
+        markov,
+        second_order,
+        autocorrelation,
+        lines: prepared.spectrum.as_ref().map(Spectrum::lines).unwrap_or_default(),
+        spectrum: prepared.spectrum.clone(),
+        slow,
+    }
+}
+
+/// Standard deviation of some values.
+#[expect(clippy::cast_precision_loss, reason = "at most some hundred")]
+fn deviation_of(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    (squares / (count - 1.0).max(1.0)).sqrt()
+}
+
+/// Deviations by averaging time, with their confidence by the kind of noise that dominates there.
+#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
+fn table(
+    tick_s: f64,
+    variances: &[(Estimator, Variance)],
+    noise: Option<&NoiseFit>,
+    factor: usize,
+) -> Vec<Deviations> {
+    let mut factors: Vec<usize> = variances.iter().map(|(_, variance)| variance.ticks).collect();
+    factors.sort_unstable();
+    factors.dedup();
+    let wanted = lengths(factors.last().map_or(0, |last| last * 3), factor);
+    factors.retain(|m| wanted.contains(m));
+    let row = |m: usize| {
+        let tau_s = m as f64 * tick_s;
+        let law = noise.map_or(PowerLaw::White, |noise| noise.dominant(tau_s).law());
+        let of = ESTIMATORS.map(|estimator| {
+            let same =
+                |(other, variance): &&(Estimator, Variance)| *other == estimator && variance.ticks == m;
+            let (_, variance) = variances.iter().find(same)?;
+            let degrees = degrees_of_freedom(estimator, law, m, variance.differences);
+            let [low, high] = interval(degrees);
+            let value = variance.variance.sqrt();
+            Some(Deviation {
+                value,
+                interval: [value * low.sqrt(), value * high.sqrt()],
+                degrees_of_freedom: degrees,
+            })
+        });
+        Deviations { tau_s, of }
+    };
+    factors.into_iter().map(row).collect()
+}

@@ -1,0 +1,106 @@
+//! What the service's own drift estimator leaves of a drift.
+//!
+//! The estimator is `isotherm_correction::drift::DriftEstimator` itself, fed tick by tick as the service feeds it: the
+//! residual rate of each gyro in, a reference each minute while the true rate is known, what it would subtract out.
+
+use crate::axes::AXES;
+use isotherm_correction::drift::{DriftEstimator, DriftModel, DriftParts, DriftSettings, Reference};
+use isotherm_correction::observation::{GyroSeen, Observation};
+use isotherm_correction::sample::{SensorFlags, Sensors};
+use isotherm_correction::units::{Span, Timestamp};
+
+/// Length of a tick (s); drifts take hours.
+pub const TICK_S: f64 = 10.0;
+/// Length of a reference (s), that of the ones at rest.
+pub const REFERENCE_S: f64 = 60.0;
+/// Ticks of a reference.
+pub const REFERENCE_TICKS: usize = 6;
+
+/// How the estimator is fed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aiding {
+    /// Ticks of the calibration, in which the rate of every gyro is known.
+    pub calibration_ticks: usize,
+    /// Whether the rates of the level gyros stay known afterwards, through the velocity log.
+    pub level_afterwards: bool,
+    /// Standard error of a reference (rad/s).
+    pub reference_sigma_rad_per_s: f64,
+}
+
+/// What is left of the drifts (rad/s) of the gyros x, y, z after the estimate, tick by tick.
+///
+/// `drift` is what the estimate is to follow; `measured` is the same with the noise of gyros and references. `parts` is what
+/// the estimator is to expect of each.
+///
+/// # Errors
+/// Everything that is wrong with the parts.
+pub fn residual(
+    drift: &[[f64; 3]],
+    measured: &[[f64; 3]],
+    parts: &[DriftParts; 3],
+    aiding: &Aiding,
+) -> Result<Vec<[f64; 3]>, Vec<String>> {
+    let mut errors = Vec::new();
+    let mut models = Vec::new();
+    for (axis, parts) in AXES.into_iter().zip(parts) {
+        match DriftModel::new(parts) {
+            Ok(model) => models.push(model),
+            Err(found) => errors.extend(found.iter().map(|error| format!("drift of gyro {axis}: {error}"))),
+        }
+    }
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let settings = DriftSettings { delay: Span::from_ms(0), subtract: true };
+    // One estimator per gyro: a reference is for all gyros of an estimator, and the azimuth's ends with the calibration.
+    let mut estimators: Vec<DriftEstimator> =
+        models.into_iter().map(|model| DriftEstimator::new(&[Some(model)], settings)).collect();
+    let mut left = Vec::with_capacity(drift.len());
+    let mut end = Timestamp::default();
+    let tick = Span::from_s(TICK_S);
+    let project = |_: [f64; 3]| std::iter::once(0.0).collect::<Sensors<f64>>();
+    for (index, (drift, measured)) in drift.iter().zip(measured).enumerate() {
+        end = end + tick;
+        let mut of_tick = *drift;
+        for (axis, estimator) in estimators.iter_mut().enumerate() {
+            let known = index < aiding.calibration_ticks || (axis < 2 && aiding.level_afterwards);
+            estimator.advance(end, false, &project);
+            let gyro = GyroSeen { rate: measured[axis], flags: SensorFlags::VALID, ..GyroSeen::default() };
+            let observation = Observation {
+                end_time: end,
+                duration: tick,
+                settled: true,
+                gyros: std::iter::once(gyro).collect(),
+                ..Observation::default()
+            };
+            of_tick[axis] -= estimator.subtrahend(0, end);
+            estimator.observe(&observation);
+            if known && (index + 1) % REFERENCE_TICKS == 0 {
+                let reference = Reference {
+                    start: end - Span::from_s(REFERENCE_S),
+                    end,
+                    angular_rate: [0.0; 3],
+                    sigma: aiding.reference_sigma_rad_per_s,
+                };
+                // It is as long as one may be, and of a time that is kept.
+                if let Err(refusal) = estimator.submit_at_rest(&reference) {
+                    return Err(vec![refusal.to_string()]);
+                }
+            }
+        }
+        left.push(of_tick);
+    }
+    Ok(left)
+}
+
+/// The same parts without the state of the trend.
+#[must_use]
+pub fn without_trend(parts: &DriftParts) -> DriftParts {
+    DriftParts { trend_sigma_rad_per_s2: 0.0, ..*parts }
+}
+
+/// The same parts without the Markov part.
+#[must_use]
+pub fn trend_alone(parts: &DriftParts) -> DriftParts {
+    DriftParts { sigma_rad_per_s: 0.0, ..*parts }
+}

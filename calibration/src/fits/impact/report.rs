@@ -1,0 +1,312 @@
+//! What is said of a drift's impact: verdict, table, JSON, page.
+
+use std::fmt::Write;
+
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::ins::Errors;
+use super::models::{Choice, TABLE_3, table_3, table_3_gains};
+use super::monte_carlo::Spread;
+use super::scenario::{CARES, Care, Course, Figures, Voyage};
+use crate::axes::AXES;
+use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
+use crate::report::figures::{short, table};
+
+/// Height of a panel (CSS pixels).
+const HEIGHT: u32 = 220;
+/// Share of the estimator's error below which a drift that is known exactly is another matter than one that is estimated.
+const EXACT: f64 = 0.5;
+
+/// One row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Which drift.
+    pub case: String,
+    /// How it went, or how it went with the first seed.
+    pub course: Course,
+    /// Over many seeds; `None` for one drift.
+    pub spread: Option<Spread>,
+}
+
+/// A row as JSON.
+#[derive(Debug, Serialize)]
+struct RowJson<'a> {
+    case: &'a str,
+    care: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    figures: Option<Figures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    median: Option<Figures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    within_95_percent: Option<Figures>,
+}
+
+/// What is said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// Where and how long.
+    pub voyage: Voyage,
+    /// Which drift, in words.
+    pub source: String,
+    /// Number of seeds; 0 for one drift.
+    pub seeds: usize,
+    /// Rows: for each case one per care.
+    pub rows: Vec<Row>,
+    /// What is to be said.
+    pub notes: Vec<String>,
+    /// Which model of the drift the log's calibration bears out, by gyro; empty without a log.
+    pub choices: Vec<Choice>,
+}
+
+impl Row {
+    /// The figure that the row is judged by.
+    fn judged(&self) -> Figures {
+        self.spread.as_ref().map_or_else(|| self.course.figures(), |spread| spread.median)
+    }
+}
+
+impl Report {
+    /// The first line, in words: the case that carries the position farthest.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        let radial = |row: &&Row| row.judged().radial_largest_m;
+        let Some(worst) = self.rows.iter().max_by(|a, b| radial(a).total_cmp(&radial(b))) else {
+            return String::new();
+        };
+        let of = |care: Care| {
+            let row = self.rows.iter().find(|row| row.case == worst.case && row.course.care == care);
+            row.map(Row::judged).unwrap_or_default()
+        };
+        let [held, without, with, alone] = CARES.map(of);
+        let middle = if self.seeds > 0 { "in the middle of all seeds " } else { "" };
+        let gain = without.radial_largest_m / with.radial_largest_m.max(f64::MIN_POSITIVE);
+        let judgement = if without.radial_largest_m <= 0.0 && with.radial_largest_m <= 0.0 {
+            "the trend state makes no difference".to_owned()
+        } else if gain >= 1.05 {
+            format!("the trend state cuts the error {gain:.1}×")
+        } else if gain > 1.0 / 1.05 {
+            "the trend state makes no difference".to_owned()
+        } else {
+            format!(
+                "the trend state increases the error {:.1}×: its trend_sigma is too large for this gyro",
+                1.0 / gain
+            )
+        };
+        let judgement = format!("{judgement}; {} with the trend alone", distance(alone.radial_largest_m));
+        let hours = short(self.voyage.hours);
+        // Seeded drifts are held at what they are, without noise: no procedure comes that far.
+        if self.seeds > 0
+            && held.radial_largest_m < EXACT * without.radial_largest_m.min(with.radial_largest_m)
+        {
+            return format!(
+                "{}: over {hours} h {middle}{} of position with the estimator without trend state, {} with it: \
+                 {judgement}. A drift known exactly at departure and held would leave {} of position and {}′ of \
+                 heading; the rest is what noise hides from the estimator.",
+                worst.case,
+                distance(without.radial_largest_m),
+                distance(with.radial_largest_m),
+                distance(held.radial_largest_m),
+                short(held.heading_largest_arcmin),
+            );
+        }
+        format!(
+            "{}: over {hours} h {middle}{} of position and {}′ of heading if the drift is held at its last value; {} \
+             with the estimator without trend state, {} with it: {judgement}.",
+            worst.case,
+            distance(held.radial_largest_m),
+            short(held.heading_largest_arcmin),
+            distance(without.radial_largest_m),
+            distance(with.radial_largest_m),
+        )
+    }
+
+    /// Head and rows of the table.
+    #[must_use]
+    pub fn rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
+        let mut head =
+            vec!["drift", "care", "position at end, m", "largest, m", "heading at end, ′", "largest, ′"];
+        if self.seeds > 0 {
+            head.extend(["95 %: position largest, m", "heading largest, ′"]);
+        }
+        let rows = self.rows.iter().map(|row| {
+            let Figures { radial_at_end_m, radial_largest_m, heading_at_end_arcmin, heading_largest_arcmin } =
+                row.judged();
+            let mut cells = vec![row.case.clone(), row.course.care.words().to_owned()];
+            cells.extend(
+                [radial_at_end_m, radial_largest_m, heading_at_end_arcmin, heading_largest_arcmin].map(short),
+            );
+            if let Some(spread) = &row.spread {
+                let far = spread.within_95_percent;
+                cells.extend([far.radial_largest_m, far.heading_largest_arcmin].map(short));
+            }
+            cells
+        });
+        (head.into_iter().map(str::to_owned).collect(), rows.collect())
+    }
+
+    /// Everything as text.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let (head, rows) = self.rows();
+        let mut text = format!("{}\n\n{}\n\n{}\n", self.verdict(), self.circumstances(), table(&head, &rows));
+        for note in self.notes.iter().chain(&self.said_of_models()) {
+            let _ = writeln!(text, "\n{note}");
+        }
+        text
+    }
+
+    /// Which model the log bears out, and what 002 has of the two.
+    fn said_of_models(&self) -> Vec<String> {
+        let [least, median, most] = table_3_gains();
+        let paper = format!(
+            "002's table 3, {} starts of six gyros: its model with trend, which has no Markov part, cuts the \
+             position error {least:.0}…{most:.0}×, {median:.1}× in the middle. It is worse if the drift has one: \
+             let the likelihood of a log choose.",
+            TABLE_3.len()
+        );
+        let chosen = self.choices.iter().map(Choice::words);
+        chosen.chain([paper]).collect()
+    }
+
+    /// Everything as JSON; the curves too.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let rows: Vec<Value> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let figures = row.spread.is_none().then(|| row.course.figures());
+                let median = row.spread.as_ref().map(|spread| spread.median);
+                let within_95_percent = row.spread.as_ref().map(|spread| spread.within_95_percent);
+                let care = row.course.care.words();
+                let mut value = json!(RowJson { case: &row.case, care, figures, median, within_95_percent });
+                let points = row.course.points.iter();
+                let points: Vec<Value> = points
+                    .map(|(hours, errors)| {
+                        json!([
+                            hours,
+                            errors.heading_arcmin(),
+                            errors.position_m[0],
+                            errors.position_m[1],
+                            errors.radial_m()
+                        ])
+                    })
+                    .collect();
+                if let Some(object) = value.as_object_mut() {
+                    object.insert("points".to_owned(), json!(points));
+                }
+                value
+            })
+            .collect();
+        json!({
+            "verdict": self.verdict(),
+            "source": self.source,
+            "voyage": self.voyage,
+            "seeds": self.seeds,
+            "columns_of_points": ["hours", "heading_arcmin", "north_m", "east_m", "radial_m"],
+            "rows": rows,
+            "notes": self.notes,
+            "models": self.choices,
+            "table_3": TABLE_3.map(|row| json!({ "gyro": row.gyro, "start": row.start, "existing_km": row.existing_km, "trend_km": row.trend_km })),
+        })
+    }
+
+    /// The page.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        let mut page = Page::new("What a drift means for navigation");
+        page.headline(&self.verdict());
+        page.paragraph(&self.circumstances());
+        let (head, rows) = self.rows();
+        page.table(&Table { head, rows });
+        self.notes.iter().chain(&self.said_of_models()).for_each(|note| page.paragraph(note));
+        let mut cases: Vec<&str> = self.rows.iter().map(|row| row.case.as_str()).collect();
+        cases.dedup();
+        for case in cases {
+            page.heading(case);
+            if self.seeds > 0 {
+                page.paragraph("The curves are those of the first seed.");
+            }
+            page.chart(&self.chart(case));
+        }
+        page.heading("Position errors of real gyros in 002, table 3");
+        page.table(&table_3());
+        page.to_html()
+    }
+
+    fn chart(&self, case: &str) -> Chart {
+        let curves = |of: &dyn Fn(&Course) -> Vec<(f64, f64)>| {
+            let rows = self.rows.iter().filter(|row| row.case == case).zip([
+                Ink::Third,
+                Ink::Second,
+                Ink::First,
+                Ink::Fourth,
+            ]);
+            let curve = |(row, ink): (&Row, Ink)| Series {
+                name: row.course.care.words().to_owned(),
+                ink,
+                form: Form::Line,
+                samples: Samples::points(of(&row.course)),
+            };
+            Content::Series(rows.map(curve).collect())
+        };
+        let errors = |of: fn(&Errors) -> f64| {
+            move |course: &Course| {
+                course.points.iter().map(|(hours, errors)| (*hours, of(errors))).collect::<Vec<_>>()
+            }
+        };
+        // The gyro of which most is left.
+        let rows = || self.rows.iter().filter(|row| row.case == case);
+        let most = |axis: usize| {
+            let left = rows().flat_map(|row| row.course.left.iter());
+            left.map(|left| left[axis].abs()).fold(0.0, f64::max)
+        };
+        let axis = [2, 0, 1].into_iter().max_by(|a, b| most(*a).total_cmp(&most(*b))).unwrap_or(2);
+        let left = |course: &Course| {
+            let left = course.points.iter().zip(&course.left);
+            left.map(|((hours, _), left)| (*hours, left[axis] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
+        };
+        let title = format!("remaining drift of gyro {}", AXES[axis]);
+        let panel = |title: &str, unit: &str, content| Panel {
+            title: title.to_owned(),
+            unit: unit.to_owned(),
+            height: HEIGHT,
+            logarithmic: false,
+            content,
+        };
+        Chart {
+            caption: format!("{case}: errors since departure."),
+            x: Axis::of("time since departure", "h"),
+            panels: vec![
+                panel("radial position error", "m", curves(&errors(Errors::radial_m))),
+                panel("heading error", "′", curves(&errors(Errors::heading_arcmin))),
+                panel(&title, "°/h", curves(&left)),
+            ],
+            marks: Vec::new(),
+        }
+    }
+
+    fn circumstances(&self) -> String {
+        let v = &self.voyage;
+        format!(
+            "{}. Latitude {}°, platform turning at {} Earth rates, {} h of calibration, then {} h without position; level gyros {}.",
+            self.source,
+            short(v.latitude_deg),
+            short(v.turn_ratio),
+            short(v.calibration_h),
+            short(v.hours),
+            if v.log_aids_level {
+                "observed through the velocity log all the time"
+            } else {
+                "not observed either"
+            }
+        )
+    }
+}
+
+/// Metres, or kilometres where they are many.
+fn distance(metres: f64) -> String {
+    if metres >= 1000.0 { format!("{} km", short(metres / 1000.0)) } else { format!("{} m", short(metres)) }
+}

@@ -1,0 +1,259 @@
+//! The constants on their way into a document.
+
+use isotherm_correction::thermal::Feature;
+use isotherm_correction::units::Angle;
+use isotherm_protocol::document::{Curve, Document, GyroSensor, ModeReversal, Servo, ServoKind, Shape, Unit};
+use toml::{Table, Value};
+
+use super::fit::{Made, ServoFit};
+use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
+use crate::document::written::tidy;
+use crate::report::Sigmas;
+use crate::report::words::gyros as gyros_in_words;
+
+/// Multiples of τ after which the servo's transient counts as settled: e⁻¹⁶ of it is left.
+pub const SETTLED: f64 = 8.0;
+/// `T_ref` where the document states none (°C).
+const REFERENCE_DEG_C: f64 = 20.0;
+/// Terms that are fitted.
+const FITTED: [Feature; 3] = [Feature::One, Feature::LasingMode, Feature::Meander];
+/// Ranges are widened to the next tenth of a degree.
+const PER_DEG_C: f64 = 10.0;
+
+/// The base without the terms that are fitted, with the switch parameters.
+#[must_use]
+pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> Document {
+    let mut document = base.clone();
+    let reversal = document.mode_reversal.take().unwrap_or_default();
+    let (transition_ticks, transition_s) = (Some(transition_ticks), None);
+    document.mode_reversal = Some(ModeReversal { transition_ticks, transition_s, ..reversal });
+    for (sensor, servo) in document.gyro.sensor.iter_mut().zip(servos) {
+        sensor.terms.retain(|feature| !FITTED.contains(&feature));
+        if servo.is_some() {
+            sensor.servo.clone_from(servo);
+        }
+    }
+    document
+}
+
+/// The bare document with the servos as they were fitted: what the residuals "before" are taken with, so that switching
+/// costs the same before and after.
+#[must_use]
+pub fn stripped(
+    without_terms: &Document,
+    servos: &[Result<ServoFit, String>],
+    base: &Document,
+    reference_deg_c: f64,
+) -> Document {
+    let mut document = without_terms.clone();
+    for ((sensor, found), old) in document.gyro.sensor.iter_mut().zip(servos).zip(&base.gyro.sensor) {
+        sensor.servo = match found {
+            Ok(found) => Some(servo(found, old, reference_deg_c)),
+            Err(_) => old.servo.clone(),
+        };
+    }
+    document
+}
+
+fn servo(found: &ServoFit, old: &GyroSensor, reference: f64) -> Servo {
+    let coefficients = found.rest.coefficients.iter().map(|[value, _]| tidy(*value)).collect();
+    let range = widened(found.rest.range_deg_c);
+    Servo {
+        form: old.servo.as_ref().map_or(ServoKind::Modelled, |servo| servo.form),
+        time_constant_s: tidy(found.transient.time_constant_s),
+        rest_frequency: Curve::new(Shape::Polynomial { reference, coefficients, range }).in_unit(Unit::HZ),
+        settle_time_constants: old.servo.as_ref().map_or(SETTLED, |servo| servo.settle_time_constants),
+    }
+}
+
+/// The document with everything that was found. `constants` are those of static biases that are not to be touched.
+#[must_use]
+pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Document {
+    let mut document = stripped.clone();
+    for ((sensor, found), constant) in document.gyro.sensor.iter_mut().zip(&made.gyros).zip(constants) {
+        let Ok(found) = found else { continue };
+        let reference = made.reference_deg_c;
+        sensor.set(Feature::One, curve(found, Term::Static, reference, *constant));
+        sensor.set(Feature::LasingMode, curve(found, Term::Magnetic, reference, None));
+        sensor.set(Feature::Meander, curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None));
+    }
+    document
+}
+
+/// Gyros without a fit keep what the base has.
+pub fn keep_old(document: &mut Document, base: &Document, gyros: &[Result<GyroFit, String>]) {
+    for ((sensor, old), found) in document.gyro.sensor.iter_mut().zip(&base.gyro.sensor).zip(gyros) {
+        if found.is_err() {
+            for feature in FITTED {
+                sensor.set(feature, old.terms.curve(feature).cloned());
+            }
+        }
+    }
+}
+
+/// A term as a curve, its constant as it was found or as it is given.
+fn curve(found: &GyroFit, term: Term, reference: f64, constant: Option<f64>) -> Option<Curve> {
+    let mut coefficients: Vec<f64> = found.of(term).into_iter().map(tidy).collect();
+    let range = widened(found.range_deg_c);
+    if let (Some(first), Some(constant)) = (coefficients.first_mut(), constant) {
+        *first = tidy(constant);
+    }
+    (!coefficients.is_empty()).then(|| Curve::new(Shape::Polynomial { reference, coefficients, range }))
+}
+
+/// A range in tenths of a degree, with some width.
+pub(crate) fn widened([low, high]: [f64; 2]) -> [f64; 2] {
+    let [low, high] = [libm::floor(low * PER_DEG_C) / PER_DEG_C, libm::ceil(high * PER_DEG_C) / PER_DEG_C];
+    // A range must have a width.
+    if high > low { [low, high] } else { [low - 1.0 / PER_DEG_C, high + 1.0 / PER_DEG_C] }
+}
+
+/// `T_ref` of the base's own biases, else 20 °C.
+#[must_use]
+pub fn reference_of(base: &Document) -> f64 {
+    let of = |sensor: &GyroSensor| {
+        let curves = [Feature::One, Feature::LasingMode].map(|feature| sensor.terms.curve(feature));
+        curves.into_iter().flatten().find_map(|curve| match curve.shape() {
+            Shape::Polynomial { reference, .. } => Some(*reference),
+            _ => None,
+        })
+    };
+    base.gyro.sensor.iter().find_map(of).unwrap_or(REFERENCE_DEG_C)
+}
+
+/// The base's static bias of a gyro at `T_ref` (°/h); zero where it has none.
+#[must_use]
+pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f64 {
+    let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.terms.curve(Feature::One));
+    curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
+}
+
+/// That magnetic biases are those of the base with the other sign, in words.
+pub(super) fn inverted(
+    base: &Document,
+    gyros: &[Result<GyroFit, String>],
+    reference_deg_c: f64,
+) -> Option<String> {
+    /// Share of the old bias that may be left of the sum of both, and standard errors that it must be large.
+    const ALIKE: f64 = 0.2;
+    const SEEN: f64 = 10.0;
+    let is_inverted = |(old, found): &(&GyroSensor, &Result<GyroFit, String>)| {
+        let old = old.terms.curve(Feature::LasingMode).and_then(|curve| curve.shape().at(reference_deg_c));
+        let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Term::Magnetic, 0));
+        old.zip(now).is_some_and(|(old, [now, sigma])| {
+            (now + old).abs() < ALIKE * old.abs() && old.abs() > SEEN * sigma
+        })
+    };
+    let sensors = base.gyro.sensor.iter().zip(gyros).filter(is_inverted);
+    let names: Vec<&str> = sensors.map(|(sensor, _)| sensor.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: the magnetic bias is that of the document with the other sign: is the log's mode column (+1 is \
+             plus), or the sign of the gyro's column, the other way round? The document is valid only for modes \
+             with the sign of this log",
+            gyros_in_words(&names)
+        )
+    })
+}
+
+/// What one count of a gyro stands for (″); zero where the output is no count.
+#[must_use]
+pub fn count_arcsec(document: &Document, sensor: usize) -> f64 {
+    let sensor = document.gyro.sensor.get(sensor);
+    sensor.and_then(|sensor| sensor.increment_weight_arcsec_per_count).map_or(0.0, f64::abs)
+}
+
+/// Input axis of a gyro at a temperature; at its reference where that is no number.
+#[must_use]
+pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
+    let orientation = &document.gyro.orientation;
+    let mut row = orientation.rows.get(sensor).copied().unwrap_or_default();
+    let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+    row = row.map(|x| x / norm);
+    if let Some(thermal) = orientation.thermal.as_ref().filter(|_| deg_c.is_finite()) {
+        let slopes = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
+        let away = deg_c - thermal.reference_deg_c;
+        for (element, slope) in row.iter_mut().zip(slopes) {
+            *element += Angle::from_arcsec(slope).as_rad() * away;
+        }
+    }
+    row
+}
+
+/// Standard errors of the terms.
+#[must_use]
+pub fn sigmas(made: &Made) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
+        for term in [Term::Static, Term::Magnetic, Term::Meander] {
+            let own = found.iter().flat_map(|fit| &fit.coefficients).filter(|one| one.term == term);
+            // Of a constant that was not fitted nothing is known.
+            let is_kept = |power: usize| made.keeps_constants && term == Term::Static && power == 0;
+            let of_term: Vec<f64> =
+                own.map(|one| if is_kept(one.power) { 0.0 } else { tidy(one.sigma) }).collect();
+            if !of_term.is_empty() {
+                sigmas.put("gyro", &sensor.name, term.key(), of_term);
+            }
+        }
+    }
+    sigmas
+}
+
+/// What goes into `origin.details`: standard errors, covariance, noise, switch parameters.
+#[must_use]
+pub fn details(made: &Made) -> Table {
+    let mut table = Table::new();
+    table.insert("transition_ticks".into(), Value::Integer(made.transition_ticks.into()));
+    table.insert("reversal_period_s".into(), tidy(made.switches.period_s()).into());
+    table.insert("window_s".into(), tidy(made.window_s).into());
+    let gyros = made.gyros.iter().zip(&made.servos).zip(&made.before.document.gyro.sensor);
+    let gyros = gyros.map(|((fit, servo), sensor)| Value::Table(of_gyro(&sensor.name, fit, servo)));
+    table.insert("gyro".into(), Value::Array(gyros.collect()));
+    table
+}
+
+fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, String>) -> Table {
+    let numbers =
+        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
+    let mut table = Table::new();
+    table.insert("name".into(), name.into());
+    match fit {
+        Err(reason) => {
+            table.insert("refused".into(), reason.as_str().into());
+        }
+        Ok(fit) => {
+            let names = fit.coefficients.iter().map(|one| format!("{}.{}", one.term.key(), one.power).into());
+            table.insert("coefficient".into(), Value::Array(names.collect()));
+            table
+                .insert("sigma_deg_per_h".into(), numbers(&mut fit.coefficients.iter().map(|one| one.sigma)));
+            let rows = fit.covariance.row_iter().map(|row| numbers(&mut row.iter().copied()));
+            table.insert("covariance".into(), Value::Array(rows.collect()));
+            table.insert(
+                "angle_random_walk_deg_per_sqrt_h".into(),
+                tidy(fit.noise.white.sqrt() / 60.0).into(),
+            );
+            if let Some([variance, time_s]) = fit.noise.markov {
+                table.insert("markov_sigma_deg_per_h".into(), tidy(variance.sqrt()).into());
+                table.insert("markov_correlation_time_h".into(), tidy(time_s / 3600.0).into());
+            }
+            table.insert("means".into(), Value::Integer(i64::try_from(fit.cells).unwrap_or(i64::MAX)));
+        }
+    }
+    match servo {
+        Err(reason) => {
+            table.insert("servo_refused".into(), reason.as_str().into());
+        }
+        Ok(servo) => {
+            let mut own = Table::new();
+            own.insert("time_constant_sigma_s".into(), tidy(servo.transient.sigma_s).into());
+            own.insert("frequency_loss_rms_hz".into(), tidy(servo.transient.loss_hz).into());
+            let sigmas = &mut servo.rest.coefficients.iter().map(|pair| pair[1]);
+            own.insert("rest_frequency_sigma_hz".into(), numbers(sigmas));
+            if let Some(delay_s) = servo.rest.delay_s {
+                own.insert("temperature_delay_s".into(), tidy(delay_s).into());
+            }
+            table.insert("servo".into(), Value::Table(own));
+        }
+    }
+    table
+}

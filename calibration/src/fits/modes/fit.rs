@@ -1,0 +1,255 @@
+//! The whole procedure: look at the switches, gather, fit, write, judge.
+
+use isotherm_correction::earth::Place;
+use isotherm_protocol::document::{Document, Sample};
+
+use super::cells::{Cut, gather};
+use super::checks;
+use super::dither;
+use super::document::{self, base_constant, reference_of};
+use super::judge::judged;
+use super::model::{Asked, Given, GyroFit, fit};
+use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, transition_ticks, window_s};
+use super::servo::{self, Transient};
+use super::switches::Switches;
+use super::{temperatures, units};
+use crate::axes::{main_axis, output_name};
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::report::{Curve as Residual, FitReport};
+use crate::robust::median;
+use crate::runs::{Run, Watch};
+
+/// About so many cells are made of a fit's runs, none shorter than [`SHORTEST_S`].
+const CELLS: f64 = 400.0;
+const SHORTEST_S: f64 = 15.0;
+/// Time behind a switch that is left out where the servo is not known (s).
+const SETTLE_S: f64 = 0.5;
+
+/// What the fit starts from.
+#[derive(Debug, Clone)]
+pub struct Wanted<'a> {
+    /// Runs that the constants are fitted to.
+    pub runs: &'a [Run],
+    /// Runs that they are judged on.
+    pub judge: &'a [Run],
+    /// Document that gives scale, axes, channels and filter.
+    pub base: &'a Document,
+    /// Where the unit stands; `None` where that is not known: then the static constant stays as it is.
+    pub place: Option<Place>,
+    /// Orders.
+    pub asked: Asked,
+    /// Ticks that a switch loses, where that is known.
+    pub transition_ticks: Option<u8>,
+    /// Time behind a switch that is left out (s), where the servo's own is not to be taken.
+    pub settle_s: Option<f64>,
+    /// `T_ref` (°C), where the document's own is not to be taken.
+    pub reference_deg_c: Option<f64>,
+}
+
+/// Servo of one gyro.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoFit {
+    /// Behind the switches.
+    pub transient: Transient,
+    /// f0 over temperature.
+    pub rest: dither::Rest,
+}
+
+/// What came of it.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// The document.
+    pub written: Written,
+    /// What "before" means: the same without the fitted terms.
+    pub before: Written,
+    /// What was found of each gyro; why not, where nothing was.
+    pub gyros: Vec<Result<GyroFit, String>>,
+    /// Servo of each gyro; why none.
+    pub servos: Vec<Result<ServoFit, String>>,
+    /// The switches.
+    pub switches: Switches,
+    /// Ticks that a switch loses, as the document states them.
+    pub transition_ticks: u8,
+    /// `T_ref` (°C).
+    pub reference_deg_c: f64,
+    /// Window of the residuals: whole reversal periods (s).
+    pub window_s: f64,
+    /// Whether the static biases keep the constants of the base, the attitude not being known.
+    pub keeps_constants: bool,
+    /// Residuals of the runs.
+    pub residuals: Vec<Residual>,
+    /// What is to be said.
+    pub warnings: Vec<String>,
+}
+
+/// Makes the constants of a mode-reversed unit.
+///
+/// # Errors
+/// [`Error::Refused`] with every reason why the log does not allow it; [`Error::Log`], [`Error::Document`].
+pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
+    let switches = Switches::of(wanted.runs, &mut watch)?;
+    let reasons = checks::before(&switches, wanted.base, wanted.transition_ticks);
+    if !reasons.is_empty() {
+        return Err(Error::Refused(reasons));
+    }
+    let mut warnings = Vec::new();
+    let transition_ticks = transition_ticks(wanted, &switches, &mut warnings);
+    let transients: Vec<Result<Transient, String>> = (0..switches.sensors)
+        .map(|sensor| servo::fit(&switches.behind, sensor, usize::from(transition_ticks)))
+        .collect();
+    let provisional = transients.iter().map(|found| found.as_ref().ok().map(provisional)).collect::<Vec<_>>();
+    let bare = document::bare(wanted.base, transition_ticks, &provisional);
+    let known = bare.gyro.sensor.iter().all(|sensor| sensor.servo.is_some());
+    let reference_deg_c = wanted.reference_deg_c.unwrap_or_else(|| reference_of(wanted.base));
+    #[expect(clippy::cast_precision_loss, reason = "ticks of a log are far below 2⁵³")]
+    let length_s = switches.ticks as f64 * switches.tick_s;
+    // A switch loses its ticks, and the transient is over one tick later at the least.
+    let settle_s = SETTLE_S.max((f64::from(transition_ticks) + 1.5) * switches.tick_s);
+    let cut = Cut {
+        cell_s: (length_s / CELLS).max(SHORTEST_S),
+        settle_s: wanted.settle_s.unwrap_or(if known { 0.0 } else { settle_s }),
+        reference_deg_c,
+    };
+    let mut gyros: Vec<Option<Result<GyroFit, String>>> = vec![None; switches.sensors];
+    let mut servos: Vec<Option<Result<ServoFit, String>>> = vec![None; switches.sensors];
+    let mut earth_case = None;
+    for group in groups(switches.sensors) {
+        let gathered = gather(wanted.runs, &bare, group, cut, &mut watch)?;
+        let earth = earth_rate(wanted, &gathered)?;
+        earth_case = earth;
+        let doubts = check(wanted, &gathered, (&bare, group), earth, &mut watch)?;
+        // Gaps, gravity and temperatures are the same for every group of gyros.
+        if group[0] == 0 {
+            gaps(&gathered, &mut warnings);
+            warnings.extend(doubts);
+            warnings.extend(temperatures::freezing(wanted.runs, &bare, &mut watch)?);
+            let deg_c: Vec<f64> =
+                gathered.cells.iter().map(|cell| cell.powers[0][0] + reference_deg_c).collect();
+            warnings.extend(units::other_dither(&switches, wanted.base, median(&deg_c)));
+        }
+        for (place, sensor) in group.into_iter().enumerate() {
+            let along: Vec<f64> =
+                gathered.cells.iter().map(|cell| earth_of(&bare, sensor, cell, earth)).collect();
+            let given = Given {
+                cells: &gathered.cells,
+                place,
+                earth: &along,
+                count_arcsec: if switches.whole { document::count_arcsec(&bare, sensor) } else { 0.0 },
+                reference_deg_c,
+                has_meander: switches.has_meander(),
+            };
+            gyros[sensor] = Some(fit(given, wanted.asked));
+            servos[sensor] = Some(transients[sensor].clone().and_then(|transient| {
+                let rest = dither::found(&gathered.cells, place, reference_deg_c)?;
+                Ok(ServoFit { transient, rest })
+            }));
+        }
+    }
+    let gyros: Vec<Result<GyroFit, String>> = gyros.into_iter().flatten().collect();
+    let servos: Vec<Result<ServoFit, String>> = servos.into_iter().flatten().collect();
+    if gyros.iter().all(Result::is_err) {
+        let name = |sensor: usize| &wanted.base.gyro.sensor[sensor].name;
+        let reasons = gyros
+            .iter()
+            .enumerate()
+            .filter_map(|(sensor, fit)| Some(format!("gyro {}: {}", name(sensor), fit.as_ref().err()?)));
+        return Err(Error::Refused(reasons.collect()));
+    }
+    warnings.extend(document::inverted(wanted.base, &gyros, reference_deg_c));
+    if wanted.place.is_none() {
+        warnings.push(
+            "the Earth's rate is unknown: the static bias keeps its constant, only its shape is fitted. Give \
+             --latitude and --heading to fit it"
+                .to_owned(),
+        );
+    }
+    if !switches.has_meander() {
+        warnings.push(
+            "the log does not state the phase of the slow meander: its effect is in the static bias, and no term is \
+             written"
+                .to_owned(),
+        );
+    }
+    let constants: Vec<Option<f64>> = (0..switches.sensors)
+        .map(|sensor| wanted.place.is_none().then(|| base_constant(wanted.base, sensor, reference_deg_c)))
+        .collect();
+    let window_s = window_s(&switches, length_s);
+    let mut made = Made {
+        before: Written::of(&document::stripped(&bare, &servos, wanted.base, reference_deg_c))?,
+        written: Written::of(&bare)?,
+        gyros,
+        servos,
+        switches,
+        transition_ticks,
+        reference_deg_c,
+        window_s,
+        keeps_constants: wanted.place.is_none(),
+        residuals: Vec::new(),
+        warnings,
+    };
+    made.settle(wanted, &constants, earth_case, &mut watch)?;
+    Ok(made)
+}
+
+impl Made {
+    /// Writes and judges; gyros whose terms make an axis worse keep the old ones, and all is judged once more.
+    fn settle<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        constants: &[Option<f64>],
+        earth: Option<[f64; 3]>,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        let document = document::fitted(&self.before.document, self, constants);
+        self.written = Written::of(&document)?;
+        self.residuals = self.judged(wanted, earth, watch)?;
+        let verdicts = Residual::verdicts(&self.residuals);
+        if verdicts.is_empty() {
+            return Err(Error::Refused(vec![format!(
+                "no window of {:.0} s, of whole reversal periods, is without lost ticks: the fit cannot be judged. \
+                 Record without gaps; isotherm-replay info shows them",
+                self.window_s
+            )]));
+        }
+        let worse: Vec<String> =
+            verdicts.iter().filter(|one| !one.accepted).map(|one| one.of.clone()).collect();
+        if worse.is_empty() {
+            return Ok(());
+        }
+        for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
+            let axis = output_name(true, main_axis(row));
+            if worse.contains(&axis) {
+                self.gyros[sensor] = Err(format!("its terms make {axis} worse: it keeps the old ones"));
+            }
+        }
+        let mut document = document::fitted(&self.before.document, self, constants);
+        document::keep_old(&mut document, wanted.base, &self.gyros);
+        self.written = Written::of(&document)?;
+        self.residuals = self.judged(wanted, earth, watch)?;
+        Ok(())
+    }
+
+    fn judged<W: Watch>(
+        &self,
+        wanted: &Wanted<'_>,
+        earth: Option<[f64; 3]>,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<Vec<Residual>, Error> {
+        let earth = earth.map(|rate| rate.map(super::model::deg_per_h));
+        let runs = wanted.runs.iter().map(|run| (run, Sample::In));
+        let runs = runs.chain(wanted.judge.iter().map(|run| (run, Sample::Out)));
+        let mut residuals = Vec::new();
+        for (run, sample) in runs {
+            let pair = [&self.before, &self.written];
+            residuals.extend(judged(run, sample, pair, earth, self.window_s, &mut *watch)?);
+        }
+        Ok(residuals)
+    }
+
+    /// The report.
+    #[must_use]
+    pub fn report(&self) -> FitReport {
+        super::report::report(self)
+    }
+}

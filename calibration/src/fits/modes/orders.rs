@@ -1,0 +1,187 @@
+//! Orders of the polynomials by cross-validation: what was fitted to cooling is judged on heating, and the other way round.
+
+use super::cells::MAX_POWER;
+use super::model::{Asked, MEANDER_ORDER, Term};
+use crate::lsq::blocks::Blocks;
+use crate::lsq::correlated::{Data, Noise};
+use crate::lsq::linear::{SINGULAR, Weak};
+
+/// Share of the range that cooling and heating must each cover to be folds.
+const COVERED: f64 = 0.7;
+/// Change of temperature over a stretch that is more than none (°C).
+const MOVED_DEG_C: f64 = 0.1;
+/// Folds where the directions are none.
+const FOLDS: usize = 5;
+/// χ² by which a larger model must be better than a smaller one: two standard deviations of one coefficient.
+const BETTER: f64 = 4.0;
+
+/// Orders of the three terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Model {
+    /// Of the static bias.
+    pub static_order: usize,
+    /// Of the magnetic bias.
+    pub magnetic_order: usize,
+    /// Of the slow meander; `None` without the term.
+    pub meander_order: Option<usize>,
+}
+
+impl Model {
+    /// Its columns among all.
+    #[must_use]
+    pub fn columns(&self) -> Vec<usize> {
+        let magnetic = MAX_POWER + 1;
+        let meander = 2 * magnetic;
+        let mut columns: Vec<usize> = (0..=self.static_order).collect();
+        columns.extend((0..=self.magnetic_order).map(|power| magnetic + power));
+        columns.extend(
+            self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| meander + power)),
+        );
+        columns
+    }
+
+    /// Term and power of each column.
+    #[must_use]
+    pub fn terms(&self) -> Vec<(Term, usize)> {
+        let mut terms: Vec<(Term, usize)> =
+            (0..=self.static_order).map(|power| (Term::Static, power)).collect();
+        terms.extend((0..=self.magnetic_order).map(|power| (Term::Magnetic, power)));
+        let meander =
+            self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| (Term::Meander, power)));
+        terms.extend(meander);
+        terms
+    }
+}
+
+/// What the cross-validation says of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// The model.
+    pub model: Model,
+    /// Squared prediction errors, in the variances of the noise.
+    pub chi_square: f64,
+    /// Means that were predicted.
+    pub count: usize,
+}
+
+/// Parts of the run that are predicted from the others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Folds {
+    /// Number of the fold of each mean.
+    pub of: Vec<usize>,
+    /// Whether they are cooling and heating.
+    pub directions: bool,
+}
+
+impl Folds {
+    /// Cooling and heating, where both cover the range; else pairs of stretches, every fifth in one fold.
+    #[must_use]
+    pub fn of(temperature: &[f64], time_s: &[f64], stretch: &[usize]) -> Self {
+        let pairs =
+            || Self { of: stretch.iter().map(|number| number / 2 % FOLDS).collect(), directions: false };
+        let mut direction = 0;
+        let mut of = Vec::with_capacity(temperature.len());
+        for row in 0..temperature.len() {
+            // Over two stretches: one behind, one ahead.
+            let near = |other: &usize| stretch[*other].abs_diff(stretch[row]) <= 1;
+            let first = (0..=row).rev().take_while(near).last().unwrap_or(row);
+            let last = (row..temperature.len()).take_while(near).last().unwrap_or(row);
+            let change = temperature[last] - temperature[first];
+            if change.abs() > MOVED_DEG_C && time_s[last] - time_s[first] < 1e8 {
+                direction = usize::from(change > 0.0);
+            }
+            of.push(direction);
+        }
+        let span = |wanted: Option<usize>| {
+            let mine =
+                temperature.iter().zip(&of).filter(|(_, of)| wanted.is_none_or(|wanted| wanted == **of));
+            let (low, high) = mine
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (t, _)| (low.min(*t), high.max(*t)));
+            (high - low).max(0.0)
+        };
+        let whole = span(None);
+        if whole > 2.0 && [0, 1].into_iter().all(|direction| span(Some(direction)) > COVERED * whole) {
+            Self { of, directions: true }
+        } else {
+            pairs()
+        }
+    }
+}
+
+/// Chooses the orders that were not given.
+///
+/// # Errors
+/// Where none of the models can be fitted.
+pub fn choose(
+    data: &Data,
+    noise: Noise,
+    full: Model,
+    asked: Asked,
+    folds: &Folds,
+    remarks: &mut Vec<String>,
+) -> Result<(Model, Vec<Score>), String> {
+    let limited = |name: &str, asked: Option<usize>, largest: usize, remarks: &mut Vec<String>| match asked {
+        Some(order) if order > largest => {
+            remarks.push(format!("{name} order {order} was requested, {largest} is the most for this run"));
+            vec![largest]
+        }
+        Some(order) => vec![order],
+        None => (0..=largest).collect(),
+    };
+    let of_static = limited("static", asked.static_order, full.static_order, remarks);
+    let of_magnetic = limited("magnetic", asked.magnetic_order, full.magnetic_order, remarks);
+    let of_meander: Vec<Option<usize>> = match (full.meander_order, asked.meander_order) {
+        (None, Some(_)) => {
+            remarks.push(
+                "the log does not state the phase of the slow meander: its term cannot be separated from the static \
+                 bias".to_owned(),
+            );
+            vec![None]
+        }
+        (None, None) => vec![None],
+        (Some(largest), Some(order)) => vec![Some(order.min(largest).min(MEANDER_ORDER))],
+        (Some(largest), None) => std::iter::once(None).chain((0..=largest).map(Some)).collect(),
+    };
+    let models = || {
+        of_static.iter().flat_map(|&static_order| {
+            let of_meander = &of_meander;
+            of_magnetic.iter().flat_map(move |&magnetic_order| {
+                of_meander.iter().map(move |&meander_order| Model {
+                    static_order,
+                    magnetic_order,
+                    meander_order,
+                })
+            })
+        })
+    };
+    if let (Some(only), None) = (models().next(), models().nth(1)) {
+        return Ok((only, Vec::new()));
+    }
+    let white = data.whitened(noise);
+    let blocks = Blocks::of(&white.columns, &white.value, &folds.of);
+    let mut scores: Vec<Score> = models()
+        .filter_map(|model| {
+            Some(Score { model, chi_square: score(&blocks, &model.columns())?, count: data.len() })
+        })
+        .collect();
+    scores.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
+    let best =
+        scores.first().ok_or("no order of its terms can be cross-validated: take a longer run")?.chi_square;
+    let near = scores.iter().filter(|score| score.chi_square <= best + BETTER);
+    let chosen = near
+        .min_by(|a, b| {
+            let width = |score: &Score| score.model.columns().len();
+            width(a).cmp(&width(b)).then(a.chi_square.total_cmp(&b.chi_square))
+        })
+        .map(|score| score.model);
+    Ok((chosen.unwrap_or(full), scores))
+}
+
+/// Squared errors with which each fold is predicted from the others.
+fn score(blocks: &Blocks, columns: &[usize]) -> Option<f64> {
+    let of = |fold: usize| {
+        let found = blocks.without(fold, columns, Weak::Refuse(SINGULAR))?;
+        Some(blocks.left_in(fold, columns, &found.coefficients))
+    };
+    (0..blocks.len()).filter(|fold| blocks.rows(*fold) > 0).map(of).sum()
+}

@@ -1,0 +1,111 @@
+//! What the procedure needs before it fits: windows, lost ticks, the Earth, a look at what was gathered.
+
+use isotherm_correction::units::Span;
+use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape, Unit};
+
+use super::cells::{Cell, Gathered};
+use super::fit::Wanted;
+use super::servo::Transient;
+use super::switches::Switches;
+use super::{checks, document, temperatures};
+use crate::error::Error;
+use crate::runs::Watch;
+use crate::runs::swapped::up;
+
+/// Length of a window of the residuals, in whole reversal periods (s).
+const WINDOW_S: f64 = 600.0;
+
+/// Whole reversal periods, ten minutes or a twelfth of the runs: what a switch costs in whole counts shall not hide the drift.
+pub(super) fn window_s(switches: &Switches, length_s: f64) -> f64 {
+    let pair_s = 2.0 * switches.period_s();
+    let wanted_s = WINDOW_S.min(length_s / 12.0);
+    pair_s * libm::ceil(wanted_s / pair_s).max(1.0)
+}
+
+/// Three gyros at a time; the last three where the number is no multiple.
+pub(super) fn groups(sensors: usize) -> Vec<[usize; 3]> {
+    let starts = (0..sensors / 3).map(|group| 3 * group);
+    let last = (!sensors.is_multiple_of(3)).then(|| sensors.saturating_sub(3));
+    starts.chain(last).map(|start| [start, start + 1, start + 2]).collect()
+}
+
+pub(super) fn transition_ticks(wanted: &Wanted<'_>, switches: &Switches, warnings: &mut Vec<String>) -> u8 {
+    let tick = Span::from_s(switches.tick_s);
+    let stated = wanted.base.mode_reversal.as_ref().map(|reversal| reversal.ticks(tick));
+    if let Some(given) = wanted.transition_ticks {
+        return given;
+    }
+    let seen = u8::try_from(switches.transition_ticks()).unwrap_or(u8::MAX);
+    if seen == 0 {
+        warnings.push(format!(
+            "no reading after a switch looks lost: {} transition ticks are assumed; if you know them, state \
+             --transition-ticks",
+            stated.unwrap_or(1)
+        ));
+    }
+    seen.max(stated.unwrap_or(1))
+}
+
+/// A servo that marks the transient's ticks while they are left out: its frequency does not matter yet.
+pub(super) fn provisional(transient: &Transient) -> Servo {
+    Servo {
+        form: ServoKind::Modelled,
+        time_constant_s: transient.time_constant_s,
+        rest_frequency: Curve::new(Shape::Constant { value: transient.rest_hz }).in_unit(Unit::HZ),
+        settle_time_constants: document::SETTLED,
+    }
+}
+
+/// Earth rate in case axes (rad/s); `None` where the place is not known.
+pub(super) fn earth_rate(wanted: &Wanted<'_>, gathered: &Gathered) -> Result<Option<[f64; 3]>, Error> {
+    let Some(place) = &wanted.place else { return Ok(None) };
+    let rate = place.earth_rate_in_case(gathered.force).ok_or_else(|| {
+        let force = gathered.force.map_or_else(
+            || "the document or the log has no accelerometers".to_owned(),
+            |[x, y, z]| format!("the mean force is ({x:.3}, {y:.3}, {z:.3}) m/s²"),
+        );
+        Error::Refused(vec![format!(
+            "the unit cannot be levelled: {force}; it must be within 2 % of one g, x not vertical. Give --pitch and --roll"
+        )])
+    })?;
+    Ok(Some(rate))
+}
+
+/// Earth rate along the input axis of a gyro in a cell (°/h).
+pub(super) fn earth_of(document: &Document, sensor: usize, cell: &Cell, earth: Option<[f64; 3]>) -> f64 {
+    earth.map_or(0.0, |earth| checks::earth_along(document::row(document, sensor, cell.axes_deg_c), earth))
+}
+
+/// Looks at what was gathered of three gyros: warnings.
+///
+/// # Errors
+/// Every reason why nothing can be made of it.
+pub(super) fn check<W: Watch>(
+    wanted: &Wanted<'_>,
+    gathered: &Gathered,
+    (bare, group): (&Document, [usize; 3]),
+    earth: Option<[f64; 3]>,
+    watch: &mut impl FnMut() -> W,
+) -> Result<Vec<String>, Error> {
+    let names = group.map(|sensor| bare.gyro.sensor[sensor].name.as_str());
+    let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
+    let along = earth
+        .map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));
+    let mut reasons = checks::behind(gathered, names, counts, along);
+    if !reasons.is_empty() {
+        if checks::lacks_temperatures(gathered) {
+            reasons.push(temperatures::read(wanted.runs, bare, watch)?);
+        }
+        return Err(Error::Refused(reasons));
+    }
+    Ok(checks::attitude(&gathered.seconds, along, wanted.place.as_ref().and_then(up)))
+}
+
+pub(super) fn gaps(gathered: &Gathered, warnings: &mut Vec<String>) {
+    let [there, missing] = gathered.ticks;
+    if missing > 0 {
+        let are = if missing == 1 { "tick is" } else { "ticks are" };
+        warnings.push(format!("{missing} {are} missing among {there}: means end there"));
+    }
+    warnings.extend(gathered.troubles.iter().cloned());
+}

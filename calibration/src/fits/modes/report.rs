@@ -1,0 +1,160 @@
+//! The report of the modes.
+
+use isotherm_pages::Table;
+
+use super::fit::{Made, ServoFit};
+use super::model::{GyroFit, Term};
+use crate::axes::{main_axis, output_name};
+use crate::report::figures::{counted, fixed, per_deg_c, short};
+use crate::report::words::together;
+use crate::report::{Coefficient, Curve, Figure, FitReport};
+
+/// Models of the cross-validation that the report lists for each gyro.
+const MODELS: usize = 5;
+
+/// The report.
+pub(super) fn report(made: &Made) -> FitReport {
+    let unit = made.written.document.unit.clone();
+    let mut report =
+        FitReport::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
+    let verdicts = Curve::verdicts(&made.residuals).into_iter();
+    report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
+    report.residuals.clone_from(&made.residuals);
+    report.warnings.clone_from(&made.warnings);
+    notes(made, &mut report);
+    let mut validation = Vec::new();
+    let mut told: Vec<(&str, String)> = Vec::new();
+    for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
+        match made.gyros.get(index) {
+            Some(Ok(fit)) => {
+                gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
+                if fit.left_out > 0 {
+                    let are = counted(fit.left_out, "mean is", "means are");
+                    told.push((&sensor.name, format!("{are} far off and left out")));
+                }
+                told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
+            }
+            Some(Err(reason)) => refuse(made, index, reason, &mut report),
+            None => {}
+        }
+        match made.servos.get(index) {
+            Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
+            Some(Err(reason)) => {
+                let old =
+                    if sensor.servo.is_some() { "the document's servo stays" } else { "no servo is written" };
+                told.push((&sensor.name, format!("{reason}; {old}")));
+            }
+            None => {}
+        }
+    }
+    report.warnings.extend(together(&told));
+    if !validation.is_empty() {
+        let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
+        report.validation = Some(Table { head: head.map(str::to_owned).to_vec(), rows: validation });
+    }
+    report
+}
+
+fn notes(made: &Made, report: &mut FitReport) {
+    let switches = &made.switches;
+    report.notes.push(format!(
+        "{} ticks of {} s, {} mode switches, every {} s; a switch loses {} {}.",
+        switches.ticks,
+        short(switches.tick_s),
+        switches.between_s.len() + 1,
+        short(switches.period_s()),
+        made.transition_ticks,
+        if made.transition_ticks == 1 { "tick" } else { "ticks" },
+    ));
+    report.notes.push(format!(
+        "Drift is the mean rate in running mode over {} s, whole reversal periods, less the Earth's. Before: without static, \
+         magnetic and slow-meander term, with the same bridging of the switches.",
+        short(made.window_s)
+    ));
+    report.notes.push(format!(
+        "Powers of temperature are taken about {} °C, those of the slow meander about 25 °C. Standard errors include \
+         white noise, whole counts and a first-order Markov drift if the means show one, at their upper limits.",
+        short(made.reference_deg_c)
+    ));
+}
+
+fn gyro(
+    name: &str,
+    fit: &GyroFit,
+    (keeps_constants, report): (bool, &mut FitReport),
+    validation: &mut Vec<Vec<String>>,
+) {
+    for one in &fit.coefficients {
+        let unit = per_deg_c("°/h", one.power);
+        let kept = keeps_constants && one.term == Term::Static && one.power == 0;
+        let what = if kept { ", with the Earth's rate: not written" } else { "" };
+        let name = format!("gyro {name} {}, power {}{what}", one.term.key().replace('_', " "), one.power);
+        report.coefficients.push(Coefficient::new(name, unit, one.value, Some(one.sigma)));
+    }
+    let markov = fit.noise.markov.map_or_else(String::new, |[variance, time_s]| {
+        format!(", drift of {} °/h over {} s", short(variance.sqrt()), short(time_s))
+    });
+    report.notes.push(format!(
+        "gyro {name}: {} over {}…{} °C, N {} °/√h{markov}, χ² {:.2} per degree of freedom.",
+        counted(fit.cells, "mean", "means"),
+        fixed(fit.range_deg_c[0], 1),
+        fixed(fit.range_deg_c[1], 1),
+        short(fit.noise.white.sqrt() / 60.0),
+        fit.chi_square
+    ));
+    let chosen = fit.scores.iter().find(|score| score.model == fit.model);
+    let first = fit.scores.iter().take(MODELS).filter(|score| score.model != fit.model);
+    for score in chosen.into_iter().chain(first) {
+        #[expect(clippy::cast_precision_loss, reason = "means of a log are far below 2⁵³")]
+        let each = score.chi_square / score.count.max(1) as f64;
+        validation.push(vec![
+            name.to_owned(),
+            score.model.static_order.to_string(),
+            score.model.magnetic_order.to_string(),
+            score.model.meander_order.map_or_else(|| "–".to_owned(), |order| order.to_string()),
+            format!("{each:.4}"),
+            if score.model == fit.model { "taken" } else { "" }.to_owned(),
+        ]);
+    }
+}
+
+fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
+    let own = &servo.transient;
+    report.coefficients.push(Coefficient::new(
+        format!("gyro {name} servo time constant"),
+        "s",
+        own.time_constant_s,
+        Some(own.sigma_s),
+    ));
+    for (power, [value, sigma]) in servo.rest.coefficients.iter().enumerate() {
+        let unit = per_deg_c("Hz", power);
+        let name = format!("gyro {name} dither rest frequency, power {power}");
+        report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
+    }
+    let delay = servo.rest.delay_s.map_or_else(String::new, |delay_s| {
+        format!("; the filtered temperature lags the dither's by {} s", short(delay_s))
+    });
+    report.notes.push(format!(
+        "gyro {name}: after {} switches the dither is low by {} Hz rms in the first tick{delay}.",
+        own.switches,
+        short(own.loss_hz)
+    ));
+}
+
+/// A gyro that keeps its old terms.
+fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut FitReport) {
+    let row = made.written.document.gyro.orientation.rows.get(sensor).copied().unwrap_or_default();
+    let axis = output_name(true, main_axis(&row));
+    for verdict in report.verdicts.iter_mut().filter(|verdict| verdict.of == axis) {
+        *verdict = verdict.clone().refused(reason);
+    }
+}
+
+impl GyroFit {
+    /// Value and standard error of a coefficient.
+    #[must_use]
+    pub fn coefficient(&self, term: Term, power: usize) -> Option<[f64; 2]> {
+        let found = self.coefficients.iter().find(|one| one.term == term && one.power == power);
+        found.map(|one| [one.value, one.sigma])
+    }
+}

@@ -1,0 +1,253 @@
+//! Logs that cannot be used are refused, with every reason and what to do.
+
+use isotherm_cli::Exit;
+use isotherm_correction::sample::{GyroTick, LasingMode};
+use isotherm_correction::thermal::Feature;
+use isotherm_log::offline::unit_id;
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::document::{Document, GyroOutput};
+use isotherm_simulator::Scenario;
+use isotherm_simulator::chamber::Profile;
+
+use super::fixture::{base, cycle, events, fitted, scenario, wanted, zeeman};
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::fits::modes::fit::{Made, Wanted, make};
+use crate::fits::modes::model::Term;
+use crate::runs::Run;
+
+/// Twenty switches, twenty seconds apart.
+fn short() -> Scenario {
+    let mut scenario = scenario(1, Profile::constant(20.0), 0.5, 20.0);
+    scenario.duration_s = 410.0;
+    zeeman(&mut scenario).reversal.miss_rms_wavelengths = 0.0;
+    scenario
+}
+
+/// A run whose gyro ticks were changed; those that are none any more are left out.
+fn changed(scenario: &Scenario, mut change: impl FnMut(&mut GyroTick) -> bool) -> Run {
+    let kept = events(scenario).into_iter().filter_map(|event| match event {
+        LogEvent::Gyro { output, mut tick } => change(&mut tick).then_some(LogEvent::Gyro { output, tick }),
+        other => Some(other),
+    });
+    Run::of_events("changed".into(), unit_id("ZLG-0001").unwrap(), kept.collect())
+}
+
+fn made(run: Run, base: &Document) -> Result<Made, Error> {
+    let runs = [run];
+    make(&wanted(&runs, base), || ())
+}
+
+#[track_caller]
+fn refused(run: Run, base: &Document, words: &[&str]) {
+    let error = made(run, base).map(|made| made.report().to_text()).unwrap_err();
+    assert_eq!(error.exit(), Exit::Failed);
+    let text = error.to_string();
+    for word in words {
+        assert!(text.contains(word), "{word:?} is not in: {text}");
+    }
+}
+
+#[test]
+fn logs_without_what_a_mode_reversed_gyro_needs_are_refused() {
+    let (scenario, base) = (short(), base());
+    let seconds = |tick: &GyroTick| tick.end_time.as_ns() / 1_000_000_000;
+    let with_mode = |mode: fn(&GyroTick) -> Option<LasingMode>| {
+        changed(&scenario, move |tick| {
+            tick.mode = mode(tick);
+            tick.switch_command = false;
+            true
+        })
+    };
+    refused(with_mode(|_| None), &base, &["none of the 820 gyro ticks states a lasing mode", "mapping"]);
+    refused(with_mode(|_| Some(LasingMode::Minus)), &base, &["all 820 ticks are in one lasing mode (minus)"]);
+    let unbalanced = |tick: &GyroTick| {
+        let minus = (tick.end_time.as_ns() / 1_000_000_000) % 40 >= 30;
+        Some(if minus { LasingMode::Minus } else { LasingMode::Plus })
+    };
+    refused(with_mode(unbalanced), &base, &["unbalanced", "20 %"]);
+    let few = changed(&scenario, |tick| seconds(tick) < 70);
+    refused(few, &base, &["the mode switches 3 times, 8 times are needed"]);
+    let dead = changed(&scenario, |tick| {
+        tick.readings[1] = 0.0;
+        true
+    });
+    refused(dead, &base, &["gyro y has a constant reading, or no number, in all 820 ticks"]);
+    let nan = changed(&scenario, |tick| {
+        if tick.sequence % 3 == 0 {
+            tick.readings[2] = f64::NAN;
+        }
+        true
+    });
+    refused(nan, &base, &["have an unusable gyro reading"]);
+    let gaps = changed(&scenario, |tick| tick.sequence % 10 != 3);
+    refused(gaps, &base, &["ticks are missing", "5 %"]);
+    let nudged = changed(&scenario, |tick| {
+        tick.readings[0] += if tick.sequence == 333 { 60.0 } else { 0.0 };
+        true
+    });
+    refused(nudged, &base, &["the unit moved 16", "gyro x turned by", "cut the log"]);
+    let turning = changed(&scenario, |tick| {
+        tick.readings.iter_mut().for_each(|reading| *reading += 500.0);
+        true
+    });
+    refused(turning, &base, &["at most 180 °/h of bias"]);
+}
+
+#[test]
+fn readings_that_change_their_scale_or_die_are_refused() {
+    let (scenario, base) = (short(), base());
+    let late = |tick: &GyroTick| tick.end_time.as_ns() > 205_000_000_000;
+    let twice = changed(&scenario, |tick| {
+        let factor = if late(tick) { 2.0 } else { 1.0 };
+        tick.readings.iter_mut().for_each(|reading| *reading *= factor);
+        true
+    });
+    refused(
+        twice,
+        &base,
+        &["the mean rate steps and stays there", "gyro z from -1", "two units of measure", "Cut the log"],
+    );
+    let dies = changed(&scenario, |tick| {
+        tick.readings[1] *= if late(tick) { 0.0 } else { 1.0 };
+        true
+    });
+    refused(dies, &base, &["gyro y gives the same reading, 0, from 20", "cut the log"]);
+    let degrees = changed(&scenario, |tick| {
+        tick.readings.iter_mut().for_each(|reading| *reading = (*reading * 57.3).round());
+        true
+    });
+    refused(
+        degrees,
+        &base,
+        &["by the document's weights the gyros show", "180 °/h of bias", "1 rad is 57.3°"],
+    );
+    let halves = |change: fn(i32) -> i32| {
+        changed(&scenario, move |tick| {
+            for counts in tick.half_periods.iter_mut().take(1) {
+                (counts.positive, counts.negative) = (change(counts.positive), change(counts.negative));
+            }
+            true
+        })
+    };
+    refused(halves(|_| 0), &base, &["gyro x: all half-period counts are zero"]);
+    refused(
+        halves(|counts| 1000 * counts),
+        &base,
+        &["gyro x: the dither's frequency comes out as 6", "1000000 Hz"],
+    );
+    refused(halves(|counts| -counts), &base, &["gyro x: the dither's frequency comes out as -6", "swapped"]);
+}
+
+#[test]
+fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
+    let scenario = short();
+    let mut held = std::collections::VecDeque::new();
+    let late = changed(&scenario, |tick| {
+        held.push_back(tick.mode);
+        tick.mode = if held.len() > 10 { held.pop_front().flatten() } else { tick.mode };
+        true
+    });
+    refused(late, &base(), &["the mode changes 5.00 s (10 ticks) behind the switch command"]);
+    let made = fitted(&scenario, &base());
+    let turned = changed(&scenario, |tick| {
+        tick.mode =
+            tick.mode.map(|mode| if mode == LasingMode::Plus { LasingMode::Minus } else { LasingMode::Plus });
+        true
+    });
+    let again = make(&wanted(&[turned], &made.written.document), || ()).unwrap();
+    let told = again.warnings.iter().find(|words| words.contains("with the other sign")).unwrap();
+    assert!(told.starts_with("gyros x, y, z: "), "{told}");
+    assert!(!made.warnings.iter().any(|words| words.contains("with the other sign")));
+}
+
+#[test]
+fn thermometers_are_told_with_what_they_read() {
+    let (scenario, base) = (short(), base());
+    let with = |change: fn(f64, i64) -> f64| {
+        let events = events(&scenario).into_iter().map(|event| match event {
+            LogEvent::Temperature(mut reading) => {
+                reading.raw = change(reading.raw, reading.time.as_ns() / 1_000_000_000);
+                LogEvent::Temperature(reading)
+            }
+            other => other,
+        });
+        Run::of_events("changed".into(), unit_id("ZLG-0001").unwrap(), events.collect())
+    };
+    refused(
+        with(|raw, _| 100.0 * raw - 150.0 + 273.15),
+        &base,
+        &["gyro0 reads 3", "Its range_deg_c is -70…130 °C"],
+    );
+    refused(with(|_, _| f64::NAN), &base, &["gyro0 has no numbers"]);
+    let made = made(with(|raw, time_s| if time_s < 205 { raw } else { 1.75 }), &base).unwrap();
+    let frozen =
+        made.warnings.iter().find(|words| words.starts_with("temperature channels gyro0, gyro1")).unwrap();
+    assert!(frozen.contains("each reads exactly 1.75 from 205"), "{frozen}");
+}
+
+#[test]
+fn documents_that_do_not_fit_the_log_are_refused() {
+    let scenario = short();
+    let mut mean = base();
+    mean.gyro.output = GyroOutput::Mean;
+    for sensor in &mut mean.gyro.sensor {
+        sensor.increment_weight_rad_per_rad = sensor.increment_weight_arcsec_per_count.take();
+    }
+    refused(changed(&scenario, |_| true), &mean, &["readings are counts", "gyro.output is mean rates"]);
+    let mut other = base();
+    other.temperature.channel[0].name = "elsewhere".into();
+    other.gyro.sensor[0].channel = Some("elsewhere".into());
+    refused(changed(&scenario, |_| true), &other, &["does the document name the log's channels"]);
+    // A document of counts without their weights is refused by its own reader.
+    let mut weightless = base();
+    weightless.gyro.sensor[0].increment_weight_arcsec_per_count = None;
+    let error = Written::of(&weightless).unwrap_err();
+    assert!(error.to_string().contains("increment_weight"), "{error}");
+}
+
+#[test]
+fn a_constant_temperature_leaves_the_constants() {
+    let made = fitted(&short(), &base());
+    let text = made.report().to_json().to_string();
+    assert!(text.contains("temperature spans 0.0 °C only: only the constants are fitted"), "{text}");
+    for fit in made.gyros.iter().flatten() {
+        assert_eq!(
+            (fit.model.static_order, fit.model.magnetic_order, fit.model.meander_order),
+            (0, 0, Some(0))
+        );
+    }
+}
+
+#[test]
+fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
+    let mut scenario = scenario(3, cycle(4.0), 0.5, 60.0);
+    zeeman(&mut scenario).reversal.miss_rms_wavelengths = 0.0;
+    zeeman(&mut scenario).reversal.meander_half_period_s = 0.0;
+    let base = base();
+    let runs = [changed(&scenario, |_| true)];
+    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }, || ()).unwrap();
+    assert!(made.warnings.iter().any(|words| words.contains("the static bias keeps its constant")));
+    assert!(made.warnings.iter().any(|words| words.contains("the phase of the slow meander")));
+    for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
+        let fit = fit.as_ref().unwrap();
+        assert!(!sensor.terms.has(Feature::Meander));
+        let bias = format!("{:?}", sensor.static_bias.as_ref().unwrap().shape());
+        assert!(bias.contains("coefficients: [0.0, "), "{bias}");
+        let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
+        assert!(got.abs() > 100.0 * sigma);
+    }
+    let report = made.report().to_json().to_string();
+    assert!(report.contains("gyro x static bias, power 0, with the Earth's rate: not written"), "{report}");
+    let sigmas = crate::fits::modes::document::sigmas(&made);
+    assert!(
+        sigmas.get("gyro", "x", "static_bias").unwrap()[0] <= 0.0,
+        "of what was not fitted nothing is known"
+    );
+    // Orders that the run cannot tell are not invented.
+    let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
+    let made = make(&Wanted { asked, ..wanted(&runs, &base) }, || ()).unwrap();
+    assert!(
+        made.report().warnings.iter().any(|words| words.contains("cannot be separated from the static bias"))
+    );
+}

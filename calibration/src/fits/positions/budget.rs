@@ -1,0 +1,328 @@
+//! The error budget of a calibration that is planned (004, equations 3 to 7; models §9), before anyone books the chamber.
+
+use isotherm_pages::Table;
+use serde_json::{Value, json};
+
+use super::doubts::unseen;
+use super::model::{Degrees, Taken};
+use super::plan::Plan;
+use super::solve::{Positions, Weights, guesses};
+use crate::report::figures::{counted, short, table};
+
+/// ″ in one radian.
+pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
+
+/// What is planned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// σ1: positioning of the stand (″).
+    pub positioning_arcsec: f64,
+    /// σ2: run-out of its axes (″).
+    pub run_out_arcsec: f64,
+    /// Q: white noise of an accelerometer (V²·s, or (m/s²)²·s and so on with the same unit in K).
+    pub noise: f64,
+    /// τ: time in each position (s).
+    pub seconds: f64,
+    /// K: output of an accelerometer at 1 g (V).
+    pub scale_per_g: f64,
+    /// Thermal expansion of housing and sensor (1e-6/°C).
+    pub expansion_ppm_per_deg_c: [f64; 2],
+    /// Temperature of calibration and highest temperature inside (°C).
+    pub temperature_deg_c: [f64; 2],
+    /// Error of the measured temperature (°C).
+    pub temperature_error_deg_c: f64,
+    /// `k_C`: how fast an axis turns (″/°C).
+    pub axis_arcsec_per_deg_c: f64,
+    /// Δ`C_a`: hysteresis of an axis over its life (″).
+    pub hysteresis_arcsec: f64,
+}
+
+impl Default for Budget {
+    /// The example of 004, with quartz accelerometers.
+    fn default() -> Self {
+        Self {
+            positioning_arcsec: 5.0,
+            run_out_arcsec: 2.0,
+            noise: 3e-9,
+            seconds: 30.0,
+            scale_per_g: 1.0,
+            expansion_ppm_per_deg_c: [22.9, 15.0],
+            temperature_deg_c: [20.0, 85.0],
+            temperature_error_deg_c: 0.2,
+            axis_arcsec_per_deg_c: 1.5,
+            hysteresis_arcsec: 5.0,
+        }
+    }
+}
+
+/// `k_C` of 004 for accelerometers of quartz and of silicon (″/°C).
+pub const TYPICAL_ARCSEC_PER_DEG_C: [(&str, f64); 2] = [("quartz", 1.5), ("silicon", 6.0)];
+
+impl Budget {
+    /// White noise of a mean over τ as an angle (″).
+    #[must_use]
+    pub fn noise_arcsec(&self) -> f64 {
+        ARCSEC_PER_RAD * (self.noise / self.seconds).sqrt() / self.scale_per_g
+    }
+
+    /// Error of one element of C by the stand and the noise (″): 004, equation 4.
+    #[must_use]
+    pub fn stand_arcsec(&self) -> f64 {
+        let parts = [self.positioning_arcsec, self.run_out_arcsec, self.noise_arcsec()];
+        2.0 * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+    }
+
+    /// Largest plastic deformation of the housing (″): equation 6.
+    #[must_use]
+    pub fn housing_arcsec(&self) -> f64 {
+        let [housing, sensor] = self.expansion_ppm_per_deg_c;
+        let [cold, hot] = self.temperature_deg_c;
+        ARCSEC_PER_RAD * 0.1 * (housing - sensor) * 1e-6 * (hot - cold)
+    }
+
+    /// Error by the measured temperature for axes that turn with `rate` (″): equation 7.
+    #[must_use]
+    pub fn temperature_arcsec(&self, rate_arcsec_per_deg_c: f64) -> f64 {
+        self.temperature_error_deg_c * rate_arcsec_per_deg_c
+    }
+
+    /// What turns an axis between calibrations (″): hysteresis, housing, measured temperature; equation 5.
+    #[must_use]
+    pub fn thermal_arcsec(&self) -> f64 {
+        let measured = self.temperature_arcsec(self.axis_arcsec_per_deg_c);
+        self.hysteresis_arcsec.hypot(self.housing_arcsec()).hypot(measured)
+    }
+
+    /// Root sum of squares with stand and noise (″).
+    #[must_use]
+    pub fn total_arcsec(&self) -> f64 {
+        self.stand_arcsec().hypot(self.thermal_arcsec())
+    }
+
+    /// Standard error of the elements of C that the least-squares fit of a plan will state, mean and largest (″); `None` where
+    /// the plan does not determine them.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "six angles")]
+    pub fn of_plan(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
+        let taken: Vec<Taken> = plan
+            .positions
+            .iter()
+            .enumerate()
+            .map(|(position, stated)| Taken {
+                position,
+                outputs: plan.up(&stated.attitude, [0.0; 3]).map(|c| c * self.scale_per_g).to_vec(),
+                ratio: vec![1.0; 3],
+                duration_s: self.seconds,
+                sensor_t: vec![0.0; 3],
+                axes_t: 0.0,
+                level: 0,
+            })
+            .collect();
+        let guess = guesses(plan, &taken, 3).ok()?;
+        let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
+        let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
+        let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights };
+        let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
+        let covariance = found.axes_covariance(plan, 0);
+        let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
+        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();
+        Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
+    }
+
+    /// How well an axis is known by the plan's own fit, and with what the housing and the measured temperature add (″); `None` where
+    /// the plan does not determine it.
+    #[must_use]
+    pub fn known_by(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
+        let [mean, _] = self.of_plan(plan, levelling_rad)?;
+        Some([mean, mean.hypot(self.thermal_arcsec())])
+    }
+
+    /// The first line: what this plan comes to.
+    fn headline(&self, plan: &Plan, levelling_rad: f64) -> String {
+        let count = counted(plan.positions.len(), "position", "positions");
+        if let Some([known, later]) = self.known_by(plan, levelling_rad) {
+            return format!(
+                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with \
+                 hysteresis, housing and measured temperature."
+            );
+        }
+        let all: Vec<usize> = (0..plan.positions.len()).collect();
+        let lacking = unseen(plan, &all);
+        let lacking = if lacking.is_empty() {
+            "they do not spread enough".to_owned()
+        } else {
+            format!("none has {}", lacking.join(", "))
+        };
+        format!("The plan's {count} will not determine C: {lacking}. Show each case axis up and down.")
+    }
+
+    /// As text.
+    #[must_use]
+    pub fn to_text(&self, plan: &Plan, levelling_rad: f64) -> String {
+        let Table { head, rows } = self.rows();
+        let typical = TYPICAL_ARCSEC_PER_DEG_C
+            .map(|(name, rate)| format!("{:.1}″ for {name} ({rate} ″/°C)", self.temperature_arcsec(rate)));
+        let of_plan = self.of_plan(plan, levelling_rad).map_or_else(String::new, |[mean, largest]| {
+            let level = if plan.tells_level() {
+                String::new()
+            } else {
+                format!(", with a level known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD)
+            };
+            format!(
+                "The weighted least-squares fit of the plan uses every position for every element{level}: it will state {mean:.1}″ on \
+                 average, {largest:.1}″ at most.\n"
+            )
+        });
+        format!(
+            "{}\n\nBy the formula of 004, which adds its errors independent of the plan: {:.1}″.\n\n{}\n\nError by the measured \
+             temperature: {}.\n{of_plan}",
+            self.headline(plan, levelling_rad),
+            self.total_arcsec(),
+            table(&head, &rows),
+            typical.join(", ")
+        )
+    }
+
+    /// The budget as a table.
+    #[must_use]
+    pub fn rows(&self) -> Table {
+        let [housing, sensor] = self.expansion_ppm_per_deg_c;
+        let [cold, hot] = self.temperature_deg_c;
+        let row = |what: String, formula: String, value: f64| vec![what, formula, format!("{value:.1}")];
+        let rows = vec![
+            row("positioning σ1".into(), "given".into(), self.positioning_arcsec),
+            row("run-out σ2".into(), "given".into(), self.run_out_arcsec),
+            row(
+                "white noise".into(),
+                format!("ρ·√(Q/τ)/K, Q {}, τ {} s, K {}", short(self.noise), self.seconds, self.scale_per_g),
+                self.noise_arcsec(),
+            ),
+            row("stand and noise [004 eq. 4]".into(), "2·√(σ1² + σ2² + noise²)".into(), self.stand_arcsec()),
+            row(
+                "housing [004 eq. 6]".into(),
+                format!("0.1·({housing} − {sensor})·10⁻⁶·({hot} − {cold}) rad"),
+                self.housing_arcsec(),
+            ),
+            row(
+                "measured temperature [004 eq. 7]".into(),
+                format!("{} °C · {} ″/°C", self.temperature_error_deg_c, self.axis_arcsec_per_deg_c),
+                self.temperature_arcsec(self.axis_arcsec_per_deg_c),
+            ),
+            row("hysteresis of the axis [004 table 1]".into(), "given".into(), self.hysteresis_arcsec),
+            row(
+                "between calibrations [004 eq. 5]".into(),
+                "root of the sum of squares of the last three".into(),
+                self.thermal_arcsec(),
+            ),
+            row("total".into(), "with stand and noise".into(), self.total_arcsec()),
+        ];
+        Table { head: ["", "", "″"].map(str::to_owned).to_vec(), rows }
+    }
+
+    /// As JSON.
+    #[must_use]
+    pub fn to_json(&self, plan: &Plan, levelling_rad: f64) -> Value {
+        let typical: serde_json::Map<String, Value> = TYPICAL_ARCSEC_PER_DEG_C
+            .iter()
+            .map(|(name, rate)| ((*name).to_owned(), json!(self.temperature_arcsec(*rate))))
+            .collect();
+        let of_plan = self.of_plan(plan, levelling_rad);
+        json!({
+            "noise_arcsec": self.noise_arcsec(),
+            "stand_arcsec": self.stand_arcsec(),
+            "housing_arcsec": self.housing_arcsec(),
+            "temperature_arcsec": self.temperature_arcsec(self.axis_arcsec_per_deg_c),
+            "temperature_typical_arcsec": typical,
+            "hysteresis_arcsec": self.hysteresis_arcsec,
+            "thermal_arcsec": self.thermal_arcsec(),
+            "total_arcsec": self.total_arcsec(),
+            "positions": plan.positions.len(),
+            "determined": of_plan.is_some(),
+            "known_arcsec": self.known_by(plan, levelling_rad).map(|[_, later]| later),
+            "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
+            "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_examples_of_the_paper() {
+        let budget = Budget::default();
+        // 11.52″ in 004 (11.53 with its own numbers), 11″, 0.3″ and 1.2″.
+        assert!((budget.stand_arcsec() - 11.53).abs() < 0.005, "{}", budget.stand_arcsec());
+        assert!((budget.housing_arcsec() - 10.59).abs() < 0.005, "{}", budget.housing_arcsec());
+        assert!((budget.temperature_arcsec(1.5) - 0.3).abs() < 1e-12);
+        assert!((budget.temperature_arcsec(6.0) - 1.2).abs() < 1e-12);
+        assert!((budget.total_arcsec() - 16.44).abs() < 0.005, "{}", budget.total_arcsec());
+        // 12…19″ for quartz (a hysteresis of 5…15″), 19…61″ for silicon (15…60″).
+        for (hysteresis, rate, total) in
+            [(5.0, 1.5, 12.0), (15.4, 1.5, 19.0), (15.4, 6.0, 19.0), (60.0, 6.0, 61.0)]
+        {
+            let of = Budget { hysteresis_arcsec: hysteresis, axis_arcsec_per_deg_c: rate, ..budget.clone() };
+            assert!((of.thermal_arcsec() - total).abs() < 0.5, "{}", of.thermal_arcsec());
+        }
+        let text = budget.to_text(&Plan::twelve(), 3e-4);
+        for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "16.4″"] {
+            assert!(text.contains(words), "{words} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn the_first_line_is_of_the_plan() {
+        let budget = Budget::default();
+        let first =
+            |plan: &Plan| budget.to_text(plan, 60.0 / ARCSEC_PER_RAD).lines().next().unwrap().to_owned();
+        let twelve = first(&Plan::twelve());
+        assert!(
+            twelve.starts_with(
+                "An axis will be known to 2.9″ (one sigma) by the plan's 12 positions, to 12.1″"
+            ),
+            "{twelve}"
+        );
+        let six = first(&Plan::six());
+        let [known, later] = budget.known_by(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
+        assert!(known > 20.0 && later > known && later < known + 5.0, "{known} {later}");
+        assert!(
+            six.starts_with(&format!(
+                "An axis will be known to {known:.1}″ (one sigma) by the plan's 6 positions"
+            )),
+            "{six}"
+        );
+        let mut flat = Plan::twelve();
+        flat.positions.retain(|position| !position.name.starts_with('Z'));
+        let flat = first(&flat);
+        assert!(
+            flat.starts_with("The plan's 8 positions will not determine C: none has z up, z down."),
+            "{flat}"
+        );
+    }
+
+    #[test]
+    fn a_plan_without_a_stand_is_budgeted_as_it_is_fitted() {
+        use crate::fits::positions::plan::Attitude;
+        let mut plan = Plan::twelve();
+        for position in &mut plan.positions {
+            position.attitude = Attitude::Up(Plan::twelve().up(&position.attitude, [0.0; 3]).map(f64::round));
+        }
+        // Two pairs for every element, each out of level by the stand's 60″: half of that, as the fit says.
+        let [mean, most] = Budget::default().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();
+        assert!((mean - 30.1).abs() < 0.2 && (most - 30.1).abs() < 0.2, "{mean} {most}");
+        plan.positions.retain(|position| !position.name.starts_with('Z'));
+        assert!(Budget::default().of_plan(&plan, 3e-4).is_none(), "z is seen neither up nor down");
+    }
+
+    #[test]
+    fn twelve_positions_know_more_than_six() {
+        let budget = Budget::default();
+        let [twelve, _] = budget.of_plan(&Plan::twelve(), 3e-4).unwrap();
+        let [six, _] = budget.of_plan(&Plan::six(), 3e-4).unwrap();
+        // Four positions for every element: σ1 and σ2 by half, and what noise adds.
+        assert!(twelve > 0.5 * 29.0_f64.sqrt() && twelve < 0.7 * 29.0_f64.sqrt(), "{twelve}");
+        // The level is out by 60″, and nothing tells it from the axes.
+        assert!(six > 20.0, "{six}");
+    }
+}

@@ -1,0 +1,130 @@
+//! Diagrams of a calibration on a stand.
+
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
+
+use super::budget::ARCSEC_PER_RAD;
+use super::fit::{Analysis, Settings};
+use super::judged::Judgement;
+use super::solve::Fit;
+use crate::axes::{AXES, main_axis};
+
+/// Points of a curve over temperature.
+const POINTS: u32 = 60;
+
+/// Largest distance between the quadratic and the linear C over the range (rad).
+#[must_use]
+pub fn bend(analysis: &Analysis) -> f64 {
+    let Some((quadratic, ..)) = &analysis.quadratic else { return 0.0 };
+    let mut largest: f64 = 0.0;
+    for deg_c in over(analysis) {
+        let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
+        for (bent, straight) in quadratic.sensors.iter().zip(&analysis.fit.sensors) {
+            let (a, b) = (at(&bent.axis, x), at(&straight.axis, x));
+            let away = libm::sqrt((0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum());
+            largest = largest.max(away);
+        }
+    }
+    largest
+}
+
+/// Temperatures over the range.
+fn over(analysis: &Analysis) -> Vec<f64> {
+    let [low, high] = analysis.range_deg_c;
+    (0..=POINTS).map(|k| low + (high - low) * f64::from(k) / f64::from(POINTS)).collect()
+}
+
+/// A row of C at a scaled temperature.
+fn at(axis: &[[f64; 3]], x: f64) -> [f64; 3] {
+    axis.iter().rev().fold([0.0; 3], |sum, row| [0, 1, 2].map(|i| sum[i] * x + row[i]))
+}
+
+/// Elements of a row that say where the axis points: all but the largest.
+pub(super) fn across(row: [f64; 3]) -> impl Iterator<Item = usize> {
+    let largest = main_axis(&row);
+    (0..3).filter(move |i| *i != largest)
+}
+
+/// What is left by itself: beside what was there before, it is a line at zero.
+pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
+    let panel = |axis: usize| {
+        let error = |(number, judgement): (u32, &Judgement)| {
+            (f64::from(number), judgement.error[1][axis] / settings.gravity * 1e3)
+        };
+        let after = Series {
+            name: "after".to_owned(),
+            ink: Ink::Corrected,
+            form: Form::Dots,
+            samples: Samples::points((1..).zip(judged).map(error)),
+        };
+        Panel {
+            title: format!("accelerometer {}", AXES[axis]),
+            unit: "mg".to_owned(),
+            height: 120,
+            logarithmic: false,
+            content: Content::Series(vec![after]),
+        }
+    };
+    Chart {
+        caption: "Error of the specific force, by position in the order of the table.".to_owned(),
+        x: Axis::of("number of the position", ""),
+        panels: (0..3).map(panel).collect(),
+        marks: Vec::new(),
+    }
+}
+
+/// Elements that are shown over temperature: sensor, element.
+pub(super) fn shown(analysis: &Analysis) -> Vec<(usize, usize)> {
+    let sensors = analysis.fit.sensors.iter().enumerate();
+    sensors.flat_map(|(index, sensor)| across(sensor.axis[0]).map(move |i| (index, i))).collect()
+}
+
+/// Elements of C over temperature.
+pub(super) fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[String]) -> Chart {
+    let panel = |(index, i): (usize, usize)| {
+        let curve = |fit: &Fit| -> Vec<(f64, f64)> {
+            let value = |deg_c: f64| {
+                let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
+                (deg_c, at(&fit.sensors[index].axis, x)[i] * ARCSEC_PER_RAD)
+            };
+            over(analysis).into_iter().map(value).collect()
+        };
+        let by_level = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(|(deg_c, fit)| {
+            Some((*deg_c, fit.as_ref()?.sensors[index].axis[0][i] * ARCSEC_PER_RAD))
+        });
+        let bar = |(deg_c, fit): (&f64, &Option<Fit>)| {
+            let fit = fit.as_ref()?;
+            let value = fit.sensors[index].axis[0][i] * ARCSEC_PER_RAD;
+            let sigma = fit.axis_sigma(&settings.plan, index, 0)[i] * ARCSEC_PER_RAD * analysis.widened;
+            Some([(*deg_c, value - 1.96 * sigma), (*deg_c, value + 1.96 * sigma), (*deg_c, f64::NAN)])
+        };
+        let bars = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar).flatten();
+        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
+            name: name.to_owned(),
+            ink,
+            form,
+            samples: Samples::points(points),
+        };
+        let mut content = vec![
+            series("each temperature", Ink::Raw, Form::Dots, by_level.collect()),
+            series("95 %", Ink::Faint, Form::Line, bars.collect()),
+            series("linear", Ink::Second, Form::Line, curve(&analysis.fit)),
+        ];
+        if let Some((quadratic, ..)) = &analysis.quadratic {
+            content.push(series("quadratic", Ink::Third, Form::Line, curve(quadratic)));
+        }
+        Panel {
+            title: format!("accelerometer {} along {}", names[index], AXES[i]),
+            unit: "″".to_owned(),
+            height: 150,
+            logarithmic: false,
+            content: Content::Series(content),
+        }
+    };
+    Chart {
+        caption: "Elements of C over temperature: each temperature alone, and the line of the document."
+            .to_owned(),
+        x: Axis::of("temperature", "°C"),
+        panels: shown(analysis).into_iter().map(panel).collect(),
+        marks: Vec::new(),
+    }
+}

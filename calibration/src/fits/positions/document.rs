@@ -1,0 +1,127 @@
+//! What was found, as a document.
+
+use isotherm_correction::thermal::Feature;
+use isotherm_correction::units::Angle;
+use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationThermal, Shape, Unit};
+
+use super::fit::Analysis;
+use super::model::Sensor;
+use crate::document::written::tidy;
+
+/// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
+const ROOM_DEG_C: f64 = 1.0;
+
+/// Puts what was found into a document.
+#[must_use]
+pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Document {
+    let mut document = document.clone();
+    let Some(accel) = &mut document.accel else { return document };
+    let scale_unit = accel.output.scale_unit();
+    let found = analysis.fit.sensors.iter().zip(&analysis.sensors_deg_c);
+    for (sensor, (found, deg_c)) in accel.sensor.iter_mut().zip(found) {
+        let range = with_room(deg_c.range);
+        let scale: Vec<f64> = found.scale.iter().map(|k| k / gravity).collect();
+        if analysis.levels_deg_c.len() > 1 {
+            sensor.scale_factor = curve(analysis, &scale, range).in_unit(scale_unit);
+            sensor.set(Feature::One, curve(analysis, &found.bias, range));
+        } else {
+            level(sensor, scale[0], found.bias[0], deg_c.mean, scale_unit);
+        }
+    }
+    orient(accel, analysis, with_room(analysis.range_deg_c));
+    document
+}
+
+/// Range of the document (°C): of all curves, and of the axes.
+#[must_use]
+pub fn range(analysis: &Analysis) -> [f64; 2] {
+    let own = analysis.sensors_deg_c.iter().map(|deg_c| deg_c.range);
+    with_room(own.fold(analysis.range_deg_c, |[low, high], own| [low.min(own[0]), high.max(own[1])]))
+}
+
+/// Range of a curve (°C), in whole degrees.
+fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
+    [(low - ROOM_DEG_C).floor(), (high + ROOM_DEG_C).ceil()]
+}
+
+/// A polynomial over temperature from coefficients over scaled temperature.
+fn curve(analysis: &Analysis, scaled: &[f64], range: [f64; 2]) -> Curve {
+    let mut factor = 1.0;
+    let coefficients = scaled.iter().map(|c| {
+        let coefficient = tidy(c * factor);
+        factor /= analysis.half_deg_c;
+        coefficient
+    });
+    Curve::new(Shape::Polynomial {
+        reference: analysis.reference_deg_c,
+        coefficients: coefficients.collect(),
+        range,
+    })
+}
+
+/// Moves an accelerometer's curves to what one temperature says, keeping their shape.
+pub(crate) fn level(sensor: &mut AccelSensor, scale: f64, bias: f64, deg_c: f64, scale_unit: Unit) {
+    let constant = |value: f64| Shape::Constant { value: tidy(value) };
+    let shape = sensor.scale_factor.shape();
+    let shape = match shape.at(deg_c) {
+        Some(old) if old != 0.0 => times(shape, scale / old),
+        _ => constant(scale),
+    };
+    sensor.scale_factor = Curve::new(shape).in_unit(scale_unit);
+    let old = sensor.terms.curve(Feature::One);
+    let moved = old.and_then(|curve| Some(curve.plus(bias - curve.shape().at(deg_c)?)));
+    let shape = moved.map_or_else(|| constant(bias), |curve| times(curve.shape(), 1.0));
+    sensor.set(Feature::One, Curve::new(shape));
+}
+
+/// A shape with all values multiplied.
+fn times(shape: &Shape, factor: f64) -> Shape {
+    let knots = |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [*x, tidy(value * factor)]).collect();
+    match shape {
+        Shape::Constant { value } => Shape::Constant { value: tidy(value * factor) },
+        Shape::Polynomial { reference, coefficients, range } => Shape::Polynomial {
+            reference: *reference,
+            coefficients: coefficients.iter().map(|c| tidy(c * factor)).collect(),
+            range: *range,
+        },
+        Shape::PiecewiseLinear { knots: of } => Shape::PiecewiseLinear { knots: knots(of) },
+        Shape::Spline { knots: of } => Shape::Spline { knots: knots(of) },
+    }
+}
+
+/// Puts C into the document: rows at the reference, and slopes where there are several temperatures. With one, the slopes of the
+/// old document stay, and the rows at their reference follow.
+fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, range: [f64; 2]) {
+    let orientation = &mut accel.orientation;
+    let row = |sensor: &Sensor| sensor.axis.first().copied().unwrap_or_default();
+    if analysis.levels_deg_c.len() > 1 {
+        orientation.rows = analysis.fit.sensors.iter().map(|sensor| row(sensor).map(tidy)).collect();
+        let slope = |sensor: &Sensor| {
+            let slope = sensor.axis.get(1).copied().unwrap_or_default();
+            slope.map(|c| tidy(Angle::from_rad(c / analysis.half_deg_c).as_arcsec()))
+        };
+        let stated = orientation.thermal.take();
+        orientation.thermal = Some(OrientationThermal {
+            channels: analysis.channels.clone(),
+            reference_deg_c: analysis.reference_deg_c,
+            range_deg_c: range,
+            slopes_arcsec_per_deg_c: analysis.fit.sensors.iter().map(slope).collect(),
+            hysteresis: stated.map(|thermal| thermal.hysteresis).unwrap_or_default(),
+        });
+        return;
+    }
+    let old = |sensor: usize| {
+        let Some(thermal) = &orientation.thermal else { return [0.0; 3] };
+        let [low, high] = thermal.range_deg_c;
+        let away = analysis.slopes_deg_c.max(low).min(high) - thermal.reference_deg_c;
+        let slope = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
+        slope.map(|c| Angle::from_arcsec(c * away).as_rad())
+    };
+    let at_reference = |(index, sensor): (usize, &Sensor)| {
+        let (found, turned) = (row(sensor), old(index));
+        let row = [0, 1, 2].map(|i| found[i] - turned[i]);
+        let norm = libm::sqrt(row.iter().map(|c| c * c).sum());
+        row.map(|c| tidy(c / norm))
+    };
+    orientation.rows = analysis.fit.sensors.iter().enumerate().map(at_reference).collect();
+}

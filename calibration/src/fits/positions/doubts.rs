@@ -1,0 +1,261 @@
+//! What is doubtful about a result, and what makes it none.
+
+use isotherm_protocol::document::Document;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::fit::{Analysis, Settings};
+use super::model::{Degrees, Sensor, Taken};
+use super::plan::Plan;
+use super::sense::{self, Beside};
+use super::solve::Fit;
+use super::temperature::Temperatures;
+use super::{budget, measure, model};
+use crate::axes::{AXES, sensor_name, several};
+use crate::lsq::linear;
+use crate::lsq::nonlinear::NoSolution;
+use crate::report::figures::{counted, short};
+
+/// Fewest positions that tell the stand's errors from the axes.
+pub const GOOD_POSITIONS: usize = 9;
+/// Probability below which something is no accident.
+pub(super) const ACCIDENT: f64 = 1e-3;
+/// Largest |f| − g (rms, a share of g) where the fit decides.
+pub(crate) const LARGEST_LEFT_SHARE: f64 = 0.02;
+/// Largest standard error of a scale factor that is still a result (relative).
+const LARGEST_SIGMA: f64 = 1e-2;
+/// Largest angle between an axis and where the document at hand has it (°): half of a skewed unit's way to the next one.
+pub const LARGEST_TURN_DEG: f64 = 30.0;
+
+/// χ² of the quadratic terms of C, and their number.
+pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {
+    let covariance = fit.axes_covariance(plan, 2);
+    let model = fit.model(plan);
+    let terms: Vec<f64> = (0..fit.guess.len())
+        .flat_map(|sensor| [0, 1].map(|which| model.axis_index(sensor, which, 2)))
+        .map(|index| fit.solution.parameters[index] * model::SMALL)
+        .collect();
+    let count = terms.len();
+    (linear::chi_square(&nalgebra::DVector::from_vec(terms), &covariance).unwrap_or(0.0), count)
+}
+
+/// Probability that χ² is at least so large by accident.
+#[expect(clippy::cast_precision_loss, reason = "degrees of freedom")]
+pub(super) fn survival(chi_square: f64, degrees: usize) -> f64 {
+    ChiSquared::new(degrees as f64).map_or(1.0, |law| law.sf(chi_square))
+}
+
+/// Factor by which standard errors are widened where the positions scatter more than they should.
+pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
+    let (chi_square, degrees) = (fit.solution.chi_square, fit.solution.degrees);
+    let Some(per_degree) = fit.solution.per_degree() else { return 1.0 };
+    if survival(chi_square, degrees) >= ACCIDENT || per_degree <= 1.0 {
+        return 1.0;
+    }
+    let factor = per_degree.sqrt();
+    warnings.push(format!(
+        "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² \
+         {chi_square:.0} with {} of freedom); all standard errors are widened by this. Check the largest residuals: \
+         a position mistaken for another, a unit not settled, a stand worse than --positioning and --run-out",
+        counted(degrees, "degree", "degrees")
+    ));
+    factor
+}
+
+/// What few, missing and repeated positions mean.
+pub(super) fn few(
+    plan: &Plan,
+    taken: &[Taken],
+    levels: usize,
+    settings: &Settings,
+    warnings: &mut Vec<String>,
+) {
+    for level in 0..levels {
+        let count = |position: usize| {
+            taken.iter().filter(|taken| taken.level == level && taken.position == position).count()
+        };
+        let names = |which: &dyn Fn(usize) -> bool| -> Vec<&str> {
+            let positions = plan.positions.iter().enumerate().filter(|(index, _)| which(count(*index)));
+            positions.map(|(_, position)| position.name.as_str()).collect()
+        };
+        let at = if levels > 1 { format!("temperature {}: ", level + 1) } else { String::new() };
+        let (missing, repeated) = (names(&|count| count == 0), names(&|count| count > 1));
+        if !missing.is_empty() {
+            warnings.push(format!("{at}missing positions: {}", missing.join(", ")));
+        }
+        if !repeated.is_empty() {
+            warnings.push(format!("{at}repeated positions, all of them used: {}", repeated.join(", ")));
+        }
+    }
+    let different =
+        (0..plan.positions.len()).filter(|p| taken.iter().any(|taken| taken.position == *p)).count();
+    if plan.has_stand() && different < GOOD_POSITIONS {
+        warnings.push(format!(
+            "{} not separate the stand's level from the axes, {GOOD_POSITIONS} or more do: the standard errors of C \
+             include --levelling ({:.0}″)",
+            if different == 1 { "1 position does".to_owned() } else { format!("{different} different positions do") },
+            settings.levelling_rad * budget::ARCSEC_PER_RAD
+        ));
+    }
+}
+
+/// Axes that lie far from where the document at hand has them: swapped columns, a sign, or another mounting.
+pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mut Vec<String>) {
+    let rows = document.accel.iter().flat_map(|accel| &accel.orientation.rows);
+    let of = |(sensor, stated): (&Sensor, &[f64; 3])| {
+        Beside::new(
+            [sensor.scale[0] / gravity, 1.0],
+            [sensor.axis.first().copied().unwrap_or_default(), *stated],
+        )
+    };
+    let beside: Vec<Beside> = fit.sensors.iter().zip(rows).map(of).collect();
+    let turned = sense::turned(&beside);
+    if turned.is_empty() {
+        return;
+    }
+    let who = several("accelerometer", &turned, beside.len());
+    let one = turned.len() == 1;
+    let moved = sense::places(&beside).map(|(order, same_way)| (sense::out_of_place(order), same_way));
+    let what = match moved {
+        Some((moved, _)) if moved.is_empty() => format!(
+            "{who} {} found with the other sign: {} missing in the mapping",
+            if one { "is" } else { "are" },
+            if one { "is its sign" } else { "are their signs" }
+        ),
+        Some((moved, [true, true, true])) if moved.len() == 2 => {
+            format!("{who} look swapped: are their columns of the mapping")
+        }
+        _ => format!(
+            "{who} {} far from where the document at hand has {}: are columns of the mapping swapped, is a sign the other one",
+            if one { "is" } else { "are" },
+            if one { "it" } else { "them" }
+        ),
+    };
+    warnings.push(format!(
+        "{what}, or is the unit mounted differently from the plan? {}",
+        sense::found_along("accelerometer", &beside, &turned)
+    ));
+}
+
+/// Scale factors that are not those of the unit of measure that the document states; `own` are the temperatures that each
+/// accelerometer was taken at (°C).
+pub(super) fn measures(fit: &Fit, document: &Document, settings: &Settings, own: &[Vec<f64>]) -> Vec<String> {
+    let Some(accel) = &document.accel else { return Vec::new() };
+    let stated =
+        accel.sensor.iter().zip(own).map(|(sensor, deg_c)| {
+            sensor.scale_factor.shape().at(Temperatures::of(deg_c).mean).unwrap_or(1.0)
+        });
+    let stated: Vec<f64> = stated.collect();
+    let found: Vec<f64> = fit.sensors.iter().map(|sensor| sensor.scale[0] / settings.gravity).collect();
+    let other = measure::Beside::accelerometers(accel.output, &found, &stated).words();
+    other.into_iter().chain(measure::already_m_per_s2(accel.output, &found, &stated)).collect()
+}
+
+/// Axes that no position of some shows up or down, such as "x up".
+pub(super) fn unseen(plan: &Plan, positions: &[usize]) -> Vec<String> {
+    let seen = |axis: usize, sign: f64| {
+        positions
+            .iter()
+            .filter_map(|position| plan.positions.get(*position))
+            .any(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
+    };
+    (0..3)
+        .flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")])
+        .filter(|(axis, sign, _)| !seen(*axis, *sign))
+        .map(|(axis, _, way)| format!("{} {way}", AXES[axis]))
+        .collect()
+}
+
+/// Sensors whose positions do not spread, in words.
+pub(super) fn spread(plan: &Plan, taken: &[Taken], (bad, sensors): (&[usize], usize)) -> Vec<String> {
+    let positions: Vec<usize> = taken.iter().map(|taken| taken.position).collect();
+    let lacking = unseen(plan, &positions);
+    let lacking = if lacking.is_empty() {
+        "the outputs do not follow the positions: check the plan and the columns of the mapping".to_owned()
+    } else {
+        format!("no position has {}", lacking.join(", "))
+    };
+    vec![format!(
+        "{} not determine scale factor, bias and axis of {}: {lacking}",
+        if taken.len() == 1 { "1 position does".to_owned() } else { format!("{} positions do", taken.len()) },
+        several("accelerometer", bad, sensors)
+    )]
+}
+
+/// Whether what was found is a result.
+pub(super) fn sound(analysis: &Analysis) -> Result<(), Vec<String>> {
+    let fit = &analysis.fit;
+    let sigma = |sensor: usize| {
+        fit.solution.sigma(sensor * fit.degrees.of_sensor()) * model::SMALL * analysis.widened
+    };
+    let bad: Vec<usize> = (0..fit.guess.len())
+        .filter(|sensor| sigma(*sensor).is_nan() || sigma(*sensor) > LARGEST_SIGMA)
+        .collect();
+    if bad.is_empty() {
+        return Ok(());
+    }
+    let known: Vec<String> = bad.iter().map(|sensor| short(sigma(*sensor) * 100.0)).collect();
+    let why = if analysis.widened > 1.0 {
+        format!(
+            "the positions scatter {} times as much as positioning, run-out and noise explain. Is a position \
+             mistaken for another (--times, --plan), does the unit of measure change between or within logs, did \
+             zeros drift?",
+            short(analysis.widened)
+        )
+    } else {
+        "use longer or more positions, and check the noise of the sensors".to_owned()
+    };
+    Err(vec![format!(
+        "{}: {} known only to {} %, at most {} % is accepted: {why}",
+        several("accelerometer", &bad, fit.guess.len()),
+        if bad.len() == 1 { "its scale factor is" } else { "their scale factors are" },
+        known.join(", "),
+        LARGEST_SIGMA * 100.0
+    )])
+}
+
+/// No solution, in words.
+pub(super) fn no_solution(why: &NoSolution, degrees: Degrees, sensors: usize) -> String {
+    let (own, of_sensor) = (degrees.sensor + 1, degrees.of_sensor());
+    let name = |index: usize| {
+        let (sensor, place) = (index / of_sensor, index % of_sensor);
+        if sensor >= sensors {
+            return format!("the stand's δ{}", index - sensors * of_sensor + 1);
+        }
+        let (what, power) = match place {
+            place if place < own => ("the scale factor", place),
+            place if place < 2 * own => ("the bias", place - own),
+            place => ("the axis", (place - 2 * own) % (degrees.axes + 1)),
+        };
+        let over = if power > 0 { " over temperature" } else { "" };
+        format!("{what} of accelerometer {}{over}", sensor_name(sensor, sensors))
+    };
+    why.words(
+        "the positions",
+        name,
+        "take each axis up and down at each temperature, in two orientations",
+        "no scale factors, biases and axes fit all positions: check the plan, every column of the mapping, and that \
+         the unit of measure is the same throughout",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_found_is_said_in_plain_words() {
+        let degrees = Degrees { sensor: 1, axes: 1 };
+        let of = |why: NoSolution| no_solution(&why, degrees, 3);
+        let words = of(NoSolution::NoMinimum("LostPatience".to_owned()));
+        assert!(!words.contains("Lost") && words.contains("check the plan"), "{words}");
+        let named = |index: usize| of(NoSolution::NotDetermined(index));
+        assert!(
+            named(0).contains("do not determine the scale factor of accelerometer x: take"),
+            "{}",
+            named(0)
+        );
+        assert!(named(11).contains("the bias of accelerometer y over temperature"), "{}", named(11));
+        assert!(named(20).contains("the axis of accelerometer z"), "{}", named(20));
+        assert!(named(25).contains("the stand's δ2"), "{}", named(25));
+    }
+}

@@ -1,0 +1,276 @@
+//! From the runs of a unit to what its accelerometers are.
+
+use isotherm_protocol::document::Document;
+
+use super::doubts::{
+    ACCIDENT, few, measures, no_solution, quadratic_terms, sound, spread, survival, turned, widening,
+};
+use super::faults;
+use super::hysteresis::{Return, returns};
+use super::matching::{Matched, matched};
+use super::model::{Degrees, Taken};
+use super::plan::Plan;
+use super::pose::{Pose, intensities};
+use super::solve::{Fit, Positions, Weights, guesses};
+use super::still::{StillLimits, still};
+use super::temperature::{
+    Followed, Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
+};
+use super::times::Times;
+use super::track::Track;
+use crate::report::figures::counted;
+
+/// How the positions are looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The plan.
+    pub plan: Plan,
+    /// Gravity (m/s²).
+    pub gravity: f64,
+    /// What counts as still.
+    pub limits: StillLimits,
+    /// Which pose is which, where somebody says so.
+    pub times: Option<Times>,
+    /// Standard deviation of the case's direction in a position (rad).
+    pub positioning_rad: f64,
+    /// Standard deviation of the stand's level beforehand (rad).
+    pub levelling_rad: f64,
+    /// Channels that the orientation follows; those of the accelerometers where empty.
+    pub channels: Vec<String>,
+    /// Reference temperature of the polynomials (°C); chosen where absent.
+    pub reference_deg_c: Option<f64>,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// All poses that are positions, with the position's number and the level's.
+    pub poses: Vec<(Pose, usize, usize)>,
+    /// The positions as the fit had them.
+    pub taken: Vec<Taken>,
+    /// Mean temperature of each level (°C); one that is no number where nothing measures it.
+    pub levels_deg_c: Vec<f64>,
+    /// What the document will hold: C constant or linear.
+    pub fit: Fit,
+    /// With C quadratic, where there are three temperatures or more, and how sure it is that it is (χ² of the quadratic terms,
+    /// their number, probability of an accident).
+    pub quadratic: Option<(Fit, f64, usize, f64)>,
+    /// Each temperature by itself.
+    pub of_level: Vec<Option<Fit>>,
+    /// Reference temperature and half the range (°C).
+    pub reference_deg_c: f64,
+    /// Half the range of temperature, which polynomials are scaled by (°C).
+    pub half_deg_c: f64,
+    /// Lowest and highest temperature that the orientation follows (°C).
+    pub range_deg_c: [f64; 2],
+    /// What K and S of each accelerometer were taken at: the temperatures of its own channel.
+    pub sensors_deg_c: Vec<Temperatures>,
+    /// Mean temperature of the channels that the slopes of the document's C follow (°C).
+    pub slopes_deg_c: f64,
+    /// Channels that the orientation follows.
+    pub channels: Vec<String>,
+    /// Weights that it was found with.
+    pub weights: Weights,
+    /// Factor by which all standard errors are widened.
+    pub widened: f64,
+    /// The axes at temperatures that were left and come back to.
+    pub returns: Vec<Return>,
+    /// What is to be said.
+    pub warnings: Vec<String>,
+}
+
+/// Finds everything from the runs of a unit, corrected with the document at hand where that matters.
+///
+/// # Errors
+/// Every reason why it cannot be, with what to do.
+pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Result<Analysis, Vec<String>> {
+    let reasons = faults::dead(tracks);
+    if !reasons.is_empty() {
+        return Err(reasons);
+    }
+    let (poses, mut warnings) = positions(tracks, settings)?;
+    let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
+    let Followed { channels, deg_c: axes } = followed(document, settings, &poses, &mut warnings)?;
+    let (level_of, levels_deg_c) = levels(&axes);
+    let own = own_deg_c(document, &poses, &axes, sensors);
+    let blind = blind(document, &own, levels_deg_c.len());
+    if !blind.is_empty() {
+        return Err(blind);
+    }
+    if let Some(words) = stuck(&channels, &axes, &own).filter(|_| !channels.is_empty()) {
+        return Err(vec![words]);
+    }
+    let (low, high) =
+        axes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let reference = settings.reference_deg_c.unwrap_or_else(|| reference(low, high));
+    let half = (0.5 * (high - low)).max(1.0);
+    let scaled = |t: f64| (t - reference) / half;
+    let taken: Vec<Taken> = poses
+        .iter()
+        .zip(axes.iter().zip(&level_of))
+        .enumerate()
+        .map(|(taken, ((pose, position), (axes_t, level)))| Taken {
+            position: *position,
+            outputs: pose.outputs.clone(),
+            ratio: (0..sensors).map(|sensor| board_ratio(document, sensor, pose)).collect(),
+            duration_s: pose.duration_s,
+            sensor_t: own.iter().map(|deg_c| scaled(deg_c.get(taken).copied().unwrap_or(*axes_t))).collect(),
+            axes_t: scaled(*axes_t),
+            level: *level,
+        })
+        .collect();
+    let plain: Vec<Pose> = poses.iter().map(|(pose, _)| pose.clone()).collect();
+    let weights = Weights {
+        intensity: intensity(tracks, &plain)?,
+        positioning_rad: settings.positioning_rad,
+        levelling_rad: settings.levelling_rad,
+    };
+    let stand = &settings.plan;
+    let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, (&bad, sensors)))?;
+    let most = levels_deg_c.len() - 1;
+    let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
+    let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights };
+    let found = all.fit(degrees).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
+    let quadratic =
+        (most >= 2).then(|| all.fit(Degrees { axes: 2, ..degrees }).ok()).flatten().map(|quadratic| {
+            let (chi_square, terms) = quadratic_terms(&quadratic, stand);
+            let accident = survival(chi_square, terms);
+            (quadratic, chi_square, terms, accident)
+        });
+    let best = quadratic.as_ref().filter(|found| found.3 < ACCIDENT).map_or(&found, |found| &found.0);
+    let widened = widening(best, &mut warnings);
+    let curved = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
+    if curved {
+        warnings.push(
+            "C bends with temperature: the quadratic terms are significant. The document has the best straight line; \
+             the report has both, and the remainder"
+                .to_owned(),
+        );
+    }
+    few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
+    turned(best, document, settings.gravity, &mut warnings);
+    warnings.extend(measures(best, document, settings, &own));
+    let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
+    let poses: Vec<(Pose, usize, usize)> =
+        poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level)).collect();
+    let returns = returns(&all, &poses, &found, &levels_deg_c);
+    let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
+    for (sensor, kind) in returns.iter().filter_map(|back| back.finding(&names)) {
+        let own = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor));
+        let name = own.map_or_else(|| sensor.to_string(), |own| own.name.clone());
+        warnings.push(kind.of(&name).to_string());
+    }
+    let analysis = Analysis {
+        poses,
+        taken,
+        levels_deg_c,
+        fit: found,
+        quadratic,
+        of_level,
+        reference_deg_c: reference,
+        half_deg_c: half,
+        range_deg_c: [low, high],
+        sensors_deg_c: own.iter().map(|deg_c| Temperatures::of(deg_c)).collect(),
+        slopes_deg_c: slopes_deg_c(document, &plain).unwrap_or(document.temperature.assumed_deg_c),
+        channels,
+        weights,
+        widened,
+        returns,
+        warnings,
+    };
+    sound(&analysis)?;
+    Ok(analysis)
+}
+
+/// Poses with their positions' numbers, and what is to be said of them.
+pub type Found = (Vec<(Pose, usize)>, Vec<String>);
+
+/// The poses of all runs that are positions of the plan, with the position's number.
+///
+/// # Errors
+/// What is wrong with each run.
+pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<String>> {
+    let mut found = Vec::new();
+    let mut warnings = Vec::new();
+    let (mut reasons, mut unclear) = (Vec::new(), Vec::new());
+    for (run, track) in tracks.iter().enumerate() {
+        if let Some(times) = &settings.times {
+            match times.poses(track, run, &settings.plan) {
+                Ok(poses) => found.extend(poses),
+                Err(words) => reasons.extend(words),
+            }
+            continue;
+        }
+        let intervals = still(track, &settings.limits, None);
+        let poses = Pose::of(track, run, &intervals);
+        if poses.is_empty() {
+            reasons.push(format!(
+                "{}: the unit is never still for {} s after {} s of settling: reduce --least and --settle, or give \
+                 the times with --times",
+                track.run, settings.limits.least_s, settings.limits.settle_s
+            ));
+            continue;
+        }
+        match matched(&settings.plan, track, &poses) {
+            Ok(Matched { positions, doubt }) => {
+                warnings.extend(doubt.map(|words| format!("{}: {words}", track.run)));
+                let others = positions.iter().filter(|position| position.is_none()).count();
+                if others > 0 {
+                    warnings.push(format!(
+                        "{}: {others} of {} {} no position of the plan and left out",
+                        track.run,
+                        counted(poses.len(), "still pose", "still poses"),
+                        if others == 1 { "is" } else { "are" }
+                    ));
+                }
+                found.extend(
+                    poses.into_iter().zip(positions).filter_map(|(pose, position)| Some((pose, position?))),
+                );
+            }
+            Err(words) => unclear.push((track.run.as_str(), words)),
+        }
+    }
+    // What is wrong with one log of many mostly is with all of them.
+    if let Some(((first, words), others)) = unclear.split_first() {
+        let others: Vec<&str> = others.iter().map(|(run, _)| *run).collect();
+        let likewise =
+            if others.is_empty() { String::new() } else { format!(". Likewise {}", faults::logs(&others)) };
+        reasons.push(format!("{first}: {words}{likewise}"));
+    }
+    let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
+    reasons.extend(faults::clipped(tracks, &poses));
+    if reasons.is_empty() && found.is_empty() {
+        let runs: Vec<&str> = tracks.iter().map(|track| track.run.as_str()).collect();
+        reasons.push(if settings.times.is_some() {
+            format!("no row of --times is of {}: the column log has the file's name", runs.join(", "))
+        } else {
+            "no position of the plan was found: is it the right --plan?".to_owned()
+        });
+    }
+    if reasons.is_empty() { Ok((found, warnings)) } else { Err(reasons) }
+}
+
+/// Intensities of the noise.
+fn intensity(tracks: &[Track], poses: &[Pose]) -> Result<Vec<f64>, Vec<String>> {
+    let found = intensities(tracks, poses);
+    if found.iter().any(|intensity| intensity.is_nan()) {
+        return Err(vec![
+            "the positions are too short to measure the noise: each needs at least two seconds".to_owned(),
+        ]);
+    }
+    // Without any noise a stand's errors alone would have to make a covariance that can be inverted.
+    let floor = |(sensor, intensity): (usize, f64)| {
+        let largest =
+            poses.iter().filter_map(|pose| pose.outputs.get(sensor)).fold(0.0, |a: f64, b| a.max(b.abs()));
+        intensity.max((1e-9 * largest).powi(2))
+    };
+    Ok(found.into_iter().enumerate().map(floor).collect())
+}
+
+/// A temperature by itself, where it has enough positions.
+fn one_level(all: &Positions<'_>, level: usize) -> Option<Fit> {
+    let own: Vec<Taken> = all.taken.iter().filter(|taken| taken.level == level).cloned().collect();
+    let enough = guesses(all.plan, &own, all.guess.len()).is_ok();
+    let alone = Positions { taken: &own, ..*all };
+    enough.then(|| alone.fit(Degrees { sensor: 0, axes: 0 }).ok()).flatten()
+}

@@ -1,0 +1,141 @@
+//! Whether the axes come back: C before and after a thermal cycle, at the same temperature (004's hysteresis of the axes).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::budget::ARCSEC_PER_RAD;
+use super::doubts::{ACCIDENT, survival};
+use super::model::{Degrees, SMALL, Taken};
+use super::pose::Pose;
+use super::solve::{Fit, Positions};
+use crate::finding::AccelKind;
+use crate::lsq::linear;
+
+/// The axes at one temperature, before and after others were visited.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Return {
+    /// The temperature (°C).
+    pub deg_c: f64,
+    /// Runs before and after, by number.
+    pub runs: [usize; 2],
+    /// By how much each accelerometer's axis turned, and its standard error (″).
+    pub turns: Vec<[f64; 2]>,
+    /// Probability that so much is an accident.
+    pub accident: f64,
+}
+
+impl Return {
+    /// Whether some axis moved, beyond chance.
+    #[must_use]
+    pub fn moved(&self) -> bool {
+        self.accident < ACCIDENT
+    }
+
+    /// The accelerometer whose axis turned most.
+    #[must_use]
+    pub fn largest(&self) -> Option<(usize, [f64; 2])> {
+        self.turns.iter().copied().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
+    }
+
+    /// As a finding, where an axis moved: the accelerometer and the kind.
+    #[must_use]
+    pub fn finding(&self, runs: &[String]) -> Option<(usize, AccelKind)> {
+        let (sensor, turn) = self.largest().filter(|_| self.moved())?;
+        let logs = self.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
+        Some((sensor, AccelKind::AxisMoved { deg_c: self.deg_c, logs, turn }))
+    }
+}
+
+/// Positions of one temperature that were taken without another in between.
+struct Visit {
+    run: usize,
+    level: usize,
+    taken: Vec<Taken>,
+}
+
+/// Every return to a temperature that was left; `poses` are those of `all.taken`, with position and level, in the order of logs and time.
+pub(super) fn returns(
+    all: &Positions<'_>,
+    poses: &[(Pose, usize, usize)],
+    fit: &Fit,
+    levels_deg_c: &[f64],
+) -> Vec<Return> {
+    let mut order: Vec<usize> = (0..poses.len()).collect();
+    order.sort_by_key(|index| (poses[*index].0.run, poses[*index].0.interval.first));
+    let mut visits: Vec<Visit> = Vec::new();
+    for index in order {
+        let ((pose, _, level), taken) = (&poses[index], all.taken[index].clone());
+        match visits.last_mut().filter(|visit| visit.level == *level) {
+            Some(visit) => visit.taken.push(taken),
+            None => visits.push(Visit { run: pose.run, level: *level, taken: vec![taken] }),
+        }
+    }
+    let found: Vec<(&Visit, Fit)> = visits
+        .iter()
+        .filter_map(|visit| {
+            let alone = Positions { taken: &visit.taken, ..*all };
+            Some((visit, alone.fit(Degrees { sensor: 0, axes: 0 }).ok()?))
+        })
+        .collect();
+    let after = |at: usize| {
+        let (visit, fit_after) = &found[at];
+        let before = found[..at].iter().rev().find(|(other, _)| other.level == visit.level)?;
+        compare(all, fit, [(before.0, &before.1), (visit, fit_after)], levels_deg_c)
+    };
+    (0..found.len()).filter_map(after).collect()
+}
+
+/// The turn from one visit to another, less what the line over temperature says of the small difference of theirs.
+fn compare(
+    all: &Positions<'_>,
+    fit: &Fit,
+    [(first, before), (second, after)]: [(&Visit, &Fit); 2],
+    levels_deg_c: &[f64],
+) -> Option<Return> {
+    #[expect(clippy::cast_precision_loss, reason = "positions")]
+    let scaled =
+        |visit: &Visit| visit.taken.iter().map(|taken| taken.axes_t).sum::<f64>() / visit.taken.len() as f64;
+    let away = scaled(second) - scaled(first);
+    let [level, line] = [before, fit].map(|fit| fit.model(all.plan));
+    let angle = |sensor: usize, which: usize| {
+        let at = level.axis_index(sensor, which, 0);
+        let slope = if fit.degrees.axes > 0 {
+            fit.solution.parameters[line.axis_index(sensor, which, 1)]
+        } else {
+            0.0
+        };
+        (after.solution.parameters[at] - before.solution.parameters[at] - slope * away) * SMALL
+    };
+    let count = all.guess.len();
+    let angles = DVector::from_iterator(
+        2 * count,
+        (0..count).flat_map(|sensor| [0, 1].map(|which| angle(sensor, which))),
+    );
+    let covariance: DMatrix<f64> = (before.axes_covariance(all.plan, 0) + after.axes_covariance(all.plan, 0))
+        * widening([before, after]);
+    let accident = survival(linear::chi_square(&angles, &covariance)?, 2 * count);
+    let turn = |sensor: usize| {
+        let own = angles.rows(2 * sensor, 2);
+        let block = covariance.view((2 * sensor, 2 * sensor), (2, 2));
+        let size = own.norm();
+        let variance = if size > 0.0 { (block * own).dot(&own) / (size * size) } else { block[(0, 0)] };
+        [size * ARCSEC_PER_RAD, variance.max(0.0).sqrt() * ARCSEC_PER_RAD]
+    };
+    Some(Return {
+        deg_c: *levels_deg_c.get(second.level)?,
+        runs: [first.run, second.run],
+        turns: (0..count).map(turn).collect(),
+        accident,
+    })
+}
+
+/// Factor of the variances: χ² per degree of both visits where it is no accident.
+fn widening(fits: [&Fit; 2]) -> f64 {
+    let chi_square: f64 = fits.iter().map(|fit| fit.solution.chi_square).sum();
+    let degrees: usize = fits.iter().map(|fit| fit.solution.degrees).sum();
+    if degrees == 0 || survival(chi_square, degrees) >= ACCIDENT {
+        return 1.0;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "some positions")]
+    let per_degree = chi_square / degrees as f64;
+    per_degree.max(1.0)
+}

@@ -1,0 +1,192 @@
+//! Readings in another unit of measure than the mapping or the document says: scale factors that are found tell.
+
+use isotherm_protocol::document::AccelOutput;
+
+use crate::axes::sensor_name;
+use crate::report::figures::short;
+
+/// Times that a scale factor may be away from what is stated, and one sensor's from another's: beyond it, it is another unit of
+/// measure. Nominal scale factors are off by less.
+const LARGEST_RATIO: f64 = 1.5;
+/// How near the logarithm of a factor is to that of a unit of measure: scale factors are nominal.
+const NEAR: f64 = 0.35;
+/// How near one a scale factor is that is no more than an error (a share).
+const NEAR_ONE: f64 = 0.25;
+/// g in m/s², which names the units of accelerometers.
+const G: f64 = 9.806_65;
+/// Degrees in a radian, which names those of gyros.
+const DEG: f64 = 180.0 / std::f64::consts::PI;
+
+/// How many times too large readings are by which mistake.
+const OF_ACCELEROMETERS: [(f64, &str); 5] = [
+    (1.0 / G, "as for readings in g taken as m/s²"),
+    (G, "as for m/s² multiplied by g again"),
+    (1000.0 / G, "as for readings in mg (or cm/s²) taken as m/s²"),
+    (1.0 / 0.3048, "as for ft/s² taken as m/s²"),
+    (1.0 / (1000.0 * G), "as for readings in thousands of g"),
+];
+const OF_GYROS: [(f64, &str); 5] = [
+    (DEG, "as for °/s taken as rad/s"),
+    (1.0 / DEG, "as for rad/s taken as °/s"),
+    (3600.0, "as for °/h taken as °/s"),
+    (3600.0 * DEG, "as for °/h taken as rad/s"),
+    (1.0 / 3600.0, "as for °/s taken as °/h"),
+];
+
+/// What scale factors of a kind of sensors are beside the stated ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beside {
+    /// Of what kind they are, as in "gyro".
+    pub kind: &'static str,
+    /// How many times too large the readings of each are by what is stated.
+    pub times: Vec<f64>,
+    /// Whether anything is stated that all of them can be held against, or only of one beside another.
+    stated: bool,
+    /// Mistakes that such sensors know.
+    mistakes: &'static [(f64, &'static str)],
+    /// What to do where it is none of them.
+    hint: &'static str,
+}
+
+impl Beside {
+    /// Accelerometers: output per specific force, found and stated.
+    #[must_use]
+    pub fn accelerometers(output: AccelOutput, found: &[f64], stated: &[f64]) -> Self {
+        Self {
+            kind: "accelerometer",
+            times: found.iter().zip(stated).map(|(found, stated)| (found / stated).abs()).collect(),
+            stated: output == AccelOutput::MetresPerSecondSquared || !is_placeholder(stated),
+            mistakes: &OF_ACCELEROMETERS,
+            hint: "readings of a converter are neither V nor m/s²: map them as \"raw\" and leave --accelerometer-unit at V, or state \
+                   their scale in the mapping",
+        }
+    }
+
+    /// Gyros: true rate per stated rate, found and stated.
+    #[must_use]
+    pub fn gyros(found: &[f64], stated: &[f64]) -> Self {
+        Self {
+            kind: "gyro",
+            times: found.iter().zip(stated).map(|(found, stated)| (stated / found).abs()).collect(),
+            stated: true,
+            mistakes: &OF_GYROS,
+            hint: "check their unit and scale in the mapping, and the range they were set to",
+        }
+    }
+
+    /// What is wrong, in words.
+    #[must_use]
+    pub fn words(&self) -> Option<String> {
+        self.apart().or_else(|| self.all())
+    }
+
+    /// Sensors that are far from the others of theirs: one column in another unit.
+    fn apart(&self) -> Option<String> {
+        let size = |sensor: &usize| self.times[*sensor];
+        let most = (0..self.times.len()).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        let least = (0..self.times.len()).min_by(|a, b| size(a).total_cmp(&size(b)))?;
+        let ratio = size(&most) / size(&least);
+        let Self { kind, .. } = self;
+        (ratio > LARGEST_RATIO).then(|| {
+            format!(
+                "{kind} {} and {kind} {}: their readings are {} and {} times those of the document, or else the log, \
+                 {} times apart: check the unit of measure of each column in the mapping",
+                sensor_name(most, self.times.len()),
+                sensor_name(least, self.times.len()),
+                short(size(&most)),
+                short(size(&least)),
+                short(ratio),
+            )
+        })
+    }
+
+    /// All sensors far from what is stated.
+    #[expect(clippy::cast_precision_loss, reason = "three to eight sensors")]
+    fn all(&self) -> Option<String> {
+        let logs: f64 = self.times.iter().map(|times| libm::log(*times)).sum();
+        let times = libm::exp(logs / self.times.len() as f64);
+        (self.stated && times.is_finite() && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&times)).then(|| {
+            format!(
+                "{}s: their readings are {} times those of the document, or else the log, {}: {}. The new document \
+                 has the fitted scale factors, for logs with this mapping",
+                self.kind,
+                short(times),
+                self.mistake(times).unwrap_or("as for no usual unit of measure"),
+                if self.mistake(times).is_some() { "correct the unit of measure in the mapping" } else { self.hint },
+            )
+        })
+    }
+
+    /// The mistake that makes readings so many times too large.
+    fn mistake(&self, times: f64) -> Option<&'static str> {
+        let away = |factor: f64| libm::log(times / factor).abs();
+        let (factor, words) = self.mistakes.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0)))?;
+        (away(*factor) < NEAR).then_some(*words)
+    }
+}
+
+/// Whether scale factors hold the place of what is to be found: they are all one.
+fn is_placeholder(stated: &[f64]) -> bool {
+    stated.iter().all(|k| (k - 1.0).abs() <= 1e-9)
+}
+
+/// Words where a log that is said to be in V is in m/s² by its scale factors.
+#[must_use]
+pub fn already_m_per_s2(output: AccelOutput, found: &[f64], stated: &[f64]) -> Option<String> {
+    let placeholder = output == AccelOutput::Volts && is_placeholder(stated);
+    let near = found.iter().all(|k| (k - 1.0).abs() < NEAR_ONE);
+    (placeholder && near).then(|| {
+        "accelerometers: 1 V of the log is about 1 m/s²: it is already in m/s²; state --accelerometer-unit m/s2, \
+         otherwise the document has V"
+            .to_owned()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use isotherm_protocol::document::AccelOutput::{MetresPerSecondSquared, Volts};
+
+    #[test]
+    fn scale_factors_tell_the_unit_of_measure() {
+        let accel = |output, found: f64, stated: f64| {
+            let found = [found * 1.02, found * 0.97, found * 1.01];
+            Beside::accelerometers(output, &found, &[stated; 3]).words()
+        };
+        assert_eq!(accel(MetresPerSecondSquared, 1.2, 1.0), None);
+        assert_eq!(accel(Volts, 414.0, 1.0), None, "nothing is stated");
+        let named = |output, found, stated, name: &str| {
+            let words = accel(output, found, stated).unwrap();
+            assert!(words.contains(name), "{words}");
+        };
+        named(MetresPerSecondSquared, 0.102, 1.0, "in g taken as m/s²");
+        named(MetresPerSecondSquared, 9.8, 1.0, "multiplied by g again");
+        named(MetresPerSecondSquared, 102.0, 1.0, "in mg (or cm/s²)");
+        named(MetresPerSecondSquared, 2.2, 1.0, "as for no usual unit of measure");
+        named(MetresPerSecondSquared, 414.0, 1.0, "map them as \"raw\"");
+        named(Volts, 4060.0, 414.0, "multiplied by g again");
+        let apart = Beside::accelerometers(Volts, &[414.0, 828.0, 412.0], &[1.0; 3]).words().unwrap();
+        assert!(
+            apart.starts_with("accelerometer y and accelerometer z: ") && apart.contains(" 2.01 times apart"),
+            "{apart}"
+        );
+        let gyros = |found: [f64; 3], stated| Beside::gyros(&found, &[stated; 3]).words();
+        assert_eq!(gyros([1.309, -1.312, 1.311], 1.0), None);
+        assert!(gyros([0.0302; 3], 1.0).unwrap().contains("33.1 times those of the document"));
+        assert!(gyros([0.0229; 3], 1.0).unwrap().contains("°/s taken as rad/s"));
+        assert!(
+            gyros([6.5; 3], 1.3)
+                .unwrap()
+                .contains("as for no usual unit of measure: check their unit and scale")
+        );
+        let one = gyros([1.3, 75.0, 1.3], 1.0).unwrap();
+        assert!(one.starts_with("gyro z and gyro y: ") && one.contains(" 57.7 times apart"), "{one}");
+    }
+
+    #[test]
+    fn a_log_in_metres_per_second_squared_is_not_called_v() {
+        assert!(already_m_per_s2(Volts, &[1.02, 0.97, 1.01], &[1.0; 3]).is_some());
+        assert_eq!(already_m_per_s2(Volts, &[0.102, 0.103, 0.101], &[1.0; 3]), None);
+        assert_eq!(already_m_per_s2(MetresPerSecondSquared, &[1.0; 3], &[1.0; 3]), None);
+    }
+}

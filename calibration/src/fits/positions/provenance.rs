@@ -1,0 +1,131 @@
+//! Where the numbers of the document come from, and what "before" means.
+
+use isotherm_protocol::document::{Document, Shape};
+use serde_json::json;
+use toml::Table;
+
+use super::budget::ARCSEC_PER_RAD;
+use super::fit::{Analysis, Settings};
+use super::hysteresis::Return;
+use super::model::SMALL;
+use crate::document::written::tidy;
+use crate::error::Error;
+use crate::report::{FitReport, Sigmas};
+
+/// The document that "before" stands for: the one that was given, or else one scale factor for all accelerometers, no bias, axes
+/// along the case.
+#[must_use]
+pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -> Document {
+    let mut document = base.clone();
+    let scales = analysis.fit.guess.iter().map(|guess| guess.scale / gravity);
+    #[expect(clippy::cast_precision_loss, reason = "at most eight accelerometers")]
+    let mean = scales.sum::<f64>() / analysis.fit.guess.len().max(1) as f64;
+    if let Some(accel) = document.accel.as_mut().filter(|_| !given) {
+        for (sensor, guess) in accel.sensor.iter_mut().zip(&analysis.fit.guess) {
+            let unit = sensor.scale_factor.unit();
+            // An accelerometer that is mounted the other way round is no error of its scale factor.
+            let sign =
+                if guess.axis.iter().copied().fold(0.0, |a: f64, c| if c.abs() > a.abs() { c } else { a })
+                    < 0.0
+                {
+                    -1.0
+                } else {
+                    1.0
+                };
+            let shape = Shape::Constant { value: tidy(sign * mean) };
+            sensor.scale_factor = isotherm_protocol::document::Curve::new(shape).in_unit(unit);
+        }
+    }
+    document
+}
+
+/// What the document says of the fit beside its coefficients.
+///
+/// # Errors
+/// [`Error::Document`] where it cannot be written, which would be a mistake here.
+pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> Result<Table, Error> {
+    let bent = analysis.quadratic.as_ref().is_some_and(|found| found.3 < 1e-3);
+    let coefficients: serde_json::Map<String, serde_json::Value> = report
+        .coefficients
+        .iter()
+        .map(|c| {
+            (
+                c.name.clone(),
+                json!({ "value": c.value, "sigma": c.sigma.unwrap_or(f64::NAN), "unit": c.unit }),
+            )
+        })
+        .filter(|(_, value)| value["sigma"].is_number() && value["value"].is_number())
+        .collect();
+    let fit = &analysis.fit;
+    let covariance = fit.axes_covariance(&settings.plan, 0) * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
+    let covariance: Vec<Vec<f64>> = covariance
+        .row_iter()
+        .map(|row| row.iter().map(|c| tidy(c * analysis.widened * analysis.widened)).collect())
+        .collect();
+    let mut about = json!({
+        "gravity_m_per_s2": settings.gravity,
+        "positions": analysis.poses.len(),
+        "temperatures_deg_c": analysis.levels_deg_c.iter().filter(|t| t.is_finite()).collect::<Vec<_>>(),
+        "positioning_arcsec": settings.positioning_rad * ARCSEC_PER_RAD,
+        "levelling_arcsec": settings.levelling_rad * ARCSEC_PER_RAD,
+        "noise_output2_s": analysis.weights.intensity,
+        "chi_square": fit.solution.chi_square,
+        "degrees_of_freedom": fit.solution.degrees,
+        "standard_errors_widened_by": analysis.widened,
+        "quadratic_axes": bent,
+        "verdict": report.headline(),
+        "warnings": report.warnings,
+        "coefficients": coefficients,
+        // Two angles per accelerometer across its axis, at the reference.
+        "axes_covariance_arcsec2": covariance,
+        "relative_scale_sigma": scale_sigmas(analysis),
+    });
+    if let (false, Some(about)) = (analysis.returns.is_empty(), about.as_object_mut()) {
+        about.insert("hysteresis".to_owned(), hysteresis(analysis).into());
+    }
+    Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+}
+
+/// Turns of the axes (″) over thermal cycles, with their standard errors.
+fn hysteresis(analysis: &Analysis) -> Vec<serde_json::Value> {
+    let of = |back: &Return| {
+        let [turn, sigma] = [0, 1].map(|i| back.turns.iter().map(|turn| tidy(turn[i])).collect::<Vec<f64>>());
+        json!({ "temperature_deg_c": tidy(back.deg_c), "turn_arcsec": turn, "sigma_arcsec": sigma, "accident": tidy(back.accident) })
+    };
+    analysis.returns.iter().map(of).collect()
+}
+
+/// Standard errors of scale factors, biases and axes, for what compares documents.
+#[must_use]
+pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    let Some(accel) = &document.accel else { return sigmas };
+    let fit = &analysis.fit;
+    let of_sensor = fit.degrees.of_sensor();
+    let own = fit.degrees.sensor + 1;
+    for (index, (sensor, guess)) in accel.sensor.iter().zip(&fit.guess).enumerate() {
+        let of = |from: usize, scale: f64| -> Vec<f64> {
+            let mut factor = SMALL * guess.scale * scale * analysis.widened;
+            let sigma = |place| {
+                let sigma = tidy(fit.solution.sigma(index * of_sensor + place) * factor);
+                factor /= analysis.half_deg_c;
+                sigma
+            };
+            (from..from + own).map(sigma).collect()
+        };
+        sigmas.put("accel", &sensor.name, "scale_factor", of(0, 1.0 / settings.gravity));
+        sigmas.put("accel", &sensor.name, "bias", of(own, 1.0));
+        let axis = fit.axis_sigma(&settings.plan, index, 0);
+        let arcsec = axis.map(|sigma| tidy(sigma * ARCSEC_PER_RAD * analysis.widened));
+        sigmas.put("accel", &sensor.name, "axis_arcsec", arcsec.to_vec());
+    }
+    sigmas
+}
+
+/// Standard errors of the scale factors (relative).
+fn scale_sigmas(analysis: &Analysis) -> Vec<f64> {
+    let solution = &analysis.fit.solution;
+    let sensors = analysis.fit.guess.len();
+    let of_sensor = analysis.fit.degrees.of_sensor();
+    (0..sensors).map(|sensor| solution.sigma(sensor * of_sensor) * SMALL * analysis.widened).collect()
+}

@@ -1,0 +1,162 @@
+//! Axes of gyros and accelerometers over temperature side by side, as 004 has them: what both do is the case's, what differs a sensor's.
+
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_protocol::document::Document;
+
+use super::over_temperature::{Level, OverTemperature};
+use crate::axes::{AXES, main_axis};
+use crate::fits::positions::budget::ARCSEC_PER_RAD;
+use crate::report::Sigmas;
+use crate::report::figures::fixed;
+
+/// Height of a panel (CSS pixels).
+const HEIGHT: u32 = 150;
+/// Standard errors of a 95 % interval.
+const WIDE: f64 = 1.96;
+
+/// An element of C over temperature, of a gyro and of the accelerometer along the same case axis.
+struct Element<'a> {
+    over: &'a OverTemperature,
+    gyro: usize,
+    /// Case axis that the element is along.
+    along: usize,
+    accel: Option<Accel>,
+}
+
+/// An element of an accelerometer's axis (″, ″/°C, °C), and its standard error (″).
+#[derive(Clone, Copy)]
+struct Accel {
+    index: usize,
+    value: f64,
+    slope: f64,
+    reference_deg_c: f64,
+    sigma: Option<f64>,
+}
+
+impl Accel {
+    fn at(&self, deg_c: f64) -> f64 {
+        self.value + self.slope * (deg_c - self.reference_deg_c)
+    }
+}
+
+/// The elements of all gyros that say where they point.
+fn elements<'a>(over: &'a OverTemperature, document: &Document) -> Vec<Element<'a>> {
+    let sigmas = Sigmas::of(document);
+    let of_accel = |main: usize, along: usize| {
+        let accel = document.accel.as_ref()?;
+        let index = accel.orientation.rows.iter().position(|row| main_axis(row) == main)?;
+        let thermal = accel.orientation.thermal.as_ref();
+        let slope = thermal.and_then(|thermal| thermal.slopes_arcsec_per_deg_c.get(index));
+        let name = &accel.sensor.get(index)?.name;
+        Some(Accel {
+            index,
+            value: accel.orientation.rows[index][along] * ARCSEC_PER_RAD,
+            slope: slope.map_or(0.0, |slope| slope[along]),
+            reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
+            sigma: sigmas.get("accel", name, "axis_arcsec").and_then(|sigma| sigma.get(along).copied()),
+        })
+    };
+    let gyros = over.lines.iter().enumerate();
+    gyros
+        .flat_map(|(gyro, line)| {
+            let main = main_axis(&line.axis);
+            (0..3).filter(move |along| *along != main).map(move |along| (gyro, main, along))
+        })
+        .map(|(gyro, main, along)| Element { over, gyro, along, accel: of_accel(main, along) })
+        .collect()
+}
+
+impl Element<'_> {
+    /// The gyro's element at a temperature with its standard error (″).
+    fn measured(&self, level: &Level) -> [f64; 2] {
+        let found = &level.gyros[self.gyro];
+        let value = found.axis.map_or(f64::NAN, |axis| axis[self.along]);
+        [value * ARCSEC_PER_RAD, found.axis_sigma[self.along] * ARCSEC_PER_RAD]
+    }
+
+    fn line_at(&self, deg_c: f64) -> f64 {
+        let line = &self.over.lines[self.gyro];
+        let away = deg_c - self.over.reference_deg_c;
+        (line.axis[self.along] + line.slope[self.along] * away) * ARCSEC_PER_RAD
+    }
+}
+
+/// The figure.
+pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
+    let name = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
+    let panel = |element: Element<'_>| {
+        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
+            name: name.to_owned(),
+            ink,
+            form,
+            samples: Samples::points(points),
+        };
+        let all: Vec<(f64, [f64; 2])> =
+            over.levels.iter().map(|level| (level.deg_c, element.measured(level))).collect();
+        let bars = all.iter().flat_map(|(deg_c, [value, sigma])| {
+            [(*deg_c, value - WIDE * sigma), (*deg_c, value + WIDE * sigma), (*deg_c, f64::NAN)]
+        });
+        let ends = || all.iter().map(|(deg_c, _)| *deg_c);
+        let dots = all.iter().map(|(deg_c, [value, _])| (*deg_c, *value)).collect();
+        let mut content = vec![
+            series("gyro, each temperature", Ink::Raw, Form::Dots, dots),
+            series("95 %", Ink::Faint, Form::Line, bars.collect()),
+            series("gyro", Ink::First, Form::Line, ends().map(|t| (t, element.line_at(t))).collect()),
+        ];
+        if let Some(accel) = element.accel {
+            let own = ends().map(|t| (t, accel.at(t))).collect();
+            content.push(series("accelerometer", Ink::Second, Form::Line, own));
+            if let Some(sigma) = accel.sigma {
+                let bars = ends().flat_map(|t| {
+                    [(t, accel.at(t) - WIDE * sigma), (t, accel.at(t) + WIDE * sigma), (t, f64::NAN)]
+                });
+                content.push(series("95 % of it", Ink::Faint, Form::Line, bars.collect()));
+            }
+            let apart = ends().map(|t| (t, element.line_at(t) - accel.at(t))).collect();
+            content.push(series("gyro less accelerometer", Ink::Third, Form::Line, apart));
+        }
+        Panel {
+            title: format!("gyro {} along {}", name(element.gyro), AXES[element.along]),
+            unit: "″".to_owned(),
+            height: HEIGHT,
+            logarithmic: false,
+            content: Content::Series(content),
+        }
+    };
+    Chart {
+        caption: "Elements of C over temperature: gyros, the document's accelerometers, and the difference."
+            .to_owned(),
+        x: Axis::of("temperature", "°C"),
+        panels: elements(over, document).into_iter().map(panel).collect(),
+        marks: Vec::new(),
+    }
+}
+
+/// The figure's numbers.
+pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
+    let elements = elements(over, document);
+    let gyro = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
+    let accel = |index: usize| {
+        let sensors = document.accel.as_ref().map(|accel| &accel.sensor);
+        sensors.and_then(|sensors| sensors.get(index)).map_or("", |sensor| sensor.name.as_str())
+    };
+    let heads = elements.iter().map(|element| {
+        let along = AXES[element.along];
+        match element.accel {
+            None => format!("gyro {} along {along}", gyro(element.gyro)),
+            Some(own) => {
+                format!("gyro {} along {along} (less accelerometer {})", gyro(element.gyro), accel(own.index))
+            }
+        }
+    });
+    let head = std::iter::once("°C".to_owned()).chain(heads).collect();
+    let row = |level: &Level| {
+        let cell = |element: &Element<'_>| {
+            let [value, sigma] = element.measured(level);
+            let apart = element.accel.map(|own| format!(" ({})", fixed(value - own.at(level.deg_c), 1)));
+            format!("{} ± {sigma:.1}{}", fixed(value, 1), apart.unwrap_or_default())
+        };
+        std::iter::once(fixed(level.deg_c, 1)).chain(elements.iter().map(cell)).collect()
+    };
+    Table { head, rows: over.levels.iter().map(row).collect() }
+}

@@ -1,0 +1,307 @@
+//! The whole procedure: bin, find the steps, fit, write, judge.
+
+use isotherm_correction::earth::Place;
+use isotherm_protocol::document::Document;
+
+use super::attitude;
+use super::checks::{no_result, one_way};
+use super::document;
+use super::judge::{errors, verdicts};
+use super::matching::Matched;
+use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
+use super::model::{GyroRates, solve};
+use super::over_temperature::OverTemperature;
+use super::read::{Turned, read, whole_turns};
+use super::steps::Step;
+use crate::axes::main_axis;
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::finding::{Finding, Kind};
+use crate::fits::modes::document::{row, widened};
+use crate::report::words::of_logs;
+use crate::report::{FitReport, Verdict};
+use crate::robust::median;
+use crate::runs::{Run, Watch};
+
+/// Rounds in which the Earth's turning and the fit settle.
+const ROUNDS: usize = 3;
+
+/// What the fit starts from.
+#[derive(Debug, Clone)]
+pub struct Wanted<'a> {
+    /// Runs.
+    pub runs: &'a [Run],
+    /// Runs that the fit does not see and is judged on.
+    pub judge: &'a [Run],
+    /// What the table did in all of them; the numbers of the judging runs follow on those of the others.
+    pub steps: &'a [Step],
+    /// Whether the document's weights are near those of the unit; without a document those of counts are not.
+    pub scale_known: bool,
+    /// Document that gives channels, filter, biases, and the scale and axes that are to be replaced.
+    pub base: &'a Document,
+    /// Where the table is, and how the case stands on it at the beginning of each run; one for all, one for each, or none.
+    pub place: &'a [Place],
+    /// Standard deviation of the table's rates (ppm).
+    pub table_ppm: f64,
+    /// Whether the bias that is found is written too.
+    pub with_bias: bool,
+}
+
+/// A step with what was measured in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// The step and its plateau.
+    pub matched: Matched,
+    /// True rate of the case (°/h).
+    pub rate: [f64; 3],
+    /// Error of the corrected rate in case axes (°/h), before and after.
+    pub error: [[f64; 3]; 2],
+}
+
+/// What came of it.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// The document.
+    pub written: Written,
+    /// What was found of each gyro, or why nothing was.
+    pub gyros: Vec<Result<GyroRates, Kind>>,
+    /// The steps.
+    pub steps: Vec<Measured>,
+    /// The steps of the judging runs.
+    pub judged: Vec<Measured>,
+    /// Whether the Earth's rate was taken off in a stated attitude.
+    pub earth_known: bool,
+    /// Whether the weights of the base are near those of the unit.
+    pub scale_known: bool,
+    /// White noise of each gyro (°/√h).
+    pub walk: Vec<f64>,
+    /// Verdicts, by case axis.
+    pub verdicts: Vec<Verdict>,
+    /// Mean temperature of each run (°C).
+    pub temperatures_deg_c: Vec<f64>,
+    /// Axes and scale factors over temperature, where there are several.
+    pub over_temperature: Option<OverTemperature>,
+    /// What is to be said.
+    pub warnings: Vec<Finding>,
+}
+
+/// Makes scale, axes and the rest from runs on a rate table.
+///
+/// # Errors
+/// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
+pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
+    let mut warnings: Vec<Finding> = one_way(wanted.steps).map(Finding::from).into_iter().collect();
+    let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
+    let judging = runs.split_off(wanted.runs.len());
+    let sensors = wanted.base.gyro.sensor.len();
+    let mut walk = vec![0.0; sensors];
+    let mut axes: Vec<[f64; 3]> = (0..sensors).map(|sensor| row(wanted.base, sensor, f64::NAN)).collect();
+    let mut gains = first_gains(&runs, &axes);
+    let mut biases = vec![0.0; sensors];
+    let mut gyros = Vec::new();
+    let mut rates = Vec::new();
+    for _ in 0..ROUNDS {
+        let earth = earth_in_bins(&runs, &axes, &gains, &biases);
+        rates = true_rates(&runs, &earth);
+        for (sensor, walk) in walk.iter_mut().enumerate() {
+            *walk = white(wanted.base, &runs, &earth, sensor, axes[sensor].map(|x| x * gains[sensor]));
+        }
+        gyros = (0..sensors)
+            .map(|sensor| {
+                solve(&points(wanted, &runs, &rates, sensor, walk[sensor]), axes_of(wanted.base, sensor))
+            })
+            .collect();
+        for (sensor, found) in gyros.iter().enumerate() {
+            if let Ok(found) = found {
+                gains[sensor] = found.gain[0];
+                biases[sensor] = found.bias[0] * found.gain[0].abs();
+                if let Some(axis) = found.axis {
+                    axes[sensor] = axis;
+                }
+            }
+        }
+    }
+    let over_temperature = match OverTemperature::of(wanted, &runs, &rates, &walk) {
+        Ok(found) => found,
+        Err(deg_c) => {
+            warnings.push(Kind::NotEachTemperature { deg_c }.into());
+            None
+        }
+    };
+    if let Some(over) = &over_temperature {
+        for (sensor, found) in gyros.iter_mut().enumerate() {
+            let points = over.at_reference(wanted, (&runs, &rates), sensor, &walk);
+            *found = solve(&points, axes_of(wanted.base, sensor));
+        }
+    }
+    let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
+    let mut doubted = Vec::new();
+    for (sensor, found) in gyros.iter_mut().enumerate() {
+        let what =
+            found.as_ref().ok().and_then(|found| no_result(found, &flat, axes[sensor], wanted.scale_known));
+        if let Some(what) = what {
+            *found = Err(what.clone());
+            doubted.push((sensor, what));
+        }
+    }
+    if gyros.iter().all(Result::is_err) {
+        let named = wanted.base.gyro.sensor.iter().zip(gyros);
+        return Err(Error::Found(
+            named.filter_map(|(sensor, found)| Some(found.err()?.of_gyro(&sensor.name))).collect(),
+        ));
+    }
+    let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
+    let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
+    let earth = earth_in_bins(&judging, &axes, &gains, &biases);
+    let steps = measured(&runs, &rates);
+    let judged = measured(&judging, &true_rates(&judging, &earth));
+    runs.extend(judging);
+    warnings.extend(attitude::doubts(wanted.place, &runs, (&axes, &gains)));
+    let mut made = Made {
+        written: Written::of(wanted.base)?,
+        gyros,
+        steps,
+        judged,
+        earth_known: !wanted.place.is_empty(),
+        scale_known: wanted.scale_known,
+        walk,
+        verdicts: Vec::new(),
+        temperatures_deg_c: temperatures,
+        over_temperature,
+        warnings,
+    };
+    made.settle(wanted, axes_deg_c, &doubted, &mut watch)?;
+    Ok(made)
+}
+
+/// Reads the runs and, behind them, the judging ones.
+fn read_all<W: Watch>(
+    wanted: &Wanted<'_>,
+    watch: &mut impl FnMut() -> W,
+    warnings: &mut Vec<Finding>,
+) -> Result<Vec<Turned>, Error> {
+    let (mut runs, mut reasons) = (Vec::new(), Vec::new());
+    for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
+        match read(wanted, number, run, &mut *watch)? {
+            Ok(read) => runs.push(read),
+            Err(reason) => reasons.push(reason),
+        }
+    }
+    if !reasons.is_empty() {
+        return Err(Error::Found(reasons));
+    }
+    let names = wanted.runs.iter().chain(wanted.judge).map(|run| run.name.as_str());
+    let troubles: Vec<(&str, String)> = names
+        .zip(&runs)
+        .flat_map(|(name, run)| run.binned.troubles.iter().map(move |words| (name, words.clone())))
+        .collect();
+    warnings.extend(of_logs(&troubles).into_iter().map(|words| Kind::Passed { words }.into()));
+    if wanted.place.is_empty() {
+        warnings.push(Kind::NoAttitude.into());
+        let rates: Vec<f64> = runs.iter_mut().flat_map(whole_turns).collect();
+        if !rates.is_empty() {
+            warnings.push(Kind::ShortSteps { rates }.into());
+        }
+    }
+    Ok(runs)
+}
+
+/// The steps of runs with their true rates, not judged yet.
+fn measured(runs: &[Turned], rates: &[Vec<[f64; 3]>]) -> Vec<Measured> {
+    runs.iter()
+        .zip(rates)
+        .flat_map(|(run, rates)| run.matched.iter().cloned().zip(rates.iter().copied()))
+        .map(|(matched, rate)| Measured { matched, rate, error: [[0.0; 3]; 2] })
+        .collect()
+}
+
+impl Made {
+    /// Writes and judges; gyros that make an axis worse keep weight and axis, and all is judged once more. Axes of gyros that
+    /// came to nothing are refused.
+    fn settle<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        axes_deg_c: Option<f64>,
+        doubted: &[(usize, Kind)],
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        self.judge(wanted, 0, watch)?;
+        self.write(wanted, axes_deg_c, watch)?;
+        self.verdicts = verdicts(&self.steps, &self.judged);
+        let worse: Vec<usize> =
+            (0..self.verdicts.len()).filter(|axis| !self.verdicts[*axis].accepted).collect();
+        let main_axes: Vec<usize> = wanted.base.gyro.orientation.rows.iter().map(main_axis).collect();
+        if !worse.is_empty() {
+            for (main, gyro) in main_axes.iter().zip(&mut self.gyros).filter(|(main, _)| worse.contains(main))
+            {
+                *gyro = Err(Kind::Worse { axis: *main });
+            }
+            self.write(wanted, axes_deg_c, watch)?;
+            for (axis, verdict) in verdicts(&self.steps, &self.judged).into_iter().enumerate() {
+                if !worse.contains(&axis) {
+                    self.verdicts[axis] = verdict;
+                }
+            }
+        }
+        for (sensor, what) in doubted {
+            if let Some(verdict) = main_axes.get(*sensor).and_then(|axis| self.verdicts.get_mut(*axis)) {
+                *verdict = verdict.clone().refused(what.to_string());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is left of the fits, and judges it.
+    fn write<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        axes_deg_c: Option<f64>,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        // What was fitted at the reference needs no slopes to come there.
+        let axes_deg_c = axes_deg_c.filter(|_| self.over_temperature.is_none());
+        let mut document = document::fitted(wanted.base, &self.gyros, axes_deg_c, wanted.with_bias);
+        if let Some(over) = &self.over_temperature {
+            over.put(&mut document, &self.gyros);
+        }
+        self.written = Written::of(&document)?;
+        self.judge(wanted, 1, watch)
+    }
+
+    /// Errors of all steps with the document as it stands: before (0), after (1).
+    fn judge<W: Watch>(
+        &mut self,
+        wanted: &Wanted<'_>,
+        sample: usize,
+        watch: &mut impl FnMut() -> W,
+    ) -> Result<(), Error> {
+        for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
+            let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
+            errors((number, run), &self.written, steps, sample, &mut *watch)?;
+        }
+        Ok(())
+    }
+
+    /// Median of the runs' mean temperatures (°C).
+    #[must_use]
+    pub fn temperature_deg_c(&self) -> Option<f64> {
+        (!self.temperatures_deg_c.is_empty()).then(|| median(&self.temperatures_deg_c))
+    }
+
+    /// Lowest and highest mean temperature of a run (°C), in tenths of a degree.
+    #[must_use]
+    pub fn range_deg_c(&self) -> Option<[f64; 2]> {
+        let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
+        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(widened)
+    }
+
+    /// The report.
+    #[must_use]
+    pub fn report(&self) -> FitReport {
+        super::report::report(self)
+    }
+}
+
+fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
+    row(base, sensor, f64::NAN)
+}

@@ -1,0 +1,145 @@
+//! True rates of the steps, what the gyros showed in them, and with which noise.
+
+use isotherm_protocol::document::{Document, GyroOutput};
+use nalgebra::{DMatrix, DVector};
+
+use super::bins::Bin;
+use super::earth::carried;
+use super::fit::Wanted;
+use super::matching::Matched;
+use super::model::Point;
+use super::read::Turned;
+use crate::fits::modes::document::count_arcsec;
+use crate::lsq::linear::{self, SINGULAR, Weak};
+
+/// White noise of a gyro from second differences of its bins within steps (°/√h), less what the Earth's turning shows along
+/// its `gain`.
+pub(super) fn white(
+    base: &Document,
+    runs: &[Turned],
+    earth: &[Vec<[f64; 3]>],
+    sensor: usize,
+    gain: [f64; 3],
+) -> f64 {
+    let count = count_arcsec(base, sensor);
+    let (mut sum, mut number) = (0.0, 0.0);
+    for (run, earth) in runs.iter().zip(earth) {
+        for one in &run.matched {
+            let own = |index: usize| {
+                let earth = earth.get(index).copied().unwrap_or_default();
+                let seen: f64 = gain.iter().zip(earth).map(|(a, b)| a * b).sum();
+                run.binned.bins[index].rate[sensor] - seen
+            };
+            for index in (one.plateau.bins[0] + 1)..one.plateau.bins[1].saturating_sub(1) {
+                let second = own(index - 1) - 2.0 * own(index) + own(index + 1);
+                let length = run.binned.bins[index].good_s;
+                if second.is_finite() && length > 0.0 {
+                    // White: 6·N²/L. Whole counts, differenced three times: 20·(1/12)·q²/L².
+                    let counted = 20.0 / 12.0 * count * count / (length * length);
+                    sum += (second * second - counted) * length / 6.0;
+                    number += 1.0;
+                }
+            }
+        }
+    }
+    let white = if number > 0.0 { (sum / number).max(0.0) } else { 0.0 };
+    // Neighbouring second differences hang together: about a third of them are independent.
+    let upper = 1.0 + 2.0 * (2.0 / (number / 3.0_f64).max(2.0)).sqrt();
+    (white * upper).sqrt() / 60.0
+}
+
+/// First guess of `K_old/K` along the document's axes.
+pub(super) fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
+    let steps: Vec<&Matched> = runs.iter().flat_map(|run| &run.matched).collect();
+    axes.iter()
+        .enumerate()
+        .map(|(sensor, axis)| {
+            let along = |one: &Matched| axis.iter().zip(one.step.axis).map(|(a, b)| a * b).sum::<f64>();
+            let stated = DMatrix::from_fn(steps.len(), 1, |i, _| {
+                3600.0 * steps[i].step.rate_deg_per_s * along(steps[i])
+            });
+            let shown = DVector::from_fn(steps.len(), |i, _| steps[i].plateau.rate[sensor]);
+            let found =
+                linear::solve(&stated, &shown, Weak::Refuse(SINGULAR)).map(|found| found.coefficients[0]);
+            found.ok().filter(|gain| *gain != 0.0).unwrap_or(1.0)
+        })
+        .collect()
+}
+
+/// What makes a rate in case axes of the rates along input axes, by least squares.
+pub(super) fn in_case(axes: &[[f64; 3]]) -> impl Fn(&dyn Fn(usize) -> f64) -> [f64; 3] + '_ {
+    let design = DMatrix::from_fn(axes.len(), 3, |sensor, axis| axes[sensor][axis]);
+    // Axes of a document span space.
+    let inverse = linear::inverse(&design).unwrap_or_else(|_| DMatrix::identity(3, 3));
+    let solved = inverse * design.transpose();
+    move |along| {
+        let rates: Vec<f64> = (0..solved.ncols()).map(along).collect();
+        [0, 1, 2]
+            .map(|axis| rates.iter().enumerate().map(|(sensor, rate)| solved[(axis, sensor)] * rate).sum())
+    }
+}
+
+/// Mean of the Earth's rate in case axes over each bin of each run (°/h); none where it is not known.
+pub(super) fn earth_in_bins(
+    runs: &[Turned],
+    axes: &[[f64; 3]],
+    gains: &[f64],
+    biases: &[f64],
+) -> Vec<Vec<[f64; 3]>> {
+    let in_case = in_case(axes);
+    let turning = |bin: &Bin| in_case(&|sensor| (bin.rate[sensor] - biases[sensor]) / gains[sensor]);
+    let of_run = |run: &Turned| {
+        run.earth_start.map(|start| carried(&run.binned.bins, start, turning)).unwrap_or_default()
+    };
+    runs.iter().map(of_run).collect()
+}
+
+/// True rates of all steps in case axes (°/h): the table's and the Earth's.
+pub(super) fn true_rates(runs: &[Turned], earth: &[Vec<[f64; 3]>]) -> Vec<Vec<[f64; 3]>> {
+    let of_run = |(run, earth): (&Turned, &Vec<[f64; 3]>)| {
+        let of_step = |one: &Matched| {
+            let table = one.step.axis.map(|axis| axis * 3600.0 * one.step.rate_deg_per_s);
+            let [begin, end] = one.plateau.bins;
+            let (mut sum, mut good) = ([0.0; 3], 0.0);
+            let bins = run.binned.bins.get(begin..end).unwrap_or_default();
+            for (bin, earth) in bins.iter().zip(earth.get(begin..end).unwrap_or_default()) {
+                good += bin.good_s;
+                sum.iter_mut().zip(earth).for_each(|(sum, earth)| *sum += earth * bin.good_s);
+            }
+            if good > 0.0 { [0, 1, 2].map(|axis| table[axis] + sum[axis] / good) } else { table }
+        };
+        run.matched.iter().map(of_step).collect()
+    };
+    runs.iter().zip(earth).map(of_run).collect()
+}
+
+/// What a gyro showed in all steps, with the noise of the means.
+pub(super) fn points(
+    wanted: &Wanted<'_>,
+    runs: &[Turned],
+    rates: &[Vec<[f64; 3]>],
+    sensor: usize,
+    walk: f64,
+) -> Vec<Point> {
+    let count =
+        if wanted.base.gyro.output == GyroOutput::Counts { count_arcsec(wanted.base, sensor) } else { 0.0 };
+    let mut points = Vec::new();
+    for (run, rates) in runs.iter().zip(rates) {
+        for (one, rate) in run.matched.iter().zip(rates) {
+            let bins = run.binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
+            let good: f64 = bins.iter().map(|bin| bin.good_s).sum();
+            let white = 3600.0 * walk * walk / good;
+            let counted = count * count / 6.0 / (good * good);
+            let table = wanted.table_ppm * 1e-6 * 3600.0 * one.step.rate_deg_per_s;
+            let variance = white + counted + table * table;
+            // Readings without any noise are as good as their digits.
+            let floor = 1e-9 * (1.0 + one.plateau.rate[sensor].abs());
+            points.push(Point {
+                rate: *rate,
+                shown: one.plateau.rate[sensor],
+                sigma: variance.sqrt().max(floor),
+            });
+        }
+    }
+    points
+}

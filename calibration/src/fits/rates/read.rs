@@ -1,0 +1,146 @@
+//! A run on the table: its bins and its steps.
+
+use super::bins::{BIN_S, Bin, Binned, binned};
+use super::checks::{dead, steady, turned_as_stated};
+use super::fit::Wanted;
+use super::matching::{Matched, matched, slow};
+use super::plateaus::{self, Plateau};
+use super::steps::Step;
+use crate::error::Error;
+use crate::finding::{Finding, Kind};
+use crate::fits::modes::document::count_arcsec;
+use crate::fits::modes::model::deg_per_h;
+use crate::runs::{Run, Watch};
+
+/// Share of a step's ticks that may be lost.
+const LOST: f64 = 0.05;
+/// A whole turn (°).
+const TURN_DEG: f64 = 360.0;
+
+/// One run with its steps.
+pub(super) struct Turned {
+    pub(super) binned: Binned,
+    pub(super) matched: Vec<Matched>,
+    /// Where the table stood, whether that was stated or not.
+    pub(super) rests: Vec<Plateau>,
+    pub(super) earth_start: Option<[f64; 3]>,
+}
+
+/// Reads one run and finds its steps; the inner error is a reason to refuse.
+pub(super) fn read<W: Watch>(
+    wanted: &Wanted<'_>,
+    number: usize,
+    run: &Run,
+    watch: &mut impl FnMut() -> W,
+) -> Result<Result<Turned, Finding>, Error> {
+    let binned = binned(run, wanted.base, &mut *watch)?;
+    let counts: Vec<f64> =
+        (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
+    let found = plateaus::find(&binned.bins, &counts);
+    let own: Vec<Step> = wanted.steps.iter().filter(|step| step.run == number).copied().collect();
+    if own.is_empty() {
+        return Ok(Err(Kind::NoStepStated { log: run.name.clone() }.in_log(number)));
+    }
+    if let Some(sensor) = dead(&binned.bins) {
+        let name = wanted.base.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str());
+        let mut finding = Kind::Dead { log: run.name.clone() }.of_gyro(name);
+        finding.place.log = Some(number);
+        return Ok(Err(finding));
+    }
+    let matched = match matched(&own, &binned.bins, &found) {
+        Ok(matched) => matched,
+        Err(kind) => {
+            return Ok(Err(match gaps(&binned.bins) {
+                None => kind,
+                Some(share) => Kind::BesideGaps { kind: Box::new(kind), share },
+            }
+            .in_log(number)));
+        }
+    };
+    let stated = turned_as_stated(&matched, wanted.base, wanted.scale_known)
+        .and_then(|()| steady(&matched, &binned.bins));
+    if let Err(kind) = stated {
+        return Ok(Err(kind.in_log(number)));
+    }
+    for one in &matched {
+        let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
+        let [good, all] =
+            bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
+        let window_s = one.plateau.window_s;
+        if good < (1.0 - LOST) * all {
+            return Ok(Err(Kind::Lost { window_s, share: [1.0 - good / all, LOST] }.in_log(number)));
+        }
+        if bins.iter().any(|bin| bin.overrange) {
+            return Ok(Err(Kind::AtLimit { window_s, stated: one.step.rate_deg_per_s }.in_log(number)));
+        }
+    }
+    let place = wanted.place.get(number).or(wanted.place.first());
+    let earth_start = match place.map(|place| place.earth_rate_in_case(binned.first_force)) {
+        None => None,
+        Some(Some(rate)) => Some(rate.map(deg_per_h)),
+        Some(None) => {
+            let Binned { first_force: force, troubles, .. } = binned;
+            return Ok(Err(Kind::NotLevel { force, troubles }.in_log(number)));
+        }
+    };
+    Ok(Ok(Turned { binned, matched, rests: slow(&own, found), earth_start }))
+}
+
+/// Share of the bins in which ticks are missing, where it is more than a twentieth: no steady stretch is long enough then.
+#[expect(clippy::cast_precision_loss, reason = "bins of a run")]
+fn gaps(bins: &[Bin]) -> Option<f64> {
+    let broken = bins.iter().filter(|bin| bin.broken || bin.good_s < (1.0 - LOST) * bin.length_s).count();
+    let share = broken as f64 / bins.len().max(1) as f64;
+    (share > LOST).then_some(share)
+}
+
+/// Cuts steps to whole turns, so that the Earth's horizontal part averages out. Gives the rates (°/s) of those that are shorter.
+pub(super) fn whole_turns(run: &mut Turned) -> Vec<f64> {
+    let mut short = Vec::new();
+    for one in &mut run.matched {
+        let [begin, end] = one.plateau.bins;
+        let bins = run.binned.bins.get(begin..end).unwrap_or_default();
+        let length_s: f64 = bins.iter().map(|bin| bin.length_s).sum();
+        let turns = libm::floor(one.step.rate_deg_per_s.abs() * length_s / TURN_DEG);
+        if one.step.rate_deg_per_s == 0.0 {
+            continue;
+        }
+        if turns < 1.0 {
+            short.push(one.step.rate_deg_per_s);
+            continue;
+        }
+        let wanted_s = turns * TURN_DEG / one.step.rate_deg_per_s.abs();
+        let mut taken = 0.0;
+        let count = bins.iter().take_while(|bin| {
+            taken += bin.length_s;
+            taken <= wanted_s + 0.5 * bin.length_s
+        });
+        let count = count.count().max(1);
+        one.plateau.bins = [begin, begin + count];
+        if let Some(last) = bins.get(count - 1) {
+            one.plateau.window_s[1] = last.begin_s + last.length_s;
+        }
+        one.plateau.rate = plateaus::mean(&bins[..count]);
+    }
+    short
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_told_where_they_are_many() {
+        let bins = |every: u32| -> Vec<Bin> {
+            let bin = |index: u32| Bin {
+                length_s: 0.5,
+                good_s: 0.5,
+                broken: index.is_multiple_of(every),
+                ..Bin::default()
+            };
+            (0..200).map(bin).collect()
+        };
+        assert_eq!(gaps(&bins(100)), None);
+        assert_eq!(gaps(&bins(4)), Some(0.25));
+    }
+}

@@ -1,0 +1,289 @@
+//! The report of the rates.
+
+use isotherm_correction::units::Angle;
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+
+use super::figure;
+use super::fit::{Made, Measured};
+use super::model::GyroRates;
+use super::over_temperature::OverTemperature;
+use crate::axes::{AXES, main_axis};
+use crate::finding::Kind;
+use crate::report::figures::{counted, fixed, per_deg_c, short};
+use crate::report::words::{gyros, together};
+use crate::report::{Coefficient, FitReport};
+
+/// Height of a panel (CSS pixels).
+const HEIGHT: u32 = 220;
+/// Largest size of what is left, in its standard deviations, before it is called a nonlinearity.
+const SEEN: f64 = 4.0;
+/// Share by which a weight changes at most without a word: what micromechanical gyros differ by from their data sheet.
+const OTHER_WEIGHT: f64 = 0.1;
+
+/// The report.
+pub(super) fn report(made: &Made) -> FitReport {
+    let document = &made.written.document;
+    let mut report =
+        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
+            .counting("steps");
+    report.verdicts.clone_from(&made.verdicts);
+    report.warnings.extend(made.warnings.iter().map(ToString::to_string));
+    let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
+    let temperature = made
+        .temperature_deg_c()
+        .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
+    report.notes.push(format!(
+        "{} of the table and {}{temperature}.",
+        counted(turning, "step", "steps"),
+        counted(made.steps.len() - turning, "rest", "rests")
+    ));
+    report.notes.push(
+        "Before and after are the errors of the corrected rate over the steps, less Earth's rate and mean error \
+         (bias). The increment weight is the mean for positive and negative input; asymmetry and nonlinearity are \
+         in origin.details."
+            .to_owned(),
+    );
+    let mut told: Vec<(&str, String)> = Vec::new();
+    for (index, sensor) in document.gyro.sensor.iter().enumerate() {
+        match made.gyros.get(index) {
+            Some(Ok(found)) => {
+                if found.axis.is_none() {
+                    let stays = "the steps turn about fewer than three directions: the input axis is kept from the \
+                                 document";
+                    told.push((&sensor.name, stays.to_owned()));
+                }
+                let weight = sensor
+                    .increment_weight_arcsec_per_count
+                    .map(|weight| (weight, "″/count"))
+                    .or(sensor.increment_weight_rad_per_rad.map(|weight| (weight, "rad/rad")));
+                coefficients(&sensor.name, found, weight, &mut report);
+                linearity(made, index, &sensor.name, found, &mut report);
+            }
+            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis are kept"))),
+            None => {}
+        }
+    }
+    report.warnings.extend(together(&told));
+    report.warnings.extend(widened(made));
+    report.warnings.extend(other_weights(made));
+    if let Some(over) = &made.over_temperature {
+        over_temperature(made, over, &mut report);
+    }
+    if !made.judged.is_empty() {
+        let steps = counted(made.judged.len(), "step", "steps");
+        report.notes.push(format!("Out of sample: {steps} of the judging logs."));
+        report.tables.push(("Errors of the judging steps".to_owned(), judged(made)));
+    }
+    report.charts.push(("Linearity".to_owned(), chart(made)));
+    report
+}
+
+/// Slopes of axes and scale factors, with the figure beside the accelerometers.
+fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport) {
+    let document = &made.written.document;
+    report.notes.push(format!(
+        "Axes and scale factors at {} temperatures; weights, axes and linearity are those at {} °C.",
+        over.levels.len(),
+        short(over.reference_deg_c)
+    ));
+    for (sensor, line) in document.gyro.sensor.iter().zip(&over.lines) {
+        let mut add = |what: String, unit: String, value: f64, sigma: f64| {
+            report.coefficients.push(Coefficient::new(
+                format!("gyro {} {what}", sensor.name),
+                unit,
+                value,
+                Some(sigma),
+            ));
+        };
+        for (power, (value, sigma)) in line.scale_ppm.iter().zip(&line.scale_sigma_ppm).enumerate() {
+            add(
+                format!("increment weight error, power {}", power + 1),
+                per_deg_c("ppm", power + 1),
+                *value,
+                *sigma,
+            );
+        }
+        let main = main_axis(&line.axis);
+        for along in (0..3).filter(|along| *along != main) {
+            let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
+            let name = format!("C1 along {}", AXES[along]);
+            add(name, per_deg_c("″", 1), arcsec(line.slope[along]), arcsec(line.slope_sigma[along]));
+        }
+    }
+    report.tables.push(("Axes by temperature, ″".to_owned(), figure::table(over, document)));
+    report.charts.push(("Axes over temperature".to_owned(), figure::chart(over, document)));
+}
+
+/// Errors of the steps that the fit has not seen, by case axis.
+fn judged(made: &Made) -> Table {
+    let head = [
+        "log",
+        "window, s",
+        "table, °/s",
+        "before: x, °/h",
+        "y, °/h",
+        "z, °/h",
+        "after: x, °/h",
+        "y, °/h",
+        "z, °/h",
+    ];
+    let row = |step: &Measured| {
+        let [from, to] = step.matched.plateau.window_s;
+        let mut row = vec![
+            (step.matched.step.run + 1).to_string(),
+            format!("{from:.1}…{to:.1}"),
+            short(step.matched.step.rate_deg_per_s),
+        ];
+        row.extend(step.error.iter().flatten().map(|error| short(*error)));
+        row
+    };
+    Table { head: head.map(str::to_owned).to_vec(), rows: made.judged.iter().map(row).collect() }
+}
+
+fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {
+    let [gain, sigma] = found.gain;
+    let relative = sigma / gain.abs();
+    let mut add = |what: &str, unit: &str, value: f64, sigma: f64| {
+        report.coefficients.push(Coefficient::new(format!("gyro {name} {what}"), unit, value, Some(sigma)));
+    };
+    if let Some((weight, unit)) = weight {
+        add("increment weight", unit, weight, relative * weight.abs());
+    }
+    add("change of its weight", "ppm", 1e6 * (1.0 / gain.abs() - 1.0), 1e6 * relative);
+    if let Some([value, sigma]) = found.asymmetry {
+        add("scale factor asymmetry", "ppm", 1e6 * value, 1e6 * sigma);
+    }
+    add("bias left", "°/h", found.bias[0], found.bias[1]);
+    if let Some(axis) = found.axis {
+        for (element, (of, sigma)) in AXES.iter().zip(axis.iter().zip(found.axis_sigma)) {
+            // Near one the element itself says nothing about the angle.
+            if of.abs() < 0.99 {
+                let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
+                add(&format!("input axis along {element}"), "″", arcsec(*of), arcsec(sigma));
+            }
+        }
+    }
+}
+
+/// Gyros whose weight is far from what it was, in one sentence: the rates, or the unit of measure, may be others than stated.
+fn other_weights(made: &Made) -> Option<String> {
+    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
+    let other = sensors.filter(|_| made.scale_known).filter_map(|(sensor, found)| {
+        let change = 1.0 / found.as_ref().ok()?.gain[0].abs() - 1.0;
+        (change.abs() > OTHER_WEIGHT).then(|| (sensor.name.as_str(), format!("{} %", short(100.0 * change))))
+    });
+    let (names, changes): (Vec<&str>, Vec<String>) = other.unzip();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: the weight changes by {}, more than {:.0} %: check the stated rates, the unit of measure in the \
+             mapping, and that the document is of this unit",
+            gyros(&names),
+            changes.join(", "),
+            100.0 * OTHER_WEIGHT
+        )
+    })
+}
+
+/// Gyros whose steps scatter by more than noise, in one sentence.
+fn widened(made: &Made) -> Option<String> {
+    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
+    let wide = sensors.filter_map(|(sensor, found)| {
+        let found = found.as_ref().ok().filter(|found| found.widened)?;
+        Some((sensor.name.as_str(), format!("{:.1}", found.chi_square.sqrt())))
+    });
+    let (names, times): (Vec<&str>, Vec<String>) = wide.unzip();
+    let place = if made.earth_known {
+        ", or latitude and attitude other than at the beginning of each log"
+    } else {
+        ", or the Earth's rate, which is not removed"
+    };
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: steps scatter by {} times what noise explains; standard errors are widened. Nonlinearity, a table less steady than stated \
+             (--table-ppm){place}",
+            gyros(&names),
+            times.join(", ")
+        )
+    })
+}
+
+fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
+    let axis =
+        found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
+    let input = |step: usize| -> f64 {
+        made.steps.get(step).map_or(0.0, |step| step.rate.iter().zip(axis).map(|(a, b)| a * b).sum())
+    };
+    let full = (0..made.steps.len()).map(|step| input(step).abs()).fold(0.0, f64::max);
+    let mut rows = Vec::new();
+    let mut worst = 0.0_f64;
+    for (step, left) in found.left.iter().enumerate() {
+        let Some(measured) = made.steps.get(step) else { continue };
+        let [from, to] = measured.matched.plateau.window_s;
+        let own = input(step);
+        worst = worst.max(left.abs());
+        let of_input =
+            if own.abs() > 0.01 * full { fixed(1e6 * left / own.abs(), 2) } else { "–".to_owned() };
+        rows.push(vec![
+            (measured.matched.step.run + 1).to_string(),
+            format!("{from:.1}…{to:.1}"),
+            short(measured.matched.step.rate_deg_per_s),
+            short(own / 3600.0),
+            short(*left),
+            of_input,
+            fixed(1e6 * left / full, 3),
+        ]);
+    }
+    let head =
+        ["log", "window, s", "table, °/s", "input, °/s", "left, °/h", "ppm of input", "ppm of full scale"];
+    report
+        .tables
+        .push((format!("Linearity of gyro {name}"), Table { head: head.map(str::to_owned).to_vec(), rows }));
+    let chi = if found.chi_square.is_finite() {
+        format!("χ² {:.2} per degree of freedom", found.chi_square)
+    } else {
+        "no degree of freedom left".to_owned()
+    };
+    report.notes.push(format!(
+        "gyro {name}: linearity error at most {} ppm of full scale ({} °/s), {chi}.",
+        short(1e6 * worst / full),
+        short(full / 3600.0)
+    ));
+    if let Some([value, sigma]) = found.asymmetry.filter(|[value, sigma]| value.abs() > SEEN * sigma) {
+        report.warnings.push(format!(
+            "gyro {name}: positive and negative scale factor differ by {} ± {} ppm, which is not in the document",
+            short(1e6 * value),
+            short(1e6 * sigma)
+        ));
+    }
+}
+
+fn chart(made: &Made) -> Chart {
+    let panel = |(index, found): (usize, &Result<GyroRates, Kind>)| {
+        let found = found.as_ref().ok()?;
+        let sensor = made.written.document.gyro.sensor.get(index)?;
+        let axis = made.written.document.gyro.orientation.rows.get(index)?;
+        let input = |rate: &[f64; 3]| rate.iter().zip(axis).map(|(a, b)| a * b).sum::<f64>() / 3600.0;
+        let mut points: Vec<(f64, f64)> =
+            made.steps.iter().zip(&found.left).map(|(step, left)| (input(&step.rate), *left)).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let series = Series {
+            name: "left".to_owned(),
+            ink: Ink::First,
+            form: Form::Dots,
+            samples: Samples::points(points),
+        };
+        Some(Panel {
+            title: format!("gyro {}", sensor.name),
+            unit: "°/h".to_owned(),
+            height: HEIGHT,
+            logarithmic: false,
+            content: Content::Series(vec![series]),
+        })
+    };
+    Chart {
+        caption: "Residual of each step from the straight line, over the input rate.".to_owned(),
+        x: Axis::of("input rate", "°/s"),
+        panels: made.gyros.iter().enumerate().filter_map(panel).collect(),
+        marks: Vec::new(),
+    }
+}

@@ -1,0 +1,230 @@
+//! A unit without the terms that a thermal fit gives it, and a nominal document for a log that comes without one.
+
+use isotherm_correction::sample::OutputKind;
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{
+    Accel, AccelOutput, AccelSensor, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor,
+    Orientation, Shape, Temperature,
+};
+
+use super::checks::median_step_s;
+use crate::axes::AXES;
+use crate::error::Error;
+use crate::runs::{self, series::Series};
+
+/// Longest step of a grid that a document may state (s).
+const LONGEST_GRID_STEP_S: f64 = 3600.0;
+/// Grid points between two readings that they can carry: between readings there are only straight lines.
+const FINEST_GRID: f64 = 3.0;
+/// Distances of readings over which a temperature must not become stale.
+const FRESH_READINGS: f64 = 2.0;
+/// Where the readings of a thermometer without a conversion must lie to be °C.
+const DEG_C: [f64; 2] = [-100.0, 200.0];
+
+/// The document without what the fit finds: static and thermal terms of the gyros, bias and lags of the accelerometers.
+/// Scale, axes, mode and magnetic terms stay.
+#[must_use]
+pub fn bare(document: &Document) -> Document {
+    let mut document = document.clone();
+    for sensor in &mut document.gyro.sensor {
+        let fitted = [Feature::One, Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+        sensor.terms.retain(|feature| !fitted.contains(&feature));
+        sensor.trend = None;
+    }
+    for sensor in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
+        sensor.terms.retain(|feature| !matches!(feature, Feature::One | Feature::Lag));
+    }
+    document
+}
+
+/// The document with sensors along the case axes by threes, some of them turned round, so that what comes out along an axis is
+/// the mean of its sensors. Pattern 0 turns none; pattern p turns the sensors 3·p to 3·p + 2.
+#[must_use]
+pub fn along_axes(document: &Document, pattern: usize) -> Document {
+    let mut document = document.clone();
+    let rows = |count: usize| {
+        (0..count).map(|index| {
+            let sign = if pattern > 0 && index / 3 == pattern { -1.0 } else { 1.0 };
+            let mut row = [0.0; 3];
+            row[index % 3] = sign;
+            row
+        })
+    };
+    let gyros = rows(document.gyro.sensor.len()).collect();
+    document.gyro.orientation = Orientation { rows: gyros, weights: None, thermal: None, parity: None };
+    if let Some(accel) = &mut document.accel {
+        let accels = rows(accel.sensor.len()).collect();
+        accel.orientation = Orientation { rows: accels, weights: None, thermal: None, parity: None };
+    }
+    document
+}
+
+/// The document of a unit of which nothing is known but its log: scale one, orthogonal axes.
+///
+/// # Errors
+/// [`Error::Refused`] where the log does not allow it: counts, other than three sensors, thermometers that are not in °C or whose
+/// sensors cannot be told.
+pub fn nominal_of(series: &Series) -> Result<Document, Error> {
+    let mut reasons = Vec::new();
+    for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
+        if ticks.output == Some(OutputKind::Counts) {
+            reasons.push(format!(
+                "the {kind} readings are counts: give a document with their scale (--calibration)"
+            ));
+        }
+        if !ticks.is_empty() && ticks.readings.len() != 3 {
+            let count = ticks.readings.len();
+            reasons.push(format!(
+                "the log has {count} {kind}s: without a document (--calibration) only three have known axes"
+            ));
+        }
+    }
+    if series.gyros.is_empty() {
+        reasons
+            .push("the log has no gyro ticks: the correction runs at their pace and needs them".to_owned());
+    }
+    for (name, channel) in &series.temperatures {
+        let away = channel.raw.iter().filter(|raw| raw.is_finite() && !(DEG_C[0]..=DEG_C[1]).contains(*raw));
+        if 2 * away.count() > channel.raw.len() {
+            reasons.push(format!(
+                "temperature channel {name:?} has readings outside {} to {} °C: it is not a temperature in °C: name \
+                 the right column in the mapping, or give a document with the channel's conversion (--calibration)",
+                DEG_C[0], DEG_C[1]
+            ));
+        }
+    }
+    if !reasons.is_empty() {
+        return Err(Error::Refused(reasons));
+    }
+    let names: Vec<&String> = series.temperatures.keys().collect();
+    let channel_of = |kind: &str, index: usize| -> Option<String> {
+        let own = format!("{kind}{index}");
+        match names.as_slice() {
+            [only] => Some((*only).clone()),
+            _ => names.iter().find(|name| ***name == own).map(|name| (*name).clone()),
+        }
+    };
+    if names.is_empty() || (0..3).any(|index| channel_of("gyro", index).is_none()) {
+        let list = names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
+        return Err(Error::Refused(vec![if names.is_empty() {
+            "the log has no temperature: a thermal fit needs at least one channel; name it in the mapping"
+                .to_owned()
+        } else {
+            format!(
+                "the names of the temperature channels ({list}) do not tell which gyro follows which: name them \
+                 gyro0, gyro1, gyro2 (and accel0 …) in the mapping, or give a document (--calibration)"
+            )
+        }]));
+    }
+    let has_accel = !series.accels.is_empty() && (0..3).all(|index| channel_of("accel", index).is_some());
+    Ok(document(series, &channel_of, has_accel))
+}
+
+fn document(
+    series: &Series,
+    channel_of: &dyn Fn(&str, usize) -> Option<String>,
+    has_accel: bool,
+) -> Document {
+    let gyro = |(index, name): (usize, &&str)| GyroSensor {
+        channel: channel_of("gyro", index),
+        increment_weight_rad_per_rad: Some(1.0),
+        ..GyroSensor::bare(name)
+    };
+    let accel = |(index, name): (usize, &&str)| AccelSensor {
+        channel: channel_of("accel", index),
+        ..AccelSensor::bare(
+            name,
+            Curve::new(Shape::Constant { value: 1.0 })
+                .in_unit(AccelOutput::MetresPerSecondSquared.scale_unit()),
+        )
+    };
+    let mut used: Vec<String> = (0..3).filter_map(|index| channel_of("gyro", index)).collect();
+    if has_accel {
+        used.extend((0..3).filter_map(|index| channel_of("accel", index)));
+    }
+    let channels = series.temperatures.iter().filter(|(name, _)| used.contains(name));
+    let channels: Vec<Channel> = channels
+        .map(|(name, readings)| Channel {
+            name: name.clone(),
+            conversion_deg_c: vec![0.0, 1.0],
+            range_deg_c: DEG_C,
+            spike_limit_deg_c: spike_limit(&readings.raw),
+        })
+        .collect();
+    let step =
+        series.temperatures.values().map(|channel| median_step_s(&channel.time_ns)).fold(0.0, f64::max);
+    Document {
+        schema: isotherm_protocol::document::CURRENT_SCHEMA,
+        unit: series.unit.to_string(),
+        created: None,
+        note: None,
+        origin: None,
+        auxiliary: Vec::new(),
+        temperature: Temperature { assumed_deg_c: 25.0, filter: Some(filter(step)), channel: channels },
+        gyro: Gyro {
+            output: GyroOutput::Mean,
+            sensor: AXES.iter().enumerate().map(gyro).collect(),
+            orientation: Orientation::along_case_axes(),
+        },
+        accel: has_accel.then(|| Accel {
+            output: AccelOutput::MetresPerSecondSquared,
+            sensor: AXES.iter().enumerate().map(accel).collect(),
+            orientation: Orientation::along_case_axes(),
+        }),
+        mode_reversal: None,
+        self_test: None,
+    }
+}
+
+/// A filter for readings that come every so many seconds.
+#[must_use]
+pub fn filter(step_s: f64) -> Filter {
+    // Readings about a second apart belong on a grid of a second; lags need some points between those that come seldom.
+    let own_s = if step_s > FINEST_GRID { step_s / FINEST_GRID } else { step_s };
+    let grids = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0];
+    let minutes = || (60.0 * libm::ceil(own_s / 60.0)).min(LONGEST_GRID_STEP_S);
+    let grid = grids.into_iter().find(|step| *step > 0.8 * own_s).unwrap_or_else(minutes);
+    Filter {
+        grid_step_s: grid,
+        smoothing_s: 10.0 * grid,
+        derivative_step_s: 10.0 * grid,
+        stale_after_s: 20.0 * grid,
+        branch_dead_band_deg_c2_per_s3: None,
+    }
+}
+
+/// Has a document carry readings that are so far apart (s): without a grid between them, and with spike limits beyond what a ramp does
+/// from one to the next. Gives the step of the grid that it had, and of the one that it has now; `None` where it can carry them.
+pub fn carry(document: &mut Document, runs: &[&Series], step_s: f64) -> Option<[f64; 2]> {
+    let stated = document.temperature.filter.as_ref()?;
+    let stated_s = stated.grid_step_s;
+    if step_s <= FINEST_GRID * stated_s && FRESH_READINGS * step_s <= stated.stale_after_s {
+        return None;
+    }
+    for channel in &mut document.temperature.channel {
+        let limit = |readings: &runs::series::Channel| {
+            let powers = &channel.conversion_deg_c;
+            let deg_c = |raw: &f64| powers.iter().rev().fold(0.0, |sum, power| sum * raw + power);
+            spike_limit(&readings.raw.iter().map(deg_c).collect::<Vec<f64>>())
+        };
+        let limits = runs.iter().filter_map(|series| series.temperatures.get(&channel.name)).map(limit);
+        channel.spike_limit_deg_c = limits.fold(channel.spike_limit_deg_c, f64::max);
+    }
+    let carried = filter(step_s);
+    let grids = [stated_s, carried.grid_step_s];
+    document.temperature.filter = Some(carried);
+    Some(grids)
+}
+
+/// A spike limit that the log's own slope does not touch.
+fn spike_limit(raw: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = raw
+        .iter()
+        .zip(raw.iter().skip(1))
+        .map(|(a, b)| (b - a).abs())
+        .filter(|step| step.is_finite())
+        .collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let high = steps.get(steps.len() * 99 / 100).copied().unwrap_or(0.0);
+    if high > 0.2 { libm::ceil(10.0 * high) } else { 2.0 }
+}

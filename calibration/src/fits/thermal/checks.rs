@@ -1,0 +1,327 @@
+//! What must hold of a run before anything is fitted to it; every refusal says what to do.
+
+use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+use isotherm_protocol::document::Document;
+
+use super::samples::Samples;
+use super::stand::Stand;
+use crate::axes::sensor_name;
+use crate::fits::drift::pieces::checks::moves;
+use crate::report::Rest;
+use crate::report::figures::{counted, short};
+use crate::robust::{median, median_if_any};
+use crate::runs::faults::{self, Fault};
+use crate::runs::series::{Series, Ticks};
+use crate::runs::swapped::{Looks, Shown};
+use crate::size::Size;
+
+/// How far a gyro on a rate table may be from what is stated: share of the rate, and beside it (°/s).
+const TABLE_SHARE: f64 = 0.05;
+const TABLE_DEG_PER_S: f64 = 0.5;
+/// How far the mean specific force may be from one g.
+const GRAVITY: [f64; 2] = [0.9, 1.1];
+/// What three gyros at rest hardly stay below together (°/h): one of three axes has more than half of the Earth's rate.
+const QUIETEST_DEG_PER_H: f64 = 1.0;
+/// Largest turn of the specific force of a unit that stays where it is (°), from one side of a window to the other.
+const LARGEST_TURN_DEG: f64 = 2.0;
+/// Windows on either side.
+const BESIDE: usize = 3;
+/// Fewest readings of a tick series for which anything can be said.
+const FEWEST: usize = 100;
+/// Smallest range of temperature that is worth a fit (°C).
+pub const SMALLEST_RANGE_DEG_C: f64 = 5.0;
+/// Share of readings that may be no number, or of time that may be missing, before a warning.
+const SMALL_SHARE: f64 = 0.001;
+
+/// What was found: nothing can be done without the first, the second is to be looked at.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Findings {
+    /// Refusals of the whole run.
+    pub refusals: Vec<String>,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Sensors that cannot be fitted, gyros first, each with why.
+    pub dead: Vec<(bool, usize, String)>,
+}
+
+/// Median distance of times (s).
+#[must_use]
+pub fn median_step_s(times_ns: &[i64]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
+    let steps: Vec<f64> =
+        times_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
+    median(&steps)
+}
+
+/// Looks at the raw readings of a run.
+#[must_use]
+pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
+    let mut found = Findings::default();
+    for (gyro, kind, ticks) in [(true, "gyro", &series.gyros), (false, "accelerometer", &series.accels)] {
+        if ticks.is_empty() {
+            continue;
+        }
+        for (index, readings) in ticks.readings.iter().enumerate() {
+            let of = format!("{kind} {}", sensor_name(index, ticks.readings.len()));
+            sensor(&mut found, name, (gyro, &of, index), readings);
+        }
+        gaps(&mut found, name, kind, ticks);
+    }
+    if series.gyros.len() < FEWEST {
+        found.refusals.push(format!(
+            "{name}: {} gyro ticks are too few, at least {FEWEST} are needed: is the whole log given?",
+            series.gyros.len()
+        ));
+    }
+    if series.gyros.output == Some(OutputKind::Mean) && stand.turning.is_none() {
+        rates(&mut found, name, &series.gyros);
+    }
+    if series.bad_frames > 0 {
+        found.warnings.push(format!(
+            "{name}: {} frames could not be read and are left out; isotherm-replay recover may save them",
+            series.bad_frames
+        ));
+    }
+    for (channel, readings) in &series.temperatures {
+        thermometer(&mut found, name, channel, readings);
+    }
+    found
+}
+
+/// What is wrong with the readings of a run that judges: it is said, and what can be judged is.
+#[must_use]
+pub fn judging(name: &str, series: &Series, stand: &Stand) -> Vec<String> {
+    let Findings { mut refusals, warnings, dead } = raw(name, series, stand);
+    refusals.extend(warnings);
+    refusals.extend(dead.into_iter().map(|(gyro, index, why)| {
+        let (kind, ticks) = if gyro { ("gyro", &series.gyros) } else { ("accelerometer", &series.accels) };
+        format!("{name}: {kind} {}: {why}", sensor_name(index, ticks.readings.len()))
+    }));
+    refusals
+}
+
+#[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]
+fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usize), readings: &[f64]) {
+    let bad = faults::missing(readings);
+    let share = bad as f64 / readings.len().max(1) as f64;
+    if share > 0.5 {
+        let why = format!(
+            "{name}: {of}: {:.0} % of its readings are not numbers: check the sensor, and the column in the mapping",
+            100.0 * share
+        );
+        found.refusals.push(why);
+        return;
+    }
+    if bad > 0 {
+        found.warnings.push(format!(
+            "{name}: {of}: {bad} readings are not numbers ({:.3} %); the windows with them are left out",
+            100.0 * share
+        ));
+    }
+    if let Some(value) = faults::dead(readings) {
+        found.dead.push((gyro, index, Fault::Dead(value).words("sensor", 1)));
+    }
+}
+
+fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
+    let step = median_step_s(&ticks.end_ns);
+    let mut missing = 0.0;
+    let (mut count, mut longest, mut at) = (0, 0.0, 0.0);
+    let first = ticks.end_ns.first().copied().unwrap_or_default();
+    for pair in ticks.end_ns.windows(2) {
+        #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
+        let (gap, since) =
+            (pair[1].saturating_sub(pair[0]) as f64 * 1e-9, pair[0].saturating_sub(first) as f64 * 1e-9);
+        if gap > 3.0 * step {
+            count += 1;
+            missing += gap - step;
+            if gap > longest {
+                (longest, at) = (gap, since);
+            }
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
+    let whole = ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first) as f64 * 1e-9;
+    if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
+        found.warnings.push(format!(
+            "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags \
+             and derivatives are poor after a gap; if it matters, leave it out with --start and --duration",
+            counted(count, "gap", "gaps")
+        ));
+    }
+}
+
+/// Gyros with a rate output must be near rest, and feel the Earth.
+fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
+    let mut largest = 0.0_f64;
+    for (index, readings) in ticks.readings.iter().enumerate() {
+        let sizes: Vec<f64> =
+            readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
+        let Some(usual) = median_if_any(&sizes) else { continue };
+        let called = format!("{name}: gyro {}", sensor_name(index, ticks.readings.len()));
+        found.refusals.extend(moves(&called, usual));
+        largest = largest.max(usual * 3600.0);
+    }
+    if ticks.readings.len() >= 3 && largest > 0.0 && largest < QUIETEST_DEG_PER_H {
+        found.warnings.push(format!(
+            "{name}: no gyro reads more than {} °/h in the median, and the Earth turns by 15 °/h: is the unit of measure in the mapping \
+             right ({} where °/s are taken as °/h)?",
+            short(largest),
+            short(largest * 3600.0)
+        ));
+    }
+}
+
+fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate::runs::series::Channel) {
+    let good: Vec<f64> = readings.raw.iter().copied().filter(|raw| raw.is_finite()).collect();
+    let bad = readings.raw.len() - good.len();
+    if 2 * good.len() < readings.raw.len() || good.len() < 10 {
+        found.refusals.push(format!(
+            "{name}: temperature channel {channel:?} has {} readings of which {bad} are not numbers: check the \
+             thermometer and its column",
+            readings.raw.len()
+        ));
+        return;
+    }
+    if bad > 0 {
+        found.warnings.push(format!(
+            "{name}: temperature channel {channel:?}: {bad} readings are not numbers and are skipped"
+        ));
+    }
+    // A temperature moves slowly: from reading to reading it changes by a small share of what it does over the run.
+    let (low, high) =
+        good.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+    let steps: Vec<f64> = good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let usual = median(&steps);
+    if usual > 0.5 && usual > 0.05 * (high - low) {
+        found.refusals.push(format!(
+            "{name}: temperature channel {channel:?} jumps by {usual:.3} from reading to reading, over a range of \
+             {:.3}: this is not a temperature; are columns swapped in the mapping?",
+            high - low
+        ));
+    }
+}
+
+/// Whether a run on a rate table turns as it was stated, all the time; why not, and what to do.
+#[must_use]
+pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<String> {
+    let turning = stand.turning.as_ref()?;
+    let stated = turning.rate_deg_per_h();
+    let allowed = (TABLE_SHARE * turning.rate_deg_per_s.abs() + TABLE_DEG_PER_S) * 3600.0;
+    let mut off: Vec<usize> = Vec::new();
+    for (index, (shown, row)) in samples.gyros.iter().zip(&document.gyro.orientation.rows).enumerate() {
+        let along: f64 = row.iter().zip(stated).map(|(r, s)| r * s).sum();
+        let away: Vec<usize> =
+            (0..shown.len()).filter(|&window| (shown[window] - along).abs() > allowed).collect();
+        if 2 * away.len() > shown.len() {
+            return Some(format!(
+                "{}: gyro {} shows {:.3} °/s in the median, {:.3} °/s are stated along it: check --rate and --axis \
+                 of this log, and the sign",
+                samples.name,
+                sensor_name(index, samples.gyros.len()),
+                median_if_any(shown).unwrap_or(f64::NAN) / 3600.0,
+                along / 3600.0
+            ));
+        }
+        off.extend(away);
+    }
+    let (first, last) = (off.iter().min()?, off.iter().max()?);
+    let time = |window: &usize| samples.time_s.get(*window).copied().unwrap_or_default();
+    Some(format!(
+        "{}: the table is not at its stated {} °/s between {:.0} and {:.0} s: cut the log to the steady part with \
+         --start and --duration",
+        samples.name,
+        turning.rate_deg_per_s,
+        time(first) - 0.5 * samples.window_s,
+        time(last) + 0.5 * samples.window_s
+    ))
+}
+
+/// Whether a run at rest stands as was stated: columns that look swapped, and gravity that is somewhere else.
+#[must_use]
+pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &Stand)) -> Findings {
+    let mut found = Findings::default();
+    if stand.turning.is_some() {
+        return found;
+    }
+    let along = |rows: &[[f64; 3]], vector: [f64; 3]| -> Option<[f64; 3]> {
+        let along = |row: &[f64; 3]| row.iter().zip(vector).map(|(r, v)| r * v).sum();
+        <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
+    };
+    let sizes = |columns: &[Vec<f64>]| -> Option<[Size; 3]> {
+        <[Size; 3]>::try_from(columns.iter().map(|values| Size::of(values)).collect::<Vec<Size>>()).ok()
+    };
+    let rate = rest.rate_deg_per_h.and_then(|rate| along(&document.gyro.orientation.rows, rate));
+    let accel = document.accel.as_ref();
+    let force = rest.force_m_per_s2.zip(accel).and_then(|(force, a)| along(&a.orientation.rows, force));
+    let gyros = sizes(&samples.gyros).zip(rate).map(|(sizes, rate)| Shown::of(["gyros", "°/h"], sizes, rate));
+    let forces = sizes(&samples.forces)
+        .zip(force)
+        .map(|(sizes, force)| Shown::of(["accelerometers", "m/s²"], sizes, force));
+    let named = |looks: Option<Looks>| looks.map(|looks| format!("{}: {looks}", samples.name));
+    found.warnings.extend([gyros, forces].into_iter().flatten().filter_map(|shown| named(shown.swapped())));
+    // The bias of a gyro may be many times the Earth's rate; that of an accelerometer is no third of gravity.
+    found.refusals.extend(named(forces.and_then(|shown| shown.far())));
+    found
+}
+
+/// That a unit was turned in the middle of a run: the specific force points somewhere else from one minute to the next. With
+/// temperature it turns slowly, by its biases.
+fn turned(samples: &Samples) -> Option<String> {
+    let [x, y, z] = samples.forces.as_slice() else { return None };
+    let middle = |windows: std::ops::Range<usize>| -> Option<[f64; 3]> {
+        let mut force = [0.0; 3];
+        for (force, values) in force.iter_mut().zip([x, y, z]) {
+            *force = median_if_any(values.get(windows.clone())?)?;
+        }
+        Some(force)
+    };
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let turn = |at: usize| {
+        let (before, after) = (middle(at.checked_sub(BESIDE)?..at)?, middle(at + 1..at + 1 + BESIDE)?);
+        let cosine = dot(before, after) / (dot(before, before) * dot(after, after)).sqrt();
+        Some((at, libm::acos(cosine.clamp(-1.0, 1.0)).to_degrees()))
+    };
+    let turns = (0..samples.time_s.len()).filter_map(turn);
+    let (at, angle) =
+        turns.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, angle)| *angle > LARGEST_TURN_DEG)?;
+    Some(format!(
+        "{}: the unit was turned {:.0} s after the beginning: the specific force turns by {angle:.1} ° there, at \
+         most {LARGEST_TURN_DEG} ° are drift. Give the parts before and after as two runs, with --start and \
+         --duration",
+        samples.name,
+        samples.time_s.get(at).copied().unwrap_or_default()
+    ))
+}
+
+/// Looks at a run that went through the corrector: the accelerometers must feel about one g.
+#[must_use]
+pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
+    let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
+    let mut found = Findings { warnings, ..Findings::default() };
+    // A dead accelerometer is refused for itself.
+    let alive = dead.iter().all(|(gyro, ..)| *gyro);
+    if samples.forces.len() == 3 && alive && stand.turning.is_none() {
+        found.refusals.extend(turned(samples));
+        let forces: Option<Vec<f64>> = samples.forces.iter().map(|values| median_if_any(values)).collect();
+        if let Some(forces) = forces {
+            let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();
+            let share = size / STANDARD_GRAVITY_M_PER_S2;
+            if !(GRAVITY[0]..=GRAVITY[1]).contains(&share) {
+                let guess = if (0.9..1.1).contains(&size) {
+                    ": the readings seem to be in g, but are taken as m/s²"
+                } else if (900.0..1100.0).contains(&size) {
+                    ": the readings seem to be in mg, but are taken as m/s²"
+                } else {
+                    ": is the unit at rest, are columns swapped, is the unit of measure in the mapping right?"
+                };
+                found.refusals.push(format!(
+                    "{}: the specific force is {size:.3} m/s², at rest it must be near {STANDARD_GRAVITY_M_PER_S2:.3}{guess}",
+                    samples.name
+                ));
+            }
+        }
+    }
+    found
+}

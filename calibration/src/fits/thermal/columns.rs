@@ -1,0 +1,308 @@
+//! What one unit of each term subtracts, taken from the corrector itself.
+//!
+//! A gyro gets the term with the coefficient one and nothing else, and the run's own temperature readings, without their noise, are
+//! driven through the service's stream with it. The bias that the corrector then subtracts is the term's column, with filter, grid,
+//! derivative step and the ramps between readings as the service has them. As many terms go in at a time as a unit has gyros.
+
+use std::collections::BTreeMap;
+use std::iter;
+
+use isotherm_correction::observation::Observation;
+use isotherm_correction::sample::{
+    GyroTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TemperatureReading,
+};
+use isotherm_correction::thermal::Feature;
+use isotherm_correction::unit::{MAX_TICK_DURATION, UnitSettings};
+use isotherm_correction::units::{AngularRate, Span, Timestamp};
+use isotherm_log::offline::Offline;
+use isotherm_log::text::LogEvent;
+use isotherm_protocol::document::{
+    Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Orientation, Shape, StatedTerm,
+    Temperature,
+};
+
+use super::samples::Samples;
+use crate::document::written::Written;
+use crate::error::Error;
+
+/// Which thermal branches a term acts on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Branch {
+    /// Both.
+    Both,
+    /// Run-up, Ṫ·T̈ > 0.
+    RunUp,
+    /// Braking, Ṫ·T̈ < 0.
+    Braking,
+}
+
+/// A term with one coefficient, in powers of the distance from a reference temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Term {
+    /// (T − reference)ʲ.
+    Static(usize),
+    /// (T − reference)ʲ·Ṫ.
+    Rate(Branch, usize),
+    /// (T − reference)ʲ·T̈.
+    Acceleration(Branch, usize),
+    /// `(T − reference)ʲ·(T − L_τ)/τ`, τ in milliseconds.
+    Lag(u64, usize),
+    /// (T − reference)ʲ times what the sensor feels, in ppm of its scale factor: a column of each sensor's own.
+    Scale(usize),
+}
+
+/// Time constant in the form that terms are told apart by.
+#[must_use]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0.001 to 1e7 s")]
+pub fn millis(tau_s: f64) -> u64 {
+    libm::round(tau_s * 1e3).clamp(1.0, 1e10) as u64
+}
+
+/// Time constant (s) of a lag term.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "at most 1e10")]
+pub fn seconds(millis: u64) -> f64 {
+    millis as f64 / 1e3
+}
+
+/// Channel, filter and the range of what follows them: what columns are made with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Basis {
+    /// The channel.
+    pub channel: Channel,
+    /// The filter, with its dead band.
+    pub filter: Filter,
+    /// Point about which powers are taken (°C).
+    pub reference_deg_c: f64,
+    /// Fitted range (°C).
+    pub range_deg_c: [f64; 2],
+}
+
+/// Columns of one channel over the windows of several runs, one after the other, made when they are asked for.
+#[derive(Debug)]
+pub struct Columns<'a> {
+    basis: Basis,
+    runs: &'a [Samples],
+    known: BTreeMap<Term, Vec<f64>>,
+}
+
+impl Basis {
+    /// A polynomial with one coefficient of one.
+    pub(super) fn power(&self, power: usize, value: f64) -> Curve {
+        let mut coefficients = vec![0.0; power + 1];
+        coefficients[power] = value;
+        let (reference, range) = (self.reference_deg_c, self.range_deg_c);
+        Curve::new(Shape::Polynomial { reference, coefficients, range })
+    }
+
+    /// A document of gyros on this channel, each with the term that it is given and nothing else.
+    fn document(&self, terms: &[Term]) -> Document {
+        let sensor = |(index, term): (usize, &Term)| {
+            let mut gyro = GyroSensor {
+                channel: Some(self.channel.name.clone()),
+                increment_weight_rad_per_rad: Some(1.0),
+                ..GyroSensor::bare(&index.to_string())
+            };
+            match *term {
+                Term::Scale(_) => {}
+                Term::Static(power) => gyro.set(Feature::One, self.power(power, 1.0)),
+                Term::Rate(branch, power) => {
+                    gyro.put(StatedTerm::branched(Feature::ThermalRate, self.branches(branch, power)));
+                }
+                Term::Acceleration(branch, power) => {
+                    gyro.put(StatedTerm::branched(
+                        Feature::ThermalAcceleration,
+                        self.branches(branch, power),
+                    ));
+                }
+                Term::Lag(tau, power) => {
+                    let gain = self.power(power, 1.0);
+                    gyro.put(StatedTerm::with_parameter(Feature::Lag, seconds(tau), gain));
+                }
+            }
+            gyro
+        };
+        let sensors: Vec<GyroSensor> = terms.iter().enumerate().map(sensor).collect();
+        let dead_band = self.filter.branch_dead_band_deg_c2_per_s3.or(Some(1e-9));
+        // Any axes that span space: what is looked at is not resolved along them.
+        let row = |index: usize| {
+            let mut row = [0.0; 3];
+            row[index % 3] = 1.0;
+            row
+        };
+        let rows = (0..sensors.len()).map(row).collect();
+        Document {
+            schema: isotherm_protocol::document::CURRENT_SCHEMA,
+            unit: "COLUMNS".to_owned(),
+            created: None,
+            note: None,
+            origin: None,
+            auxiliary: Vec::new(),
+            temperature: Temperature {
+                assumed_deg_c: self.reference_deg_c,
+                filter: Some(Filter { branch_dead_band_deg_c2_per_s3: dead_band, ..self.filter.clone() }),
+                channel: vec![self.channel.clone()],
+            },
+            gyro: Gyro {
+                output: GyroOutput::Mean,
+                sensor: sensors,
+                orientation: Orientation { rows, weights: None, thermal: None, parity: None },
+            },
+            accel: None,
+            mode_reversal: None,
+            self_test: None,
+        }
+    }
+
+    fn branches(&self, branch: Branch, power: usize) -> [Curve; 2] {
+        [Branch::Braking, Branch::RunUp].map(|other| self.power(power, f64::from(u8::from(branch != other))))
+    }
+
+    /// What up to eight terms subtract over the windows of a run (°/h).
+    pub(super) fn drive(&self, run: &Samples, terms: &[Term]) -> Result<Vec<Vec<f64>>, Error> {
+        // A unit has three gyros at least.
+        let padding = iter::repeat_n(Term::Static(0), MIN_SENSORS.saturating_sub(terms.len()));
+        let padded: Vec<Term> = terms.iter().copied().chain(padding).collect();
+        let loaded = Written::compiled(&self.document(&padded))?;
+        let mut unit = Offline::new(&loaded, UnitSettings::default());
+        let readings: &[TemperatureReading] =
+            run.temperatures.get(&self.channel.name).map_or(&[], Vec::as_slice);
+        // Some to a window, each no longer than the corrector takes.
+        let step = Span::from_s(run.window_s / libm::ceil(run.window_s / MAX_TICK_DURATION.as_s()).max(5.0));
+        let mut sums = Windows::new(run, terms.len());
+        let mut readings = readings.iter().peekable();
+        // A unit keeps its first tick until it has seen the next one: it gets one from before the run.
+        let (mut sequence, mut end) = (0_u64, run.start_ns.saturating_sub(step.as_ns()));
+        let last = run.time_s.last().map_or(0.0, |middle| middle + run.window_s);
+        let last = run.start_ns.saturating_add(Span::from_s(last).as_ns());
+        while end < last {
+            end += step.as_ns();
+            while let Some(reading) = readings.next_if(|reading| reading.time.as_ns() <= end) {
+                unit.handle(&LogEvent::Temperature(*reading));
+            }
+            let tick = GyroTick {
+                sequence,
+                end_time: Timestamp::from_ns(end),
+                duration: step,
+                readings: padded.iter().map(|_| 0.0).collect(),
+                mode: None,
+                switch_command: false,
+                meander: None,
+                half_periods: Sensors::default(),
+                series: 0,
+            };
+            sequence += 1;
+            // Without accelerometers every other tick goes through at once.
+            unit.handle(&LogEvent::Gyro { output: OutputKind::Mean, tick });
+            unit.take();
+            if let Some(seen) = unit.unit().observation() {
+                sums.take(seen, step.as_s());
+            }
+        }
+        Ok(sums.means())
+    }
+}
+
+/// Sums over the windows of a run; windows before the first temperature reading have no number.
+struct Windows<'a> {
+    run: &'a Samples,
+    /// By window: sums of rate times time (rad) by term, and the time (s).
+    sums: Vec<(Vec<f64>, f64)>,
+    at: usize,
+    /// The temperature is known: until then the corrector assumes one.
+    known: bool,
+}
+
+impl<'a> Windows<'a> {
+    fn new(run: &'a Samples, terms: usize) -> Self {
+        Self { run, sums: vec![(vec![0.0; terms], 0.0); run.time_s.len()], at: 0, known: false }
+    }
+
+    fn take(&mut self, seen: &Observation, length_s: f64) {
+        #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
+        let middle = seen.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
+        self.known |= seen.gyros.iter().all(|gyro| !gyro.flags.contains(SensorFlags::STALE_TEMPERATURE));
+        let half = 0.5 * self.run.window_s;
+        while self.run.time_s.get(self.at).is_some_and(|window| window + half < middle) {
+            self.at += 1;
+        }
+        if let (Some(window), Some((sums, length))) =
+            (self.run.time_s.get(self.at), self.sums.get_mut(self.at))
+            && (window - middle).abs() <= half
+        {
+            sums.iter_mut().zip(seen.gyros.bias).for_each(|(sum, bias)| *sum += bias * length_s);
+            *length += if self.known { length_s } else { f64::NAN };
+        }
+    }
+
+    fn means(self) -> Vec<Vec<f64>> {
+        let terms = self.sums.first().map_or(0, |(sums, _)| sums.len());
+        let mean = |term: usize| {
+            let mean = |(sums, length): &(Vec<f64>, f64)| {
+                if *length > 0.0 {
+                    AngularRate::from_rad_per_s(sums[term] / length).as_deg_per_h()
+                } else {
+                    f64::NAN
+                }
+            };
+            self.sums.iter().map(mean).collect()
+        };
+        (0..terms).map(mean).collect()
+    }
+}
+
+impl<'a> Columns<'a> {
+    /// Columns over the windows of runs.
+    #[must_use]
+    pub fn new(basis: Basis, runs: &'a [Samples]) -> Self {
+        Self { basis, runs, known: BTreeMap::new() }
+    }
+
+    /// What they are made with.
+    #[must_use]
+    pub fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    /// Makes the columns of terms that are not there yet.
+    ///
+    /// # Errors
+    /// [`Error::Document`].
+    pub fn make(&mut self, terms: &[Term]) -> Result<(), Error> {
+        let of_all = |term: &&Term| !self.known.contains_key(*term) && !matches!(term, Term::Scale(_));
+        let mut wanted: Vec<Term> = terms.iter().filter(of_all).copied().collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        for group in wanted.chunks(MAX_SENSORS) {
+            let mut whole = vec![Vec::new(); group.len()];
+            for run in self.runs {
+                let columns = self.basis.drive(run, group)?;
+                whole
+                    .iter_mut()
+                    .zip(columns)
+                    .for_each(|(whole, column): (&mut Vec<f64>, _)| whole.extend(column));
+            }
+            for (term, column) in group.iter().zip(whole) {
+                self.known.insert(*term, column);
+            }
+        }
+        Ok(())
+    }
+
+    /// The column of a term that was made.
+    #[must_use]
+    pub fn get(&self, term: Term) -> &[f64] {
+        self.known.get(&term).map_or(&[], Vec::as_slice)
+    }
+
+    /// Smoothed temperature (°C) and Ṫ (°C/s) over the windows.
+    ///
+    /// # Errors
+    /// As [`Columns::make`].
+    pub fn temperature(&mut self) -> Result<(Vec<f64>, Vec<f64>), Error> {
+        let (level, rate) = (Term::Static(1), Term::Rate(Branch::Both, 0));
+        self.make(&[level, rate])?;
+        let level = self.get(level).iter().map(|away| away + self.basis.reference_deg_c).collect();
+        Ok((level, self.get(rate).to_vec()))
+    }
+}

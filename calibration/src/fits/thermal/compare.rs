@@ -1,0 +1,239 @@
+//! A document beside what anybody would fit first, on runs that none of them has seen: no correction, the mean, a cubic over
+//! temperature, a cubic with Ṫ.
+
+use isotherm_log::offline::Loaded;
+use isotherm_pages::Table as Rows;
+use isotherm_protocol::document::{Document, Sample};
+
+use super::columns::Term;
+use super::outcome::{Outcome, axis_of};
+use super::stand::Stand;
+use crate::axes::output_name;
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::report::figures::short;
+use crate::report::{Curve, Rest};
+use crate::robust::scatter_of_steps;
+use crate::runs::table::{Rows as Windows, Table, Takes};
+use crate::runs::{Run, Watch};
+
+/// Axes: gyros, then accelerometers.
+const COLUMNS: usize = 6;
+/// What is compared, in the order of the columns; a document of each but of the mean, which needs none.
+const HEAD: [&str; 5] = ["raw", "mean", "cubic", "cubic + Ṫ", "this document"];
+
+/// Heading of the table that states each axis' accuracy.
+pub(super) const HEADING: &str = "Accuracy: rms of windows on the judging runs; noise of a window, and of single ticks from the thermometer";
+
+/// What a sensor's terms are compared with.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Rivals {
+    /// The mean; nothing where the level is not known.
+    pub(super) mean: Vec<(Term, f64, f64)>,
+    /// A cubic.
+    pub(super) cubic: Vec<(Term, f64, f64)>,
+    /// A cubic and Ṫ.
+    pub(super) with_rate: Vec<(Term, f64, f64)>,
+}
+
+/// A run with how long its windows are and what its unit would put out without error.
+struct Stage<'a> {
+    run: &'a Run,
+    window_s: f64,
+    rest: Rest,
+    at_rest: bool,
+}
+
+/// Rms of what is left on the judging runs, by axis and in the order of [`HEAD`]; and the levels that the document and none had where
+/// it was fitted.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Compared {
+    rms: [Option<[f64; 5]>; COLUMNS],
+    levels: [[f64; 2]; COLUMNS],
+}
+
+/// Which of the rivals.
+type Pick = fn(&Rivals) -> &Vec<(Term, f64, f64)>;
+/// Squares and their number.
+type Sum = (f64, f64);
+
+impl Compared {
+    /// Of documents without terms, with cubics, with Ṫ beside them, and the new one.
+    fn of(
+        documents: [&Document; 4],
+        fitted: &[Stage<'_>],
+        judging: &[Stage<'_>],
+        mut watch: impl Watch,
+    ) -> Result<Self, Error> {
+        let loaded: Vec<Loaded> = documents.into_iter().map(Written::compiled).collect::<Result<_, _>>()?;
+        let mut levels = [[(0.0, 0.0); 4]; COLUMNS];
+        for stage in fitted {
+            let tables = stage.tables(&loaded, &mut watch)?;
+            for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| stage.counts(*axis)) {
+                let truth = truth(&stage.rest, axis).unwrap_or(0.0);
+                for ((sum, count), table) in levels.iter_mut().zip(&tables) {
+                    let good = column(table, axis).iter().filter(|value| value.is_finite());
+                    good.for_each(|value| (*sum, *count) = (*sum + value - truth, *count + 1.0));
+                }
+            }
+        }
+        let levels =
+            levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
+        let mut sums: [[Sum; 5]; COLUMNS] = Default::default();
+        for stage in judging {
+            let tables = stage.tables(&loaded, &mut watch)?;
+            let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
+            for axis in (0..COLUMNS).filter(|axis| stage.counts(*axis)) {
+                add(&mut sums[axis], &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
+            }
+        }
+        let rms = sums.map(|axis| {
+            let known = axis.iter().all(|(_, count)| *count > 0.0);
+            known.then(|| axis.map(|(square, count)| (square / count).sqrt()))
+        });
+        Ok(Self { rms, levels: levels.map(|axis| [axis[0], axis[3]]) })
+    }
+
+    /// Levels before and after, for a run that is another part of a log of the fit.
+    pub(super) fn levels(&self) -> [[f64; 2]; COLUMNS] {
+        self.levels
+    }
+
+    /// What leaves less of an axis than the document does, in words: a mean or a cubic.
+    fn prefers(&self, axis: usize) -> Option<(&'static str, Pick)> {
+        let [_, mean, cubic, _, document] = self.rms.get(axis).copied().flatten()?;
+        if mean.min(cubic) >= document {
+            None
+        } else if mean < cubic {
+            Some(("constant", |rivals| &rivals.mean))
+        } else {
+            Some(("cubic by plain least squares", |rivals| &rivals.cubic))
+        }
+    }
+
+    /// By axis what is left in the end, beside the noise that nothing takes away and that of the thermometers.
+    pub(super) fn table(&self, outcome: &Outcome, curves: &[Curve]) -> Rows {
+        let judged = curves.iter().any(|curve| curve.sample == Sample::Out);
+        let mut rows = Vec::new();
+        for (axis, rms) in self.rms.iter().enumerate() {
+            let of = output_name(axis < 3, axis % 3);
+            let deciding = |curve: &&Curve| curve.of == of && (curve.sample == Sample::Out) == judged;
+            let mine: Vec<&Curve> = curves.iter().filter(deciding).collect();
+            let Some(first) = mine.first() else { continue };
+            let white = mine.iter().map(|curve| scatter_of_steps(&curve.after)).fold(f64::INFINITY, f64::min);
+            let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
+            let mut row = vec![format!("{of}, {}", first.measure), short(white)];
+            row.push(or_dash(outcome.passed_on(axis)));
+            row.extend((0..HEAD.len()).map(|line| or_dash(rms.map(|rms| rms[line]))));
+            rows.push(row);
+        }
+        let head = ["", "white noise", "from the thermometer"].into_iter().chain(HEAD);
+        Rows { head: head.map(str::to_owned).collect(), rows }
+    }
+}
+
+impl Outcome {
+    /// The documents beside each other, where there are runs to judge them.
+    pub(super) fn compared(
+        &self,
+        document: &Document,
+        (runs, judges): (&[Run], &[Run]),
+        rest: &impl Fn(&Run, &Stand) -> Result<Rest, Error>,
+        watch: impl Watch,
+    ) -> Result<Compared, Error> {
+        if judges.is_empty() {
+            return Ok(Compared::default());
+        }
+        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
+        let stage = |(index, run)| -> Result<Stage<'_>, Error> {
+            let stand: Stand = self.settings.stand(index);
+            let rest = rest(run, &stand)?;
+            Ok(Stage { run, window_s: stand.window_s(window_s), rest, at_rest: stand.turning.is_none() })
+        };
+        let stages: Vec<Stage<'_>> =
+            runs.iter().chain(judges).enumerate().map(stage).collect::<Result<_, _>>()?;
+        let (fitted, judging) = stages.split_at(runs.len());
+        let rival = |of: Pick| self.document(|found| found.rivals.as_ref().map_or(&found.terms, of));
+        let (cubic, with_rate) = (rival(|rivals| &rivals.cubic), rival(|rivals| &rivals.with_rate));
+        Compared::of([&self.plain(), &cubic, &with_rate, document], fitted, judging, watch)
+    }
+
+    /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
+    pub(super) fn take_simpler(&mut self, compared: &Compared) -> bool {
+        let sensors =
+            [self.base.accel.as_ref().map_or(0, |accel| accel.sensor.len()), self.base.gyro.sensor.len()];
+        let mut changed = false;
+        for (sensor, _, found) in &mut self.found {
+            // Of more than three sensors none stands for an axis.
+            let axis = axis_of(sensor).filter(|_| sensors[usize::from(sensor.gyro)] == 3);
+            let Some((words, of)) = axis.and_then(|axis| compared.prefers(axis)) else { continue };
+            let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some()) else { continue };
+            let simpler = of(rivals);
+            if found.refused.is_none() && found.terms != *simpler && !simpler.is_empty() {
+                found.terms.clone_from(simpler);
+                found.words = format!("{words}: the judging run leaves more with {}", found.words);
+                found.passed_on = None;
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Root mean square of the thermometer's noise that the terms of an axis' sensor pass on.
+    pub(super) fn passed_on(&self, axis: usize) -> Option<f64> {
+        let mine = self.found.iter().find(|(sensor, ..)| axis_of(sensor) == Some(axis));
+        mine.and_then(|(.., found)| found.passed_on.filter(|_| found.refused.is_none()))
+    }
+}
+
+impl Stage<'_> {
+    fn tables(&self, loaded: &[Loaded], watch: impl Watch) -> Result<Vec<Table>, Error> {
+        let rows = Windows { length_s: self.window_s, takes: Takes::Valid };
+        let tables = Table::together(self.run, loaded, rows, watch)?;
+        Ok(tables.into_iter().map(|table| table.whole(0.999)).collect())
+    }
+
+    /// On a table the accelerometers feel its turning, too.
+    fn counts(&self, axis: usize) -> bool {
+        self.at_rest || axis < 3
+    }
+}
+
+/// Adds the squares of what is left of an axis in windows that all have.
+fn add(
+    sums: &mut [Sum; 5],
+    tables: &[Table],
+    (axis, truth): (usize, Option<f64>),
+    levels: [f64; 4],
+    shared: bool,
+) {
+    let columns: Vec<&[f64]> = tables.iter().map(|table| column(table, axis)).collect();
+    let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
+    let good: Vec<usize> =
+        (0..count).filter(|&row| columns.iter().all(|column| column[row].is_finite())).collect();
+    #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
+    let own = |column: &[f64]| good.iter().map(|&row| column[row]).sum::<f64>() / good.len() as f64;
+    let off = |document: usize| match truth {
+        Some(truth) => truth,
+        None if shared => levels[document],
+        None => own(columns[document]),
+    };
+    // The mean of the fitted runs is what it takes, where the level counts.
+    let mean = off(0) + if truth.is_some() { levels[0] } else { 0.0 };
+    let lines = [(0, off(0)), (0, mean), (1, off(1)), (2, off(2)), (3, off(3))];
+    for ((square, number), (document, off)) in sums.iter_mut().zip(lines) {
+        for &row in &good {
+            *square += (columns[document][row] - off).powi(2);
+            *number += 1.0;
+        }
+    }
+}
+
+fn column(table: &Table, axis: usize) -> &[f64] {
+    if axis < 3 { table.rate(axis) } else { table.force(axis - 3) }
+}
+
+fn truth(rest: &Rest, axis: usize) -> Option<f64> {
+    let known = if axis < 3 { rest.rate_deg_per_h } else { rest.force_m_per_s2 };
+    known.map(|known| known[axis % 3])
+}

@@ -1,0 +1,271 @@
+//! From runs to a document and its report.
+
+use isotherm_protocol::document::{Document, Origin};
+
+use super::bare::{bare, carry, filter, nominal_of};
+use super::checks::{self, Findings};
+use super::columns::{Columns, Term};
+use super::filter::{choose_filter, longest_run_s};
+use super::found::Found;
+use super::joint::{CUBIC, Joint, rivals};
+use super::known::{Known, channel, histories};
+use super::ladder::lags;
+use super::outcome::Outcome;
+use super::samples::Samples;
+use super::select::{Target, WORTH_IT};
+use super::sequential;
+use super::settings::{Method, Settings};
+use super::stand::Stand;
+use super::target::{rest, target};
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::report::figures::six;
+use crate::report::{FitReport, Rest};
+use crate::runs::series::Series;
+use crate::runs::table::usual_window_s;
+use crate::runs::{Run, Watch};
+
+/// A document and what is to be said of it.
+#[derive(Debug)]
+pub struct Fitted {
+    /// The document.
+    pub written: Written,
+    /// The report.
+    pub report: FitReport,
+    /// Whether any sensor has new terms; without one the document says nothing new.
+    pub any_accepted: bool,
+}
+
+/// One sensor on its way.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sensor {
+    pub(super) gyro: bool,
+    pub(super) index: usize,
+    pub(super) name: String,
+    pub(super) channel: String,
+    /// Why it cannot be fitted at all.
+    pub(super) dead: Option<String>,
+}
+
+impl Sensor {
+    /// Whether it works and follows a channel.
+    pub(super) fn follows(&self, channel: &str) -> bool {
+        self.dead.is_none() && self.channel == channel
+    }
+}
+
+/// Fits the thermal terms of a unit to its runs, and judges them on others.
+///
+/// # Errors
+/// [`Error::Refused`] with every reason why the runs do not allow it; [`Error::Log`], [`Error::Document`].
+pub fn fit(
+    base: Option<&Document>,
+    (runs, judges): (&[Run], &[Run]),
+    settings: &Settings,
+    origin: Origin,
+    mut watch: impl Watch,
+) -> Result<Fitted, Error> {
+    let mut warnings = Vec::new();
+    let (mut refusals, mut dead) = (Vec::new(), Vec::new());
+    let mut series = Vec::new();
+    let stands: Vec<Stand> = (0..runs.len()).map(|run| settings.stand(run)).collect();
+    for (run, stand) in runs.iter().zip(&stands) {
+        let of_run = run.series(&mut watch)?;
+        let found = checks::raw(&run.name, &of_run, stand);
+        refusals.extend(found.refusals);
+        warnings.extend(found.warnings);
+        dead.extend(found.dead);
+        series.push(of_run);
+    }
+    let mut judging = Vec::new();
+    for (index, run) in judges.iter().enumerate() {
+        let (stand, series) = (settings.stand(runs.len() + index), run.series(&mut watch)?);
+        warnings.extend(checks::judging(&run.name, &series, &stand));
+        judging.push((series, stand));
+    }
+    let first = series.first().ok_or_else(|| Error::Refused(vec!["there is no run to fit to".to_owned()]))?;
+    if !refusals.is_empty() {
+        return Err(Error::Refused(refusals));
+    }
+    let base = match base {
+        Some(base) => base.clone(),
+        None => nominal_of(first)?,
+    };
+    let mut plain = bare(&base);
+    if plain.temperature.channel.is_empty() {
+        return Err(Error::Refused(vec![
+            "the document has no temperature channel: a thermal fit needs one; add [[temperature.channel]]"
+                .to_owned(),
+        ]));
+    }
+    let all: Vec<&Series> = series.iter().chain(judging.iter().map(|(series, _)| series)).collect();
+    let channels = all.iter().flat_map(|series| series.temperatures.values());
+    let step_s = channels.map(|channel| checks::median_step_s(&channel.time_ns)).fold(0.0, f64::max);
+    if let Some(grids_s) = carry(&mut plain, &all, step_s) {
+        let [stated_s, carried_s] = grids_s.map(six);
+        warnings.push(format!(
+            "temperature readings come every {} s: the document's grid of {stated_s} s is too fine, and is replaced \
+             by one of {carried_s} s",
+            six(step_s)
+        ));
+    }
+    let filter = plain.temperature.filter.get_or_insert_with(|| filter(step_s)).clone();
+    // No window is shorter than the readings are apart.
+    let settings =
+        &Settings { fit_window_s: settings.fit_window_s.max(libm::ceil(step_s)), ..settings.clone() };
+    let mut samples = Vec::new();
+    let mut rests = Vec::new();
+    for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
+        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
+        let (of_rest, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        rests.extend(of_rest);
+        refusals.extend(found.refusals);
+        warnings.extend(found.warnings);
+        samples.push(of_run);
+    }
+    for (run, (series, stand)) in judges.iter().zip(&judging) {
+        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
+        let (_, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        // What can be judged is judged.
+        warnings.extend(found.refusals);
+        warnings.extend(found.warnings);
+    }
+    if !refusals.is_empty() {
+        return Err(Error::Refused(refusals));
+    }
+    let sensors = sensors(&plain, &dead);
+    let histories = histories(&plain, &filter, &sensors, &samples, &mut warnings)?;
+    let targets: Vec<Target> = sensors
+        .iter()
+        .map(|sensor| target(sensor, &plain, &samples, (&rests, &stands), &histories))
+        .collect();
+    let chosen = choose_filter(&filter, &plain, (&sensors, &targets), &samples, &histories, settings)?;
+    let usual_s = || usual_window_s(longest_run_s(&samples), settings.fit_window_s);
+    let settings =
+        &Settings { window_s: Some(settings.window_s.unwrap_or_else(usual_s)), ..settings.clone() };
+    let mut outcome = Outcome::new(&base, plain, chosen.clone(), settings);
+    outcome.warnings = warnings;
+    outcome.scales(&sensors, &targets);
+    let longest_s = longest_run_s(&samples);
+    for (name, known) in &histories {
+        let columns = Columns::new(known.basis(channel(&outcome.bare, name)?, &chosen), &samples);
+        let all: Vec<(&Sensor, &Target)> =
+            sensors.iter().zip(&targets).filter(|(sensor, _)| sensor.channel == *name).collect();
+        sensors_of(&mut outcome, columns, &all, (known, longest_s), &samples)?;
+        outcome.history(name, &known.history);
+    }
+    outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
+}
+
+/// Whether a run feels what it must in its stated attitude, and what it would put out without error where it does.
+fn stands_as_stated(
+    run: &Run,
+    of_run: &Samples,
+    (base, plain): (&Document, &Document),
+    (stand, dead): (&Stand, &[(bool, usize, String)]),
+    watch: impl Watch,
+) -> Result<(Option<Rest>, Findings), Error> {
+    let mut found = checks::corrected(of_run, stand, dead);
+    if !found.refusals.is_empty() {
+        return Ok((None, found));
+    }
+    let rest = rest(run, base, stand, watch)?;
+    found.refusals.extend(checks::turning(of_run, plain, stand));
+    let stands = checks::attitude(of_run, plain, (&rest, stand));
+    found.refusals.extend(stands.refusals);
+    found.warnings.extend(stands.warnings);
+    Ok((Some(rest), found))
+}
+
+/// Every sensor that follows a channel.
+fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
+    let why = |gyro: bool, index: usize| {
+        dead.iter().find(|(g, i, _)| (*g, *i) == (gyro, index)).map(|(_, _, why)| why.clone())
+    };
+    let gyros = bare.gyro.sensor.iter().enumerate().filter_map(|(index, sensor)| {
+        let name = format!("gyro {}", sensor.name);
+        Some(Sensor { gyro: true, index, name, channel: sensor.channel.clone()?, dead: why(true, index) })
+    });
+    let accels =
+        bare.accel.iter().flat_map(|accel| &accel.sensor).enumerate().filter_map(|(index, sensor)| {
+            let name = format!("accelerometer {}", sensor.name);
+            Some(Sensor {
+                gyro: false,
+                index,
+                name,
+                channel: sensor.channel.clone()?,
+                dead: why(false, index),
+            })
+        });
+    gyros.chain(accels).collect()
+}
+
+/// Finds the terms of a channel's sensors.
+fn sensors_of<'a>(
+    outcome: &mut Outcome,
+    mut columns: Columns<'a>,
+    sensors: &[(&'a Sensor, &'a Target)],
+    (known, longest_s): (&'a Known, f64),
+    samples: &'a [Samples],
+) -> Result<(), Error> {
+    let (dead, alive): (Vec<_>, Vec<_>) = sensors.iter().partition(|(sensor, _)| sensor.dead.is_some());
+    let basis = columns.basis().clone();
+    for (sensor, _) in dead {
+        outcome.add(sensor, &basis, Found::dead(sensor.dead.as_deref().unwrap_or_default()));
+    }
+    let method = outcome.settings.method;
+    if method.is_stepwise() {
+        for (sensor, target) in alive {
+            let found = step_by_step(&mut columns, (sensor, target), known, method)?;
+            outcome.add(sensor, &basis, found);
+        }
+        return Ok(());
+    }
+    let terms = outcome.settings.terms;
+    let mut joint = Joint::of(columns, samples, (known, longest_s), &alive)?;
+    for (sensor, _) in alive {
+        let found = joint.find(sensor, terms)?;
+        outcome.add(sensor, &basis, found);
+    }
+    Ok(())
+}
+
+/// Finds the terms of one sensor one after the other.
+fn step_by_step(
+    columns: &mut Columns<'_>,
+    (sensor, target): (&Sensor, &Target),
+    known: &Known,
+    method: Method,
+) -> Result<Found, Error> {
+    let history = &known.history;
+    if !history.both_directions() {
+        return Ok(Found::refused(
+            "the temperature goes one way only: methods sequential and rate need ramps both ways",
+        ));
+    }
+    let grid = columns.basis().filter.grid_step_s;
+    let steps = if sensor.gyro {
+        let steps = if method == Method::Rate { 1 } else { 2 };
+        sequential::gyro_terms().into_iter().take(steps).collect()
+    } else {
+        vec![lags(&[(3.0 * grid).max(10.0)], 0).terms]
+    };
+    columns.make(&(0..=sequential::degree(history).max(CUBIC)).map(Term::Static).collect::<Vec<_>>())?;
+    for terms in &steps {
+        columns.make(terms)?;
+    }
+    let mut found = match sequential::find(columns, target, history, &steps) {
+        Err(why) => Found::refused(&why),
+        Ok(found) => {
+            let (left, mean) =
+                (sequential::left(columns, target, &found), sequential::left(columns, target, &[]));
+            let flat = target.flat(columns).filter(|_| left > WORTH_IT * mean);
+            flat.map_or_else(
+                || Found::sequential(found, left, mean),
+                |level| Found::flat(&level, target.level),
+            )
+        }
+    };
+    found.rivals = Some(rivals(columns, sensor, target, target.widest_scale())?);
+    Ok(found)
+}

@@ -1,0 +1,312 @@
+//! What a thermal fit came to: the document, its verdicts, its report.
+
+use isotherm_correction::thermal::Feature;
+use isotherm_protocol::document::{Document, Filter, Origin, Sample};
+
+use super::branches::History;
+use super::checks::SMALLEST_RANGE_DEG_C;
+use super::columns::{Basis, Term};
+use super::compare;
+use super::fit::{Fitted, Sensor};
+use super::found::Found;
+use super::model::{put_accel, put_gyro};
+use super::settings::Settings;
+use super::stand::Stand;
+use crate::axes::output_name;
+use crate::document::written::Written;
+use crate::error::Error;
+use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
+use crate::runs::{Run, Watch};
+use crate::size::Size;
+
+/// Everything that gathers on the way.
+#[derive(Debug)]
+pub(super) struct Outcome {
+    pub(super) bare: Document,
+    pub(super) warnings: Vec<String>,
+    pub(super) base: Document,
+    pub(super) filter: Filter,
+    pub(super) settings: Settings,
+    pub(super) found: Vec<(Sensor, Basis, Found)>,
+    pub(super) notes: Vec<String>,
+    pub(super) range_deg_c: [f64; 2],
+    pub(super) rate_range_deg_c_per_s: [f64; 2],
+}
+
+impl Outcome {
+    pub(super) fn new(base: &Document, without: Document, filter: Filter, settings: &Settings) -> Self {
+        Self {
+            bare: without,
+            warnings: Vec::new(),
+            base: base.clone(),
+            filter,
+            settings: settings.clone(),
+            found: Vec::new(),
+            notes: Vec::new(),
+            range_deg_c: [f64::INFINITY, f64::NEG_INFINITY],
+            rate_range_deg_c_per_s: [0.0, 0.0],
+        }
+    }
+
+    pub(super) fn add(&mut self, sensor: &Sensor, basis: &Basis, found: Found) {
+        self.found.push((sensor.clone(), basis.clone(), found));
+    }
+
+    pub(super) fn history(&mut self, name: &str, history: &History) {
+        let [low, high] = history.range_deg_c;
+        self.range_deg_c = [self.range_deg_c[0].min(low), self.range_deg_c[1].max(high)];
+        let [cooling, heating] = history.rate_range_deg_c_per_s;
+        self.rate_range_deg_c_per_s =
+            [self.rate_range_deg_c_per_s[0].min(cooling), self.rate_range_deg_c_per_s[1].max(heating)];
+        let ramps: Vec<String> = history
+            .ramps
+            .iter()
+            .map(|ramp| {
+                let [from, to] = ramp.from_to_deg_c;
+                format!("{from:.0} to {to:.0} °C at up to {:.1} °C/min", ramp.deg_c_per_min.abs())
+            })
+            .collect();
+        let plateaus: Vec<String> = history
+            .plateaus
+            .iter()
+            .map(|plateau| format!("{:.1} °C for {:.0} min", plateau.deg_c, plateau.length_s / 60.0))
+            .collect();
+        let plateaus = if plateaus.is_empty() { "none".to_owned() } else { plateaus.join(", ") };
+        self.notes.push(format!(
+            "Channel {name}: {low:.1} to {high:.1} °C; ramps {}; plateaus {plateaus}.",
+            ramps.join(", ")
+        ));
+    }
+
+    /// Writes the document, judges it, and takes out what made an axis worse.
+    pub(super) fn finish(
+        mut self,
+        (runs, judges): (&[Run], &[Run]),
+        origin: Origin,
+        rest: impl Fn(&Run, &Stand) -> Result<Rest, Error>,
+        mut watch: impl Watch,
+    ) -> Result<Fitted, Error> {
+        self.found.sort_by_key(|(sensor, ..)| (!sensor.gyro, sensor.index));
+        let before = Written::of(&self.plain())?;
+        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
+        let (document, curves, mut verdicts, troubles, compared) = loop {
+            let document = self.document(|found| &found.terms);
+            let compared = self.compared(&document, (runs, judges), &rest, &mut watch)?;
+            if self.take_simpler(&compared) {
+                continue;
+            }
+            let written = Written::of(&document)?;
+            let (mut curves, mut troubles) = (Vec::new(), Vec::new());
+            let both =
+                runs.iter().map(|run| (run, Sample::In)).chain(judges.iter().map(|run| (run, Sample::Out)));
+            for (index, (run, sample)) in both.enumerate() {
+                let stand = self.settings.stand(index);
+                let shares = sample == Sample::Out && runs.iter().any(|other| run.shares_log(other));
+                let rest = Rest { levels: shares.then(|| compared.levels()), ..rest(run, &stand)? };
+                let both_ways = judge(
+                    run,
+                    sample,
+                    (&before.loaded, &written.loaded),
+                    (&written.document, &rest),
+                    stand.window_s(window_s),
+                    &mut watch,
+                )?;
+                troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));
+                // On a table the accelerometers feel its turning, too.
+                let at_rest = stand.turning.is_none();
+                curves.extend(
+                    both_ways.curves.into_iter().filter(|curve| at_rest || curve.of.starts_with("gyro")),
+                );
+            }
+            troubles.extend(constant(&curves));
+            let verdicts = Curve::verdicts(&curves);
+            if verdicts.is_empty() {
+                let nothing = "no window of any axis is complete: the log has gaps, or all its ticks are flagged; \
+                               check with isotherm-replay correct";
+                return Err(Error::Refused([vec![nothing.to_owned()], troubles].concat()));
+            }
+            // Every time round there is a sensor less.
+            if !self.take_out(&verdicts) {
+                break (document, curves, verdicts, troubles, compared);
+            }
+        };
+        let table = compared.table(&self, &curves);
+        self.say(&mut verdicts);
+        for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
+            self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
+        }
+        let mut document = document;
+        document.origin = Some(self.origin(origin, &verdicts));
+        let written = Written::of(&document)?;
+        for words in troubles {
+            if !self.warnings.contains(&words) {
+                self.warnings.push(words);
+            }
+        }
+        let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
+        self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
+        let mut report = self.report(verdicts, curves);
+        report.tables.push((compare::HEADING.to_owned(), table));
+        Ok(Fitted { written, report, any_accepted })
+    }
+
+    /// The document without the fitted terms, with the filter of the fit.
+    pub(super) fn plain(&self) -> Document {
+        let mut document = self.bare.clone();
+        document.temperature.filter = Some(self.filter.clone());
+        document
+    }
+
+    /// The document with what was found, or something else for it; a refused sensor keeps what it had.
+    pub(super) fn document(&self, of: impl for<'a> Fn(&'a Found) -> &'a Vec<(Term, f64, f64)>) -> Document {
+        let mut document = self.plain();
+        for (sensor, basis, found) in &self.found {
+            let terms: Vec<(Term, f64)> = of(found).iter().map(|(term, value, _)| (*term, *value)).collect();
+            if sensor.gyro {
+                let Some(gyro) = document.gyro.sensor.get_mut(sensor.index) else { continue };
+                match self.base.gyro.sensor.get(sensor.index).filter(|_| found.refused.is_some()) {
+                    Some(old) => gyro.clone_from(old),
+                    None => put_gyro(gyro, basis, &terms),
+                }
+            } else if let Some(accel) =
+                document.accel.as_mut().and_then(|accel| accel.sensor.get_mut(sensor.index))
+            {
+                let old = self.base.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index));
+                match old.filter(|_| found.refused.is_some()) {
+                    Some(old) => accel.clone_from(old),
+                    None => put_accel(accel, basis, &terms),
+                }
+            }
+        }
+        document.created = self.settings.created.or(self.base.created);
+        if self.settings.removes_mean() {
+            let level = "The attitude of the unit was not stated: every fitted bias is zero in the middle of its \
+                         range, and the level of each output does not change.";
+            document.note = Some(match &self.base.note {
+                Some(note) if note.contains(level) => note.clone(),
+                Some(note) => format!("{note}\n{level}"),
+                None => level.to_owned(),
+            });
+        }
+        document
+    }
+
+    /// Takes the terms of sensors out whose axis became worse; whether there was one.
+    fn take_out(&mut self, verdicts: &[Verdict]) -> bool {
+        let mut worse = false;
+        for verdict in verdicts {
+            let mine = self.found.iter_mut().find(|(sensor, _, found)| {
+                axis_name(sensor).as_ref() == Some(&verdict.of) && found.refused.is_none()
+            });
+            let Some((_, _, found)) = mine.filter(|_| !verdict.accepted) else { continue };
+            let sample = if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
+            found.refused = Some(format!("{sample} its {}", verdict.reason));
+            found.terms.clear();
+            worse = true;
+        }
+        worse
+    }
+
+    /// That a refused sensor keeps terms which were made with another filter: a document has one for all its sensors.
+    fn kept_terms(&self) -> Option<String> {
+        let old = self.base.temperature.filter.as_ref()?;
+        let lengths = |filter: &Filter| [filter.smoothing_s, filter.derivative_step_s];
+        if lengths(old).iter().zip(lengths(&self.filter)).all(|(a, b)| (a - b).abs() <= 1e-9 * b) {
+            return None;
+        }
+        let follows = |sensor: &Sensor| {
+            if sensor.gyro {
+                let gyro = self.base.gyro.sensor.get(sensor.index);
+                gyro.is_some_and(|gyro| {
+                    let following = [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+                    following.into_iter().any(|feature| gyro.terms.has(feature))
+                })
+            } else {
+                let accel = self.base.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index));
+                accel.is_some_and(|accel| accel.terms.has(Feature::Lag))
+            }
+        };
+        let refused = self.found.iter().filter(|(.., found)| found.refused.is_some());
+        let names: Vec<&str> =
+            refused.filter(|(sensor, ..)| follows(sensor)).map(|(sensor, ..)| sensor.name.as_str()).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "{}: refused, and keeps rate terms made with a smoothing of {} s and a derivative step of {} s, but \
+                 the document now has {} s and {} s for all sensors: they are wrong with these. Keep the old filter \
+                 with --smoothing {}",
+                names.join(", "),
+                old.smoothing_s,
+                old.derivative_step_s,
+                self.filter.smoothing_s,
+                self.filter.derivative_step_s,
+                old.smoothing_s
+            )
+        })
+    }
+
+    /// Whether a sensor of the document at hand has terms of the kind that is fitted.
+    fn had_terms(&self, sensor: &Sensor) -> bool {
+        let accel = |document: &Document| {
+            document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index).cloned())
+        };
+        if sensor.gyro {
+            self.base.gyro.sensor.get(sensor.index) != self.bare.gyro.sensor.get(sensor.index)
+        } else {
+            accel(&self.base) != accel(&self.bare)
+        }
+    }
+
+    /// Gives the verdicts their reasons.
+    fn say(&self, verdicts: &mut [Verdict]) {
+        for verdict in verdicts {
+            verdict.figure = Figure::Rms;
+            let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
+            let Some((sensor, _, found)) = mine else { continue };
+            if let Some(why) = &found.refused {
+                *verdict = verdict.clone().refused(why.clone());
+                if found.dead {
+                    // What comes out along its axis is not its own.
+                    (verdict.in_sample, verdict.out_of_sample) = ([Size::default(); 2], None);
+                }
+            } else {
+                verdict.accepted = true;
+                let words = match (found.flat, found.terms.is_empty()) {
+                    (true, true) if self.had_terms(sensor) => format!("{FLAT}; its terms are removed"),
+                    (true, true) => format!("{FLAT}; left unchanged"),
+                    (true, false) => format!("{FLAT}; constant bias"),
+                    (false, _) => found.words.clone(),
+                };
+                *verdict = verdict.clone().remark(words);
+            }
+        }
+    }
+}
+
+/// Judging runs over which a temperature hardly moves.
+fn constant(curves: &[Curve]) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    for curve in curves.iter().filter(|curve| curve.sample == Sample::Out) {
+        let range = Size::of(&curve.temperature_deg_c).peak_to_peak;
+        if !curve.temperature_deg_c.is_empty() && range < SMALLEST_RANGE_DEG_C {
+            let run = &curve.run;
+            let of = format!(
+                "{run}: its temperature moves by {range:.1} °C, at least {SMALLEST_RANGE_DEG_C} °C are needed for \
+                 judging: use a run through the chamber"
+            );
+            if words.iter().all(|other| !other.starts_with(&format!("{run}: "))) {
+                words.push(of);
+            }
+        }
+    }
+    words
+}
+
+/// The case axis that a sensor of a unit with three stands for, gyros first.
+pub(super) fn axis_of(sensor: &Sensor) -> Option<usize> {
+    (sensor.index < 3).then_some(sensor.index + if sensor.gyro { 0 } else { 3 })
+}
+
+/// The same, as the curves call it.
+fn axis_name(sensor: &Sensor) -> Option<String> {
+    (sensor.index < 3).then(|| output_name(sensor.gyro, sensor.index))
+}

@@ -1,0 +1,179 @@
+//! What is said of a thermal fit: the origin in the document, and the report.
+
+use isotherm_pages::Table;
+use isotherm_protocol::document::{Document, Origin};
+
+use super::columns::Basis;
+use super::fit::Sensor;
+use super::found::Found;
+use super::model::described;
+use super::outcome::Outcome;
+use super::scale::Kept;
+use super::select::{Target, Tried};
+use crate::report::figures::short;
+use crate::report::{Coefficient, Curve, FitReport, Verdict, output_unit, residuals};
+
+impl Outcome {
+    /// Says which sensors keep their scale factors, and why.
+    pub(super) fn scales(&mut self, sensors: &[Sensor], targets: &[Target]) {
+        let mut without = Vec::new();
+        for (sensor, target) in sensors.iter().zip(targets).filter(|(sensor, _)| sensor.dead.is_none()) {
+            match &target.kept {
+                Some(Kept::Short(why)) => {
+                    self.warnings.push(format!("{}: it keeps its scale factor: {why}", sensor.name));
+                }
+                Some(Kept::NotMeant) => without.push(sensor.gyro),
+                None => {}
+            }
+        }
+        let kinds: Vec<&str> = [
+            (true, "gyros on a rate table (--axis, --rate)"),
+            (false, "accelerometers in several attitudes (--roll, --pitch)"),
+        ]
+        .into_iter()
+        .filter(|(gyro, _)| without.contains(gyro))
+        .map(|(_, words)| words)
+        .collect();
+        if !kinds.is_empty() {
+            self.notes.push(format!(
+                "Scale factors without runs are kept: of {}, each log with its own.",
+                kinds.join(" and of ")
+            ));
+        }
+    }
+
+    pub(super) fn origin(&self, origin: Origin, verdicts: &[Verdict]) -> Origin {
+        let mut details = toml::Table::new();
+        let mut figures = toml::Table::new();
+        for (sensor, _, found) in &self.found {
+            let mut of_sensor = toml::Table::new();
+            of_sensor.insert("model".into(), found.words.clone().into());
+            if let Some(why) = &found.refused {
+                of_sensor.insert("refused".into(), why.clone().into());
+            }
+            let sigmas = found.terms.iter().map(|(term, value, sigma)| {
+                let (name, unit) = described(*term, output(&self.base, sensor));
+                let row = [
+                    ("of", name.into()),
+                    ("unit", unit.into()),
+                    ("value", (*value).into()),
+                    ("sigma", (*sigma).into()),
+                ];
+                toml::Value::Table(
+                    row.into_iter()
+                        .map(|(key, value): (&str, toml::Value)| (key.to_owned(), value))
+                        .collect(),
+                )
+            });
+            of_sensor.insert("coefficient".into(), toml::Value::Array(sigmas.collect()));
+            if let Some((choice, best)) =
+                found.choice.as_ref().and_then(|choice| Some((choice, choice.best()?)))
+            {
+                let mut validation = toml::Table::new();
+                validation.insert("left_of_mean".into(), choice.mean.into());
+                validation.insert("left".into(), best.score.into());
+                of_sensor.insert("cross_validation".into(), validation.into());
+            }
+            figures.insert(sensor.name.clone(), of_sensor.into());
+        }
+        details.insert("sensors".into(), figures.into());
+        details.insert("fit_window_s".into(), self.settings.fit_window_s.into());
+        details.insert("smoothing_s".into(), self.filter.smoothing_s.into());
+        details.insert("derivative_step_s".into(), self.filter.derivative_step_s.into());
+        details.insert("mean_removed".into(), self.settings.removes_mean().into());
+        Origin {
+            method: Some(self.settings.method.name().to_owned()),
+            range_deg_c: Some(self.range_deg_c.map(|t| libm::round(10.0 * t) / 10.0)),
+            rate_range_deg_c_per_s: Some(self.rate_range_deg_c_per_s.map(|r| libm::round(1e5 * r) / 1e5)),
+            residual: residuals(verdicts),
+            details: Some(details),
+            ..origin
+        }
+    }
+
+    pub(super) fn report(self, verdicts: Vec<Verdict>, curves: Vec<Curve>) -> FitReport {
+        let title = format!("Thermal calibration, method {}", self.settings.method.name());
+        let mut report = FitReport::new(title, self.base.unit.clone());
+        report.verdicts = verdicts;
+        report.warnings = self.warnings;
+        report.notes = self.notes;
+        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
+        report.notes.push(format!(
+            "The fit is to means over {} s; before and after are means over {window_s} s.",
+            self.settings.fit_window_s
+        ));
+        report.notes.push(format!(
+            "Temperature is smoothed over {} s and differentiated over {} s on a grid of {} s: this filter belongs to the coefficients.",
+            self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
+        ));
+        if self.settings.removes_mean() {
+            report.notes.push(
+                "The mean of each run is removed: Earth's rate and gravity along the axes are unknown."
+                    .into(),
+            );
+        }
+        for (sensor, _, found) in &self.found {
+            for (term, value, sigma) in &found.terms {
+                let (name, unit) = described(*term, output(&self.base, sensor));
+                report.coefficients.push(Coefficient::new(
+                    format!("{} {name}", sensor.name),
+                    unit,
+                    *value,
+                    Some(*sigma),
+                ));
+            }
+        }
+        report.validation = validation(&self.found);
+        report.residuals = curves;
+        report
+    }
+}
+
+/// Unit of a sensor's bias.
+fn output(document: &Document, sensor: &Sensor) -> &'static str {
+    if sensor.gyro { "°/h" } else { output_unit(document) }
+}
+
+/// Models that the table of a sensor shows, beside the one without dynamics and the chosen one.
+const SHOWN: usize = 8;
+
+/// The best model of each kind of dynamics, by sensor: of many kinds the best ones.
+fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
+    let head = ["sensor", "model", "coefficients", "remaining on unseen parts", "of the mean's", ""];
+    let mut rows = Vec::new();
+    for (sensor, _, found) in found {
+        let Some(choice) = &found.choice else { continue };
+        let kind_of = |tried: &'_ Tried| (tried.spec.dynamics.name.clone(), tried.spec.scale);
+        let mut kinds: Vec<&Tried> = Vec::new();
+        for tried in &choice.tried {
+            match kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(tried)) {
+                Some(kind) if tried.score < kind.score => *kind = tried,
+                Some(_) => {}
+                None => kinds.push(tried),
+            }
+        }
+        if let Some(best) = choice.best()
+            && let Some(kind) = kinds.iter_mut().find(|kind| kind_of(kind) == kind_of(best))
+        {
+            *kind = best;
+        }
+        let mut scores: Vec<f64> = kinds.iter().map(|kind| kind.score).collect();
+        scores.sort_unstable_by(f64::total_cmp);
+        let last = scores.get(SHOWN - 1).copied().unwrap_or(f64::INFINITY);
+        for kind in kinds {
+            let chosen = choice.best() == Some(kind);
+            if kind.score > last && !chosen && !kind.spec.dynamics.terms.is_empty() {
+                continue;
+            }
+            rows.push(vec![
+                sensor.name.clone(),
+                kind.spec.words(),
+                kind.count.to_string(),
+                short(kind.score),
+                format!("{:.1} %", 100.0 * kind.score / choice.mean),
+                if chosen && found.refused.is_none() { "chosen".to_owned() } else { String::new() },
+            ]);
+        }
+    }
+    (!rows.is_empty()).then(|| Table { head: head.map(str::to_owned).to_vec(), rows })
+}

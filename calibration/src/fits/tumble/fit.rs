@@ -1,0 +1,293 @@
+//! From a run to the fits of its accelerometers and gyros, and every reason not to.
+
+pub(super) mod doubts;
+pub(super) mod odd;
+
+use crate::axes::AXES;
+use crate::fits::positions::faults;
+use crate::fits::positions::pose::Pose;
+use crate::fits::positions::still::{StillLimits, still};
+use crate::fits::positions::track::Track;
+use crate::report::figures::{counted, short};
+use crate::size::Size;
+
+use super::accel::{self, AccelFit, SENSORS, norm};
+use super::acceleration::{self, GyroDrift};
+use super::gyro::{self, GyroFit, Transition};
+
+/// Fewest poses for nine parameters; as many as that leave no residual to judge by.
+pub const FEWEST_POSES: usize = 12;
+/// Share of the mean square along the direction that the poses show least: below it they lie in one plane.
+const THINNEST: f64 = 0.05;
+/// Multiples of the still start's variance that are tried as the limit of stillness.
+const FACTORS: [f64; 9] = [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
+/// Shortest turn that says something of a gyro (rad).
+const SHORTEST_TURN_RAD: f64 = 0.1;
+/// Angle within which poses are alike (rad): 15°.
+const ALIKE_RAD: f64 = core::f64::consts::PI / 12.0;
+/// Longest transition (s): beyond it the gyros' drift is what is measured.
+const LONGEST_TRANSITION_S: f64 = 60.0;
+
+/// How a tumble log is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Gravity (m/s²).
+    pub gravity: f64,
+    /// What counts as still; the factor is searched where `search` says so.
+    pub limits: StillLimits,
+    /// Try several factors and keep the one with the smallest residual.
+    pub search: bool,
+    /// Time at the beginning that the unit stood still (s).
+    pub start_s: f64,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tumble {
+    /// The poses.
+    pub poses: Vec<Pose>,
+    /// The factor of stillness that they were found with.
+    pub factor: f64,
+    /// The accelerometers.
+    pub accel: AccelFit,
+    /// The gyros, or why not.
+    pub gyro: Result<GyroFit, String>,
+    /// Drift with acceleration of each gyro, or why none is stated.
+    pub acceleration: [Result<GyroDrift, String>; 3],
+    /// |f| − g (m/s²) of each pose, by the fit of all that are not within 15° of it; no number where these have none.
+    pub held_out: Vec<f64>,
+    /// Largest distance of each gyro's output from that at rest (rad/s of the log).
+    pub largest_rate: [f64; 3],
+    /// What is to be said.
+    pub warnings: Vec<String>,
+}
+
+impl Tumble {
+    /// Mean temperature of a channel over all poses (°C).
+    #[must_use]
+    pub fn mean_temperature(&self, channel: &str) -> Option<f64> {
+        let of =
+            |pose: &Pose| Some((pose.temperature_deg_c.get(channel)? * pose.duration_s, pose.duration_s));
+        let (sum, time) = self.poses.iter().filter_map(of).fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+        (time > 0.0).then(|| sum / time)
+    }
+}
+
+/// Fits a tumble log.
+///
+/// # Errors
+/// Every reason why it cannot be, with what to do.
+pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>> {
+    faults(track)?;
+    let factors: &[f64] = if settings.search { &FACTORS } else { &[] };
+    let mut best: Option<(f64, Vec<Pose>, AccelFit)> = None;
+    let mut reasons = Vec::new();
+    let single = [settings.limits.factor];
+    for factor in if factors.is_empty() { &single[..] } else { factors } {
+        let limits = StillLimits { factor: *factor, ..settings.limits };
+        let intervals = still(track, &limits, Some(settings.start_s));
+        let poses = Pose::of(track, 0, &intervals);
+        match found(track, &poses, settings).and_then(|()| {
+            accel::fit(&outputs(&poses), settings.gravity)
+                .map_err(|why| vec![doubts::no_accelerometers(&why)])
+        }) {
+            Ok(fit) => {
+                let rms = Size::of(&fit.residual).rms;
+                if best.as_ref().is_none_or(|(_, _, other)| rms < Size::of(&other.residual).rms) {
+                    best = Some((*factor, poses, fit));
+                }
+            }
+            Err(why) => reasons = why,
+        }
+    }
+    let Some((factor, poses, accel)) = best else { return Err(reasons) };
+    doubts::sound(&poses, &accel)?;
+    let held_out = held_out(&poses, &accel);
+    let mut warnings = Vec::new();
+    let (after, outside) = (Size::of(&accel.residual).rms, Size::of(&held_out).rms);
+    if outside > 2.0 * after {
+        warnings.push(format!(
+            "|f| − g is {} m/s² rms in unseen poses, {} in fitted ones: use more poses",
+            short(outside),
+            short(after)
+        ));
+    }
+    warnings.extend(doubts::beyond_noise(track, &poses, &accel));
+    warnings.extend(doubts::ends_early(track, &poses));
+    let rest = at_rest(&poses);
+    let gyro = gyros(track, &poses, &accel, rest);
+    let force: Vec<[f64; 3]> = poses.iter().map(|pose| accel.force(&pose.outputs)).collect();
+    let directions: Vec<[f64; 3]> = force.iter().map(|force| unit(*force)).collect();
+    let acceleration = acceleration::judged(&poses, &force, |a, b| !apart(&directions, a, b));
+    let largest_rate = [0, 1, 2].map(|gyro| {
+        let column = track.gyros.get(gyro).map_or(&[][..], Vec::as_slice);
+        column
+            .iter()
+            .map(|rate| (rate - rest[gyro]).abs())
+            .filter(|away| away.is_finite())
+            .fold(0.0, f64::max)
+    });
+    Ok(Tumble { poses, factor, accel, gyro, acceleration, held_out, largest_rate, warnings })
+}
+
+/// Mean outputs of poses.
+fn outputs(poses: &[Pose]) -> Vec<Vec<f64>> {
+    poses.iter().map(|pose| pose.outputs.clone()).collect()
+}
+
+/// Sensors that cannot be fitted, before anything else.
+fn faults(track: &Track) -> Result<(), Vec<String>> {
+    let mut reasons = Vec::new();
+    let kinds = [("accelerometer", &track.outputs), ("gyro", &track.gyros)];
+    for (kind, columns) in kinds {
+        if columns.len() != SENSORS {
+            reasons.push(format!(
+                "the unit has {} {kind}s: |f| = g needs three; for more use `isotherm-calibrate positions` on a stand",
+                columns.len()
+            ));
+        }
+    }
+    reasons.extend(faults::dead(std::slice::from_ref(track)));
+    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
+}
+
+/// Whether the poses allow a fit.
+fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<String>> {
+    let mut reasons = Vec::new();
+    let begins = poses.first().map_or(f64::INFINITY, |pose| pose.span_s[0]);
+    let length = poses.first().map_or(0.0, |pose| pose.duration_s);
+    let window = settings.limits.window_s;
+    if begins > window + settings.limits.settle_s || length < settings.start_s - 2.0 * window {
+        let at = if begins.is_finite() {
+            format!("the first still interval begins at {begins:.1} s and lasts {length:.1} s")
+        } else {
+            "no still interval was found at all".to_owned()
+        };
+        reasons.push(format!(
+            "the unit must be still for the first {} s, to measure the noise; {at}: leave it alone before the first \
+             turn, or reduce --still-start",
+            settings.start_s
+        ));
+        reasons.extend(track.gaps());
+    }
+    reasons.extend(faults::clipped(std::slice::from_ref(track), poses));
+    if poses.len() < FEWEST_POSES {
+        reasons.push(format!(
+            "{} {} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
+            counted(poses.len(), "still pose", "still poses"),
+            if poses.len() == 1 { "was" } else { "were" },
+            settings.limits.least_s + settings.limits.window_s
+        ));
+    } else if let Some(words) = flat(poses) {
+        reasons.push(words);
+    }
+    if reasons.is_empty() { Ok(()) } else { Err(reasons) }
+}
+
+/// Words where the poses lie in one plane.
+///
+/// Outputs are brought to the size of one by the largest half range of all axes: an axis that never points up or down has a
+/// small one, and must not be blown up to the size of the others.
+fn flat(poses: &[Pose]) -> Option<String> {
+    let ends = [0, 1, 2].map(|i| {
+        poses.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), pose| {
+            let value = pose.outputs.get(i).copied().unwrap_or(f64::NAN);
+            (low.min(value), high.max(value))
+        })
+    });
+    let half = ends.iter().map(|(low, high)| 0.5 * (high - low)).fold(0.0, f64::max);
+    let mut scatter = nalgebra::Matrix3::<f64>::zeros();
+    for pose in poses {
+        let v = nalgebra::Vector3::from_fn(|i, _| {
+            (pose.outputs.get(i).copied().unwrap_or(f64::NAN) - 0.5 * (ends[i].0 + ends[i].1)) / half
+        });
+        scatter += v * v.transpose();
+    }
+    #[expect(clippy::cast_precision_loss, reason = "poses")]
+    let eigen = (scatter / poses.len() as f64).symmetric_eigen();
+    let (index, least) = eigen.eigenvalues.argmin();
+    if least.is_nan() || least >= THINNEST {
+        return None;
+    }
+    let direction = eigen.eigenvectors.column(index);
+    let axis = AXES.get(direction.iamax()).copied().unwrap_or_default();
+    Some(format!(
+        "the poses lie in one plane: along {axis} the specific force is {:.2} g rms, at least {:.2} g is needed; put the unit down \
+         with its {axis} axis up, down and slanting",
+        least.max(0.0).sqrt(),
+        THINNEST.sqrt()
+    ))
+}
+
+/// |f| − g of every pose by the fit of those that look elsewhere. A unit that is put down by hand is often put down alike: of two
+/// poses next to each other the one knows what the other leaves, and a fit that has either says nothing of poses that are new.
+fn held_out(poses: &[Pose], fit: &AccelFit) -> Vec<f64> {
+    let all = outputs(poses);
+    let directions: Vec<[f64; 3]> = all.iter().map(|outputs| unit(fit.force(outputs))).collect();
+    let one = |index: usize| {
+        let others = (0..all.len()).filter(|other| apart(&directions, index, *other));
+        let others: Vec<Vec<f64>> = others.map(|other| all[other].clone()).collect();
+        let fit = accel::fit(&others, fit.gravity);
+        fit.map_or(f64::NAN, |fit| norm(fit.force(&all[index])) - fit.gravity)
+    };
+    (0..all.len()).map(one).collect()
+}
+
+/// Whether two poses look at different directions.
+fn apart(directions: &[[f64; 3]], a: usize, b: usize) -> bool {
+    dot(directions[a], directions[b]) < libm::cos(ALIKE_RAD)
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    v.map(|c| c / norm(v))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Mean output of each gyro over all poses.
+fn at_rest(poses: &[Pose]) -> [f64; 3] {
+    let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
+    [0, 1, 2].map(|gyro| {
+        let of = |pose: &Pose| pose.gyro(gyro) * pose.duration_s;
+        poses.iter().map(of).sum::<f64>() / total
+    })
+}
+
+/// Fits the gyros to what lies between the poses.
+fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Result<GyroFit, String> {
+    if track.gyro_counts {
+        return Err("the gyro readings are counts: convert them in the mapping".into());
+    }
+    let transitions = transitions(poses, |pose| accel.force(&pose.outputs));
+    if transitions.len() < 6 {
+        return Err(format!(
+            "{} of at least {:.0}° within {LONGEST_TRANSITION_S} s between the poses, six are needed: turn the unit about each of its \
+             axes, each time within {LONGEST_TRANSITION_S} s from pose to pose",
+            counted(transitions.len(), "turn", "turns"),
+            SHORTEST_TURN_RAD.to_degrees()
+        ));
+    }
+    let fit = gyro::fit(track, rest, &transitions).map_err(|why| doubts::no_gyros(&why))?;
+    match doubts::lost(&fit) {
+        Some(words) => Err(words),
+        None => Ok(fit),
+    }
+}
+
+/// Turns between neighbouring poses, by the specific force that each has.
+#[must_use]
+pub fn transitions(poses: &[Pose], force: impl Fn(&Pose) -> [f64; 3]) -> Vec<Transition> {
+    let direction = |pose: &Pose| unit(force(pose));
+    let between = |pair: &[Pose]| {
+        let [before, after] = pair else { return None };
+        let directions = [direction(before), direction(after)];
+        let cosine = dot(directions[0], directions[1]);
+        let ticks = [before.interval.end, after.interval.first];
+        let length = after.span_s[0] - before.span_s[1];
+        let turned = cosine < libm::cos(SHORTEST_TURN_RAD);
+        (turned && length < LONGEST_TRANSITION_S).then_some(Transition { ticks, directions })
+    };
+    poses.windows(2).filter_map(between).collect()
+}

@@ -1,0 +1,197 @@
+//! What is physically odd about fits that are good: axes, signs and scale factors far from what the document at hand states.
+
+use isotherm_protocol::document::Document;
+
+use super::Tumble;
+use crate::axes::{AXES, several};
+use crate::fits::positions::measure;
+use crate::fits::positions::sense::{Beside, found_along, out_of_place, places, turned};
+use crate::report::figures::short;
+
+/// What to do where sensors lie along the others' axes or the other way round: the fewest mistakes that make it.
+///
+/// Columns of accelerometers that are swapped, or one with a wrong sign, make a mirror image of the case: |f| is g all the same, and a
+/// rotation, which has no mirror image, is seen by the gyros the other way round.
+fn mistakes(order: [usize; 3], same_way: [bool; 3]) -> String {
+    let moved = out_of_place(order);
+    let wrong: Vec<usize> = (0..3).filter(|axis| !same_way[*axis]).collect();
+    let right: Vec<usize> = (0..3).filter(|axis| same_way[*axis]).collect();
+    match (moved.len(), wrong.as_slice()) {
+        (0, [_]) => format!("{} is found with the other sign: is its sign missing in the mapping?", several("gyro", &wrong, 3)),
+        (0, [_, _]) => format!(
+            "{} are found with the other sign: is the sign of {} missing in the mapping, or are those of both gyros?",
+            several("gyro", &wrong, 3),
+            several("accelerometer", &right, 3)
+        ),
+        (0, _) => format!("{} are found with the other sign: are their signs missing in the mapping?", several("gyro", &wrong, 3)),
+        (2, []) => format!("{} look swapped: check the columns in the mapping", several("gyro", &moved, 3)),
+        (2, [_, _, _]) => format!("{} look swapped: check the columns in the mapping", several("accelerometer", &moved, 3)),
+        (3, []) => "the columns of the gyros, or of the accelerometers, look as if they were in another order: check them in the mapping".to_owned(),
+        (2, _) => format!(
+            "{} look swapped, or accelerometers, and a sign is the other one: check the columns in the mapping, or state how the gyros \
+             lie in the document",
+            several("gyro", &moved, 3)
+        ),
+        _ => "columns of gyros or accelerometers look as if they were in another order, and a sign is the other one: check them in the \
+              mapping"
+            .to_owned(),
+    }
+}
+
+/// Whether the accelerometers show a mirror image of the case, by the fewest mistakes: one sign, or two of their columns swapped. A
+/// document of that would turn the wrong way round.
+fn is_mirrored(order: [usize; 3], same_way: [bool; 3]) -> bool {
+    let wrong = same_way.into_iter().filter(|same| !same).count();
+    matches!((out_of_place(order).len(), wrong), (0, 2) | (2, 3))
+}
+
+/// Words where gyros lie elsewhere than stated: `Err` where that is a mistake of the accelerometers.
+fn gyros(sensors: &[Beside]) -> Result<Option<String>, String> {
+    let turned = turned(sensors);
+    if turned.is_empty() {
+        return Ok(None);
+    }
+    let places = places(sensors);
+    let what = places.map_or_else(
+        || {
+            format!(
+                "{} far from where the document at hand, or else {} it: are columns of the mapping swapped, of the accelerometers \
+                 too, or is a sign the other one?",
+                if turned.len() == 1 { format!("{} is", several("gyro", &turned, sensors.len())) } else { format!("{} are", several("gyro", &turned, sensors.len())) },
+                if turned.len() == 1 { "its column, has" } else { "their columns, have" },
+            )
+        },
+        |(order, same_way)| mistakes(order, same_way),
+    );
+    let stop = if what.ends_with('?') { "" } else { "." };
+    let words = format!("{what}{stop} {}", found_along("gyro", sensors, &turned));
+    if places.is_some_and(|(order, same_way)| is_mirrored(order, same_way)) {
+        Err(words)
+    } else {
+        Ok(Some(words))
+    }
+}
+
+/// What is physically odd about fits that are good: axes and scale factors far from what the document at hand states.
+///
+/// # Errors
+/// Where the accelerometers show a mirror image of the case.
+pub(in crate::fits::tumble) fn odd(
+    base: &Document,
+    tumble: &Tumble,
+    temperature: &dyn Fn(Option<&String>) -> f64,
+) -> Result<Vec<String>, Vec<String>> {
+    let mut words = Vec::new();
+    if let Some(accel) = &base.accel {
+        let stated: Vec<f64> = (accel.sensor.iter())
+            .map(|sensor| sensor.scale_factor.shape().at(temperature(sensor.channel.as_ref())).unwrap_or(1.0))
+            .collect();
+        let found = tumble.accel.scale.iter().zip(&tumble.accel.rows);
+        let beside = found
+            .zip(stated.iter().zip(&accel.orientation.rows))
+            .map(|((scale, row), (old, axis))| Beside::new([*scale, *old], [*row, *axis]));
+        let beside: Vec<Beside> = beside.collect();
+        let turned: Vec<usize> = turned(&beside);
+        if !turned.is_empty() {
+            words.push(format!(
+                "{}: are columns of the mapping swapped, or is a sign the other one? {}",
+                several("accelerometer", &turned, beside.len()),
+                found_along("accelerometer", &beside, &turned)
+            ));
+        }
+        let scale = &tumble.accel.scale;
+        words.extend(measure::Beside::accelerometers(accel.output, scale, &stated).words());
+        words.extend(measure::already_m_per_s2(accel.output, scale, &stated));
+    }
+    let Ok(gyro) = &tumble.gyro else { return Ok(words) };
+    let stated: Vec<f64> =
+        base.gyro.sensor.iter().map(|sensor| sensor.increment_weight_rad_per_rad.unwrap_or(1.0)).collect();
+    let found = gyro.weight.iter().zip(&gyro.rows);
+    let beside = found
+        .zip(stated.iter().zip(&base.gyro.orientation.rows))
+        .map(|((weight, row), (old, axis))| Beside::new([*weight, *old], [*row, *axis]));
+    words.extend(gyros(&beside.collect::<Vec<_>>()).map_err(|mirrored| vec![mirrored])?);
+    words.extend(measure::Beside::gyros(&gyro.weight, &stated).words());
+    words.extend(far_from_zero(tumble));
+    Ok(words)
+}
+
+/// Words where gyros read more at rest than any turn takes them away from that: a converter whose zero is at mid-scale.
+fn far_from_zero(tumble: &Tumble) -> Option<String> {
+    let gyro = tumble.gyro.as_ref().ok()?;
+    let far = |index: &usize| gyro.rest[*index].abs() > tumble.largest_rate[*index];
+    let far: Vec<usize> = (0..AXES.len()).filter(far).collect();
+    let first = *far.first()?;
+    Some(format!(
+        "{}: at rest {} reads {} °/s, and no turn takes it further than {} °/s away from that: is its zero at mid-scale? State \
+         mid_scale in the mapping",
+        several("gyro", &far, AXES.len()),
+        if far.len() > 1 { "the first" } else { "it" },
+        short(gyro.rest[first].to_degrees()),
+        short(tumble.largest_rate[first].to_degrees())
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gyros whose positive outputs point along these axes, all of them stated along their own.
+    fn said(senses: [[f64; 3]; 3]) -> Result<String, String> {
+        let own = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let sensors: Vec<Beside> =
+            senses.into_iter().zip(own).map(|(sense, own)| Beside::new([1.31, 1.0], [sense, own])).collect();
+        gyros(&sensors).map(Option::unwrap_or_default)
+    }
+
+    #[test]
+    fn the_columns_that_are_wrong_are_named() {
+        let [x, y, z] = [[1.0, 0.02, 0.0], [0.0, 1.0, -0.001], [0.0, 0.0, 1.0]];
+        let back = |v: [f64; 3]| v.map(|c: f64| -c);
+        assert_eq!(said([x, y, z]), Ok(String::new()));
+        let pointed_out = |senses, words: &str| {
+            let said = said(senses).unwrap();
+            assert!(said.starts_with(words), "{said}");
+            assert!(!said.contains("-0.00") && !said.contains("?."), "{said}");
+        };
+        let along = "Positive output of gyro x along (0.00, 1.00, 0.00), K = 1.31; of gyro y along (1.00, 0.02, 0.00), K = 1.31";
+        pointed_out(
+            [y, x, z],
+            &format!("gyros x and y look swapped: check the columns in the mapping. {along}"),
+        );
+        pointed_out([z, y, x], "gyros x and z look swapped: ");
+        pointed_out([back(x), y, z], "gyro x is found with the other sign: is its sign missing");
+        pointed_out(
+            [back(x), back(y), back(z)],
+            "gyros x, y and z are found with the other sign: are their signs missing",
+        );
+        pointed_out(
+            [y, z, x],
+            "the columns of the gyros, or of the accelerometers, look as if they were in another order",
+        );
+        pointed_out(
+            [y, back(x), z],
+            "gyros x and y look swapped, or accelerometers, and a sign is the other one",
+        );
+        pointed_out(
+            [[0.6, 0.8, 0.0], y, z],
+            "gyro x is far from where the document at hand, or else its column, has it: ",
+        );
+    }
+
+    #[test]
+    fn a_mirror_image_of_the_case_is_refused() {
+        let [x, y, z] = [[1.0, 0.02, 0.0], [0.0, 1.0, -0.001], [0.0, 0.0, 1.0]];
+        let back = |v: [f64; 3]| v.map(|c: f64| -c);
+        // The turns are seen the other way round.
+        let swapped = said([back(y), back(x), back(z)]).unwrap_err();
+        assert!(swapped.starts_with("accelerometers x and y look swapped: "), "{swapped}");
+        let sign = said([back(x), y, back(z)]).unwrap_err();
+        assert!(
+            sign.starts_with(
+                "gyros x and z are found with the other sign: is the sign of accelerometer y missing"
+            ),
+            "{sign}"
+        );
+    }
+}

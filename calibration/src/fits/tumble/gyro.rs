@@ -1,0 +1,151 @@
+//! Gyros against accelerometers: between two poses the rotated direction of gravity must be the one that the accelerometers
+//! find there (Tedaldi, Pretto and Menegatti 2014).
+
+mod search;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::fits::positions::track::Track;
+use crate::lsq::nonlinear::{NoSolution, solve};
+use crate::size::Size;
+
+use super::accel::norm;
+use search::Start;
+
+/// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
+pub const LARGEST_LEFT_DEG: f64 = 3.0;
+
+/// What was found of the gyros.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GyroFit {
+    /// K: true rate per stated rate.
+    pub weight: [f64; 3],
+    /// Mean output at rest (rad/s of the log), which is taken off before the weight.
+    pub rest: [f64; 3],
+    /// Input axes, unit vectors in case axes.
+    pub rows: [[f64; 3]; 3],
+    /// Standard errors of the weights (as they are) and of the two angles of each axis (rad), along the case axes of
+    /// [`GyroFit::across`].
+    pub sigma: [f64; 9],
+    /// Angle between the direction that the gyros predict and the one that the accelerometers find, by transition (rad).
+    pub angle: Vec<f64>,
+}
+
+impl GyroFit {
+    /// The two case axes that a gyro's input axis lies across, whichever way round it is: those that its angles are along.
+    #[must_use]
+    pub fn across(&self, gyro: usize) -> [usize; 2] {
+        let along = Vector3::from(self.rows.get(gyro).copied().unwrap_or_default()).iamax();
+        others(along)
+    }
+
+    /// Angle that is left after a turn (°, rms).
+    #[must_use]
+    pub fn left_deg(&self) -> f64 {
+        Size::of(&self.angle).rms.to_degrees()
+    }
+
+    /// Whether the gyros follow the turns, and each lies along the case axis that its angles were counted from.
+    fn follows(&self, start: &Start) -> bool {
+        let placed = (0..3).all(|gyro| self.across(gyro) == others(start.along[gyro]));
+        placed && self.left_deg() <= LARGEST_LEFT_DEG
+    }
+}
+
+/// The two axes that are not this one.
+fn others(axis: usize) -> [usize; 2] {
+    match axis {
+        0 => [1, 2],
+        1 => [0, 2],
+        _ => [0, 1],
+    }
+}
+
+/// A transition: ticks between two poses, and the directions of specific force before and after.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    /// First tick and tick behind the last.
+    pub ticks: [usize; 2],
+    /// Unit vectors along the specific force, in case axes.
+    pub directions: [[f64; 3]; 2],
+}
+
+/// Fits scale factors and axes of three gyros to transitions: first as if each lay along its own case axis and the log's unit of
+/// measure were the right one. Where that does not follow the turns, other orders, signs and units of measure are tried.
+///
+/// # Errors
+/// Where the transitions do not determine them.
+pub fn fit(track: &Track, rest: [f64; 3], transitions: &[Transition]) -> Result<GyroFit, NoSolution> {
+    let own = Start::default();
+    let plain = from(track, rest, transitions, &own);
+    if plain.as_ref().is_ok_and(|fit| fit.follows(&own)) {
+        return plain;
+    }
+    let other = search::likely(track, rest, transitions).into_iter().find_map(|start| {
+        let found = from(track, rest, transitions, &start).ok()?;
+        found.follows(&start).then_some(found)
+    });
+    other.map_or(plain, Ok)
+}
+
+/// The fit from one start.
+fn from(
+    track: &Track,
+    rest: [f64; 3],
+    transitions: &[Transition],
+    start: &Start,
+) -> Result<GyroFit, NoSolution> {
+    let residuals = |p: &[f64]| -> Vec<f64> {
+        let inverse = start.inverse_of(p);
+        let of = |transition: &Transition| {
+            let found = turned(track, rest, &inverse, transition);
+            let [_, wanted] = transition.directions;
+            [0, 1, 2].map(|axis| found[axis] - wanted[axis])
+        };
+        transitions.iter().flat_map(of).collect()
+    };
+    let found = solve(&[0.0; 9], residuals)?;
+    // Two of the three components of a unit vector are free.
+    #[expect(clippy::cast_precision_loss, reason = "transitions")]
+    let degrees = (2 * transitions.len()).saturating_sub(9).max(1) as f64;
+    let size = (found.chi_square / degrees).sqrt();
+    let p = &found.parameters;
+    // Residuals are differences of unit vectors: chords.
+    let angle =
+        found.residuals.chunks_exact(3).map(|r| 2.0 * libm::asin((0.5 * norm([r[0], r[1], r[2]])).min(1.0)));
+    let angle = angle.collect();
+    let mut sigma = [0.0; 9];
+    for (index, sigma) in sigma.iter_mut().enumerate() {
+        let of_one = start.weight.get(index).map_or(1.0, |weight| weight.abs());
+        *sigma = found.sigma(index) * size * of_one;
+    }
+    Ok(GyroFit { weight: start.weights(p), rest, rows: start.rows(p), sigma, angle })
+}
+
+/// The direction before the transition, as the case sees it after the gyros' rotation.
+fn turned(track: &Track, rest: [f64; 3], inverse: &Matrix3<f64>, transition: &Transition) -> [f64; 3] {
+    let mut seen = Vector3::from(transition.directions[0]);
+    for tick in transition.ticks[0]..transition.ticks[1] {
+        let output = |gyro: usize| {
+            let column = track.gyros.get(gyro).and_then(|column| column.get(tick));
+            column.copied().unwrap_or(f64::NAN) - rest[gyro]
+        };
+        let duration = track.duration_s.get(tick).copied().unwrap_or(0.0);
+        seen = crate::fits::positions::matching::seen(
+            inverse * Vector3::new(output(0), output(1), output(2)) * duration,
+        ) * seen;
+    }
+    seen.into()
+}
+
+/// Angle (rad) between the direction that corrected rates predict after a transition and the one that corrected accelerometers
+/// find there.
+#[must_use]
+pub fn angle_of(track: &Track, transition: &Transition) -> f64 {
+    let mut seen = Vector3::from(transition.directions[0]);
+    for tick in transition.ticks[0]..transition.ticks[1] {
+        let rate = Vector3::from_fn(|axis, _| track.rate_deg_per_s[axis][tick].to_radians());
+        seen = crate::fits::positions::matching::seen(rate * track.duration_s[tick]) * seen;
+    }
+    seen.angle(&Vector3::from(transition.directions[1]))
+}

@@ -1,0 +1,330 @@
+//! What is said of a tumbled unit.
+
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_protocol::document::{Document, Sample};
+use serde_json::json;
+use std::sync::Arc;
+
+use super::accel::norm;
+use super::acceleration::GyroDrift;
+use super::fit::{Settings, Tumble, transitions};
+use super::gyro::{GyroFit, angle_of};
+use crate::axes::AXES;
+use crate::document::written::tidy;
+use crate::error::Error;
+use crate::fits::positions::budget::ARCSEC_PER_RAD;
+use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
+use crate::fits::positions::pose::Pose;
+use crate::fits::positions::track::Track;
+use crate::report::figures::{counted, fixed, short, six};
+use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
+use crate::size::Size;
+
+/// Times by which the rms may grow in poses that the fit has not seen.
+const LARGEST_GROWTH: f64 = 2.0;
+
+/// What a calibration leaves of the poses, by the service's own output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Left {
+    /// |f| − g by pose (m/s²).
+    pub length: Vec<f64>,
+    /// Direction of f by pose.
+    pub direction: Vec<[f64; 3]>,
+    /// Angle between predicted and found direction by turn (°).
+    pub angle_deg: Vec<f64>,
+    /// Middle of each turn since the run's beginning (s).
+    pub turn_s: Vec<f64>,
+}
+
+impl Left {
+    /// Of the same ticks as the poses.
+    #[must_use]
+    pub fn of(track: &Track, poses: &[Pose], gravity: f64) -> Self {
+        let own: Vec<Pose> = poses.iter().map(|pose| Pose::over(track, pose.run, pose.interval)).collect();
+        let force: Vec<[f64; 3]> = own.iter().map(|pose| pose.force_m_per_s2).collect();
+        let turns = transitions(&own, |pose| pose.force_m_per_s2);
+        Self {
+            length: force.iter().map(|force| norm(*force) - gravity).collect(),
+            direction: force.iter().map(|force| force.map(|c| c / norm(*force))).collect(),
+            angle_deg: turns.iter().map(|turn| angle_of(track, turn).to_degrees()).collect(),
+            turn_s: turns
+                .iter()
+                .map(|turn| track.start_s(usize::midpoint(turn.ticks[0], turn.ticks[1])))
+                .collect(),
+        }
+    }
+}
+
+/// Everything that is said of a run.
+#[must_use]
+pub fn report(
+    document: &Document,
+    tumble: &Tumble,
+    settings: &Settings,
+    run: &str,
+    [before, after]: [&Left; 2],
+) -> FitReport {
+    let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit)
+        .counting("poses, turns");
+    let accel = accelerometers(tumble, [&before.length, &after.length], settings.gravity);
+    let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
+    let gyro = gyro.stated_as(Figure::Rms);
+    let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);
+    let gyro = match &tumble.gyro {
+        Err(words) => refused(words),
+        Ok(_) if !accel.accepted => refused("they are relative to the accelerometers, which are refused"),
+        Ok(_) => gyro.remark(format!("{} between poses", counted(after.angle_deg.len(), "turn", "turns"))),
+    };
+    report.verdicts.extend([accel, gyro]);
+    report.warnings.clone_from(&tumble.warnings);
+    report.notes.push(format!(
+        "{}, detected with {} times the variance of the still start; g = {} m/s². z is the input axis of the third \
+         accelerometer, y lies in the plane of the second and third. Out of sample: each pose by a fit of all that \
+         are more than 15° away from it.",
+        counted(tumble.poses.len(), "pose", "poses"),
+        tumble.factor,
+        six(settings.gravity)
+    ));
+    report.notes.extend(at_rest(tumble));
+    report.coefficients = coefficients(document, tumble);
+    let time_s: Arc<[f64]> = tumble.poses.iter().map(Pose::middle_s).collect();
+    report.residuals.push(Curve {
+        of: "|f|−g".to_owned(),
+        measure: "m/s²".to_owned(),
+        run: run.to_owned(),
+        sample: Sample::In,
+        window_s: 0.0,
+        time_s,
+        temperature_deg_c: Vec::new(),
+        before: before.length.clone(),
+        after: after.length.clone(),
+    });
+    report.charts.push(("What is left".to_owned(), left_chart(tumble, after)));
+    report.tables.push(("Poses".to_owned(), rows(tumble, after)));
+    report
+}
+
+/// What came of the accelerometers: held-out poses decide.
+fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
+    let sizes = [before, after].map(|values| Size::of(values));
+    let outside = Size::of(&tumble.held_out);
+    let verdict = Verdict::new("|f|−g", "m/s²", sizes).out_of_sample(Some([sizes[0], outside]));
+    let verdict = verdict.stated_as(Figure::Rms);
+    let left = outside.rms;
+    if left.is_nan() || outside.count == 0 || left > LARGEST_LEFT_SHARE * gravity {
+        return verdict.refused(format!(
+            "{} % of g remain in unseen poses, at most {} % is accepted: were unit of measure and temperature the \
+             same throughout, and was the unit left alone in each pose?",
+            short(100.0 * left / gravity),
+            100.0 * LARGEST_LEFT_SHARE
+        ));
+    }
+    let change: Vec<f64> = before.iter().zip(after).map(|(before, after)| after - before).collect();
+    if Size::of(&change).rms <= SAME_SHARE * sizes[0].rms {
+        return verdict.remark("it changes nothing");
+    }
+    // Nine coefficients cost something in poses that they were not found from; these may be what the document at hand was found from.
+    match left / sizes[0].rms {
+        grown if grown > LARGEST_GROWTH => verdict
+            .refused("the given document fits these poses better than the new fit: more poses are needed"),
+        grown if grown > 1.0 + SAME_SHARE => verdict.remark("no better than the given document"),
+        _ => verdict,
+    }
+}
+
+/// What is left by itself: beside what was there before, it is a line at zero.
+fn left_chart(tumble: &Tumble, after: &Left) -> Chart {
+    let times = tumble.poses.iter().map(Pose::middle_s);
+    let own: Vec<(f64, f64)> = times.zip(after.length.iter().map(|length| length * 1e3)).collect();
+    let turns: Vec<(f64, f64)> = after.turn_s.iter().copied().zip(after.angle_deg.iter().copied()).collect();
+    let panel = |title: &str, unit: &str, points: Vec<(f64, f64)>| Panel {
+        title: title.to_owned(),
+        unit: unit.to_owned(),
+        height: 170,
+        logarithmic: false,
+        content: Content::Series(vec![Series {
+            name: "after".to_owned(),
+            ink: Ink::Corrected,
+            form: Form::Dots,
+            samples: Samples::points(points),
+        }]),
+    };
+    Chart {
+        caption: "|f| − g of each pose, and the angle by which the gyros miss the direction of gravity after each turn.".to_owned(),
+        x: Axis::of("time since the run's beginning", "s"),
+        panels: vec![panel("|f|−g", "mm/s²", own), panel("gyros", "°", turns)],
+        marks: Vec::new(),
+    }
+}
+
+fn rows(tumble: &Tumble, after: &Left) -> Table {
+    let head = ["pose", "from, s", "to, s", "x", "y", "z", "|f|−g, mm/s²"].map(str::to_owned).to_vec();
+    let poses = tumble.poses.iter().zip(&after.direction).zip(&after.length).enumerate();
+    let row = |(index, ((pose, direction), length)): (usize, ((&Pose, &[f64; 3]), &f64))| {
+        let mut row = vec![(index + 1).to_string()];
+        row.extend(pose.span_s.map(|time| format!("{time:.2}")));
+        row.extend(direction.map(|c| fixed(c, 3)));
+        row.push(fixed(length * 1e3, 3));
+        row
+    };
+    Table { head, rows: poses.map(row).collect() }
+}
+
+/// Reading of a gyro at rest without specific force, or its mean over the poses where that is not known (rad/s of the log).
+fn rest(tumble: &Tumble, gyro: &GyroFit, axis: usize) -> f64 {
+    tumble.acceleration[axis].as_ref().map_or(gyro.rest[axis], |drift| drift.response.bias)
+}
+
+/// Drift of a gyro by the specific force along a case axis and its standard error ((°/h)/g).
+fn deg_per_h_per_g(tumble: &Tumble, gyro: usize, along: usize) -> Option<[f64; 2]> {
+    let weight = tumble.gyro.as_ref().ok()?.weight[gyro];
+    let drift = tumble.acceleration[gyro].as_ref().ok()?;
+    let per_g = |value: f64| AngularRate::from_rad_per_s(value * STANDARD_GRAVITY_M_PER_S2).as_deg_per_h();
+    Some([
+        per_g(weight * drift.response.by_force[along]),
+        per_g((weight * drift.response.sigma[1 + along]).abs()),
+    ])
+}
+
+/// What the gyros read at rest, about their mean and with what follows acceleration taken off.
+fn at_rest(tumble: &Tumble) -> Option<String> {
+    let gyro = tumble.gyro.as_ref().ok()?;
+    let of = |(axis, drift): (usize, &Result<GyroDrift, String>)| match drift {
+        Ok(drift) => {
+            let [before, after] = drift.sizes.map(|size| {
+                fixed(AngularRate::from_rad_per_s(gyro.weight[axis].abs() * size.rms).as_deg_per_h(), 1)
+            });
+            format!("{} {before} → {after} °/h", AXES[axis])
+        }
+        Err(why) => format!("{} has no acceleration-sensitive drift stated: {why}", AXES[axis]),
+    };
+    let gyros = tumble.acceleration.iter().enumerate().map(of).collect::<Vec<_>>();
+    Some(format!("Gyros at rest, in unseen poses: {}.", gyros.join("; ")))
+}
+
+fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
+    let accel = &tumble.accel;
+    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
+        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
+        isotherm_protocol::document::AccelOutput::Volts => "V or raw",
+        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
+    });
+    let mut all = Vec::new();
+    for (axis, name) in AXES.iter().enumerate() {
+        let of = |what: &str| format!("accelerometer {name} {what}");
+        let per_output = 1.0 / accel.scale[axis];
+        let sigma = accel.sigma[axis];
+        all.push(Coefficient::new(
+            of("1/K"),
+            format!("m/s² per {output}"),
+            per_output,
+            Some(per_output.abs() * sigma),
+        ));
+        all.push(Coefficient::new(of("S"), output, accel.bias[axis], Some(accel.sigma[3 + axis])));
+    }
+    for (index, (row, column)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+        let value = accel.rows[row][column] * ARCSEC_PER_RAD;
+        let name = format!("accelerometer {} along {}", AXES[row], AXES[column]);
+        all.push(Coefficient::new(name, "″", value, Some(accel.sigma[6 + index] * ARCSEC_PER_RAD)));
+    }
+    let Ok(gyro) = &tumble.gyro else { return all };
+    for (axis, name) in AXES.iter().enumerate() {
+        all.push(Coefficient::new(
+            format!("gyro {name} K"),
+            "rad/s per rad/s of the log",
+            gyro.weight[axis],
+            Some(gyro.sigma[axis]),
+        ));
+        all.push(Coefficient::new(
+            format!("gyro {name} at rest"),
+            "°/s",
+            (gyro.weight[axis] * rest(tumble, gyro, axis)).to_degrees(),
+            None,
+        ));
+        let drift = tumble.acceleration[axis].as_ref().ok();
+        for (along, name_of_axis) in drift.into_iter().flat_map(|_| AXES.iter().enumerate()) {
+            let [value, sigma] = deg_per_h_per_g(tumble, axis, along).unwrap_or_default();
+            let name = format!("gyro {name} by force along {name_of_axis}");
+            all.push(Coefficient::new(name, "(°/h)/g", value, Some(sigma)));
+        }
+        for (which, column) in gyro.across(axis).into_iter().enumerate() {
+            all.push(Coefficient::new(
+                format!("gyro {name} along {}", AXES[column]),
+                "″",
+                gyro.rows[axis][column] * ARCSEC_PER_RAD,
+                Some(gyro.sigma[3 + 2 * axis + which] * ARCSEC_PER_RAD),
+            ));
+        }
+    }
+    all
+}
+
+/// What the document says of the fit beside its coefficients.
+///
+/// # Errors
+/// [`Error::Document`] where it cannot be written, which would be a mistake here.
+pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Result<toml::Table, Error> {
+    let coefficients: serde_json::Map<String, serde_json::Value> = report
+        .coefficients
+        .iter()
+        .map(|c| {
+            (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(0.0), "unit": c.unit }))
+        })
+        .collect();
+    let covariance: Vec<Vec<f64>> =
+        tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let about = json!({
+        "gravity_m_per_s2": settings.gravity,
+        "poses": tumble.poses.len(),
+        "stillness_factor": tumble.factor,
+        "window_s": settings.limits.window_s,
+        "held_out_rms_m_per_s2": Size::of(&tumble.held_out).rms,
+        "verdict": report.headline(),
+        "warnings": report.warnings,
+        "coefficients": coefficients,
+        // Scale factors (relative), biases over K·g, angles xy, xz, yz (rad).
+        "accelerometer_covariance": covariance,
+    });
+    toml::Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+}
+
+/// Standard errors of scale factors, biases and axes, for what compares documents.
+#[must_use]
+pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
+    let mut sigmas = Sigmas::default();
+    let accel = &tumble.accel;
+    // Row and column of each angle; the others are zero by definition.
+    let angle = |row: usize, column: usize| match (row, column) {
+        (0, 1) => accel.sigma[6],
+        (0, 2) => accel.sigma[7],
+        (1, 2) => accel.sigma[8],
+        _ => 0.0,
+    };
+    let arcsec = |rad: f64| tidy(rad * ARCSEC_PER_RAD);
+    let sensors = document.accel.iter().flat_map(|accel| &accel.sensor);
+    for (axis, sensor) in sensors.enumerate().take(AXES.len()) {
+        let scale = tidy(accel.scale[axis].abs() * accel.sigma[axis]);
+        sigmas.put("accel", &sensor.name, "scale_factor", vec![scale]);
+        sigmas.put("accel", &sensor.name, "bias", vec![tidy(accel.sigma[3 + axis])]);
+        let row = [0, 1, 2].map(|column| arcsec(angle(axis, column)));
+        sigmas.put("accel", &sensor.name, "axis_arcsec", row.to_vec());
+    }
+    let Ok(gyro) = &tumble.gyro else { return sigmas };
+    for (axis, sensor) in document.gyro.sensor.iter().enumerate().take(AXES.len()) {
+        let ppm = tidy(1e6 * gyro.sigma[axis] / gyro.weight[axis].abs());
+        sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        for (along, name) in AXES.iter().enumerate() {
+            if let Some([_, sigma]) = deg_per_h_per_g(tumble, axis, along) {
+                let key = format!("acceleration_sensitive_drift.{name}");
+                sigmas.put("gyro", &sensor.name, &key, vec![tidy(sigma)]);
+            }
+        }
+        let mut row = [0.0; 3];
+        for (which, column) in gyro.across(axis).into_iter().enumerate() {
+            row[column] = arcsec(gyro.sigma[3 + 2 * axis + which]);
+        }
+        sigmas.put("gyro", &sensor.name, "axis_arcsec", row.to_vec());
+    }
+    sigmas
+}

@@ -1,0 +1,96 @@
+//! Columns of readings that nothing can be made of, whatever is to be made of them.
+
+use crate::axes::sensor_name;
+use crate::report::figures::six;
+
+/// Share of readings that may be no number.
+const LARGEST_MISSING: f64 = 0.01;
+
+/// What is wrong with the readings of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fault {
+    /// All of them are this.
+    Dead(f64),
+    /// The same in every tick as another sensor, by number.
+    Twin(usize),
+    /// How many are not numbers, and of how many.
+    Missing([usize; 2]),
+}
+
+impl Fault {
+    /// Of a column by itself.
+    #[must_use]
+    pub fn of(column: &[f64]) -> Option<Self> {
+        let missing = missing(column);
+        #[expect(clippy::cast_precision_loss, reason = "ticks of a run")]
+        if missing as f64 > LARGEST_MISSING * column.len() as f64 {
+            return Some(Self::Missing([missing, column.len()]));
+        }
+        dead(column).map(Self::Dead)
+    }
+
+    /// Of one column beside those before it.
+    #[must_use]
+    pub fn among(columns: &[Vec<f64>], index: usize) -> Option<Self> {
+        let column = columns.get(index)?;
+        let equal = |other: &Vec<f64>| {
+            other.len() == column.len() && other.iter().zip(column).all(|(a, b)| a.total_cmp(b).is_eq())
+        };
+        Self::of(column).or_else(|| columns[..index].iter().position(equal).map(Self::Twin))
+    }
+
+    /// In words; the sensor is one of so many of a kind.
+    #[must_use]
+    pub fn words(self, kind: &str, of: usize) -> String {
+        match self {
+            Self::Dead(value) => format!(
+                "every reading is {}: the sensor is dead, or the mapping names the wrong column",
+                six(value)
+            ),
+            Self::Twin(twin) => format!(
+                "the same in every tick as {kind} {}: does the mapping have a column twice?",
+                sensor_name(twin, of)
+            ),
+            Self::Missing([missing, all]) => format!(
+                "{missing} of {all} readings are not numbers, at most {} % may be: look for a broken column or a sensor beyond its \
+                 limit, or cut the log with --start and --duration",
+                LARGEST_MISSING * 100.0
+            ),
+        }
+    }
+}
+
+/// How many readings are not numbers.
+#[must_use]
+pub fn missing(column: &[f64]) -> usize {
+    column.iter().filter(|reading| !reading.is_finite()).count()
+}
+
+/// The one reading that a column has; `None` where it changes, or has none.
+#[must_use]
+pub fn dead(column: &[f64]) -> Option<f64> {
+    let mut good = column.iter().filter(|reading| reading.is_finite());
+    let first = good.next()?;
+    good.all(|reading| (reading - first).abs() <= 0.0).then_some(*first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_told_by_kind() {
+        let wave: Vec<f64> = (0..200).map(|k| libm::sin(f64::from(k))).collect();
+        let mut holed = wave.clone();
+        holed[7] = f64::NAN;
+        let mut flat = vec![2.5; 200];
+        flat[3] = f64::NAN;
+        let columns = [wave.clone(), holed.clone(), flat, vec![f64::NAN; 200], wave, holed];
+        let found: Vec<_> = (0..columns.len()).map(|index| Fault::among(&columns, index)).collect();
+        let twin = |of| Some(Fault::Twin(of));
+        let wanted = [None, None, Some(Fault::Dead(2.5)), Some(Fault::Missing([200, 200])), twin(0), twin(1)];
+        assert_eq!(found, wanted);
+        assert_eq!(Fault::of(&[]), None);
+        assert!(Fault::Twin(3).words("gyro", 6).contains("as gyro 4: "));
+    }
+}

@@ -1,0 +1,199 @@
+//! Columns that look swapped: at rest, in a stated attitude, gravity and the Earth's rate tell the axes.
+
+use std::fmt::{self, Display, Formatter};
+
+use isotherm_correction::earth::{Place, Tilt};
+
+use crate::axes::AXES;
+use crate::report::figures::fixed;
+use crate::size::Size;
+
+/// Orders of three axes: the swaps of two first, which need the fewest mistakes.
+pub const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+/// How far from what is stated the means must be, as a share of it: 20° of gravity.
+const AWAY: f64 = 0.35;
+/// And in standard deviations of the means themselves, which a bias that moves has.
+const AWAY_DEVIATIONS: f64 = 5.0;
+/// What another order may leave of that.
+const LEFT: f64 = 0.25;
+
+/// What three sensors show in the mean beside what they must.
+#[derive(Debug, Clone, Copy)]
+pub struct Shown {
+    /// Of what kind they are, as in "gyros".
+    pub kind: &'static str,
+    /// Symbol of the unit of measure.
+    pub measure: &'static str,
+    /// Means of the sensors.
+    pub mean: [f64; 3],
+    /// What each would show without error, in the stated attitude.
+    pub stated: [f64; 3],
+    /// How far the means move over the run.
+    pub deviation: f64,
+}
+
+impl Shown {
+    /// Of sensors of a kind, with the symbol of their unit of measure.
+    #[must_use]
+    pub fn of([kind, measure]: [&'static str; 2], sizes: [Size; 3], stated: [f64; 3]) -> Self {
+        let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
+        Self { kind, measure, mean: sizes.map(|size| size.mean), stated, deviation }
+    }
+
+    /// Which axes look swapped: another order fits by far better than that of the log; `None` where none does.
+    #[must_use]
+    pub fn swapped(&self) -> Option<Looks> {
+        let off = |order: [usize; 3]| size([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]));
+        let (as_logged, size) = (self.off(), size(self.stated));
+        if !self.is_away() {
+            return None;
+        }
+        let fits = |order: &[usize; 3]| off(*order) < LEFT * as_logged;
+        let best = ORDERS.into_iter().filter(fits).reduce(|best, order| {
+            if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
+        })?;
+        Some(self.looks(Some(best)))
+    }
+
+    /// That the means are far from what they must be though no order looks right; `None` where they are near.
+    #[must_use]
+    pub fn far(&self) -> Option<Looks> {
+        (self.is_away() && self.swapped().is_none()).then(|| self.looks(None))
+    }
+
+    fn looks(&self, order: Option<[usize; 3]>) -> Looks {
+        let Self { kind, measure, mean, stated, .. } = *self;
+        Looks { kind, measure, order, mean, stated }
+    }
+
+    /// How far the means are from what they must be.
+    fn off(&self) -> f64 {
+        size([0, 1, 2].map(|axis| self.mean[axis] - self.stated[axis]))
+    }
+
+    /// Whether that is too far; false for NaN too.
+    fn is_away(&self) -> bool {
+        let off = self.off();
+        off > AWAY * size(self.stated) && off > AWAY_DEVIATIONS * self.deviation
+    }
+}
+
+/// Sensors that do not show what they must in the stated attitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looks {
+    /// Of what kind they are, as in "gyros".
+    pub kind: &'static str,
+    /// Symbol of the unit of measure.
+    pub measure: &'static str,
+    /// The order in which they fit; `None` where they fit in none.
+    pub order: Option<[usize; 3]>,
+    /// Their means.
+    pub mean: [f64; 3],
+    /// What they would be.
+    pub stated: [f64; 3],
+}
+
+impl Display for Looks {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { kind, measure, order, mean, stated } = self;
+        // As many places as the largest of them needs for three digits: what is next to nothing is zero.
+        let largest = mean.iter().chain(stated).map(|part| part.abs()).fold(0.0, f64::max);
+        let places =
+            (0..6_u8).find(|places| largest * libm::pow(10.0, f64::from(*places)) >= 100.0).unwrap_or(6);
+        let list = |v: [f64; 3]| v.map(|part| fixed(part, usize::from(places))).join(", ");
+        let means = format!(
+            "their means are {} {measure}, in the stated attitude they would be {}",
+            list(*mean),
+            list(*stated)
+        );
+        match order {
+            Some(order) => write!(
+                f,
+                "{kind} {} look swapped: {means}; check the columns in the mapping, and the attitude",
+                moved(*order)
+            ),
+            None => write!(
+                f,
+                "the {kind} do not fit the attitude: {means}; check attitude, signs and unit of measure"
+            ),
+        }
+    }
+}
+
+fn size(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
+}
+
+/// The axes that are not in their places, in words.
+#[must_use]
+pub fn moved(order: [usize; 3]) -> String {
+    let names = AXES.into_iter().zip(order).enumerate();
+    let moved: Vec<&str> = names.filter(|(axis, (_, of))| axis != of).map(|(_, (name, _))| name).collect();
+    moved.join(" and ")
+}
+
+/// Direction of the specific force at rest in case axes, a unit vector, where pitch and roll were stated.
+#[must_use]
+pub fn up(place: &Place) -> Option<[f64; 3]> {
+    let Tilt::Given { pitch_rad, roll_rad } = place.tilt() else { return None };
+    // At the pole the Earth turns about the vertical: where that axis is in the case, there gravity is.
+    let tilt_deg = [pitch_rad.to_degrees(), roll_rad.to_degrees()];
+    let rate = Place::new(90.0, 0.0, Some(tilt_deg)).ok()?.earth_rate_in_case(None)?;
+    let size = rate.iter().map(|part| part * part).sum::<f64>().sqrt();
+    Some(rate.map(|part| part / size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(kind: &'static str, mean: [f64; 3], stated: [f64; 3], deviation: f64) -> String {
+        Shown { kind, measure: "m/s²", mean, stated, deviation }
+            .swapped()
+            .map(|looks| looks.to_string())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn another_order_that_fits_is_named() {
+        let level = [0.1, -0.2, -9.8];
+        let swap = words("accelerometers", [-9.79, -0.2, 0.1], level, 0.01);
+        assert!(
+            swap.starts_with("accelerometers x and z look swapped: ") && swap.contains("mapping"),
+            "{swap}"
+        );
+        let earth = [7.3, -4.2, -12.4];
+        assert!(
+            words("gyros", [-12.6, 7.1, -4.3], earth, 0.3).starts_with("gyros x and y and z look swapped")
+        );
+        assert!(words("gyros", [-4.0, 7.5, -12.0], earth, 0.3).starts_with("gyros x and y look swapped"));
+    }
+
+    #[test]
+    fn what_fits_in_no_order_is_told_as_far() {
+        let of = |mean: [f64; 3]| Shown {
+            kind: "accelerometers",
+            measure: "m/s²",
+            mean,
+            stated: [0.1, -0.2, -9.8],
+            deviation: 0.01,
+        };
+        let upside_down = of([0.1, -0.2, 9.8]).far().unwrap().to_string();
+        assert!(
+            upside_down.contains("9.80 m/s²") && upside_down.contains("check attitude, signs"),
+            "{upside_down}"
+        );
+        assert_eq!(of([-9.8, -0.2, 0.1]).far(), None, "swapped, which is told otherwise");
+        assert_eq!(of([0.3, 0.1, -9.7]).far(), None);
+    }
+
+    #[test]
+    fn biases_and_motion_of_the_means_are_no_swap() {
+        let (level, earth) = ([0.1, -0.2, -9.8], [7.3, -4.2, -12.4]);
+        assert_eq!(words("accelerometers", [0.3, 0.1, -9.7], level, 0.01), "");
+        // A bias of many times the Earth's rate, and one that moves as much as it.
+        assert_eq!(words("gyros", [190.0, -80.0, 30.0], earth, 1.0), "");
+        assert_eq!(words("gyros", [-12.6, -4.0, 7.1], earth, 10.0), "");
+        assert_eq!(words("gyros", [f64::NAN, -4.0, 7.1], earth, 0.1), "");
+    }
+}
