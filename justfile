@@ -77,6 +77,10 @@ instructions:
 packages:
     .ci/run packages
 
+# Boot a Debian with that package in a container, and have systemd start, watch and stop the service (needs root and systemd-nspawn)
+boot:
+    packaging/boot
+
 # Build the programs without shared libraries, for containers
 static:
     packaging/static
@@ -99,7 +103,7 @@ performance:
 
 # Pictures of the console in the browser at every size and colour, into target/console (needs chromium)
 console-pictures:
-    ISOTHERM_PICTURES="$PWD/target/console" cargo test --release --locked -p isotherm-service --test service web::pictures -- --nocapture
+    ISOTHERM_PICTURES="$PWD/target/console" cargo test --release --locked -p isotherm --test service web::pictures -- --nocapture
 
 # Latency with 200 units at 200 Hz while pages of the console are open, beside latency without (after `cargo build --release --locked`)
 console-cost:

@@ -4,7 +4,7 @@ import json
 import pathlib
 import subprocess
 
-PROGRAMS = ["isotherm-service", "isotherm-replay-tool", "isotherm-calibration", "isotherm-ros"]
+PROGRAMS = ["isotherm", "isotherm-replay-tool", "isotherm-calibration", "isotherm-ros"]
 NAMES = ("LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE")
 
 

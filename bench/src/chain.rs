@@ -14,6 +14,7 @@ mod subject;
 mod swap;
 mod table;
 
+use isotherm_cli::Bar;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use case::Case;
@@ -25,7 +26,6 @@ pub(crate) use table::{middle, table};
 use crate::error::Error;
 use crate::machine::Machine;
 use crate::part::Pace;
-use crate::progress::Bar;
 
 /// What of a chain is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -188,7 +188,7 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
     let (cases, profiles) = (args.cases(), args.profiles());
     let rounds = if args.quick { 1 } else { args.rounds.max(1) };
     let runs: Vec<_> = cases.iter().map(|(_, variants)| runs(variants, &profiles, &subjects)).collect();
-    let bar = Bar::over(runs.iter().map(|runs| runs.len() * rounds).sum());
+    let bar = Bar::counting("", runs.iter().map(|runs| runs.len() * rounds).sum());
     for ((measure, _), runs) in cases.iter().zip(runs) {
         let outcomes = match take_turns(&runs, rounds, args.ends_too, &bar) {
             Ok(outcomes) => outcomes,
@@ -226,11 +226,11 @@ pub(crate) fn take_turns(
     let mut outcomes = vec![Vec::with_capacity(rounds); runs.len()];
     for _ in 0..rounds {
         for ((case, profile, subject), outcomes) in runs.iter().zip(&mut outcomes) {
-            bar.show(&format!("{}: {}", case.words(), subject.name()));
+            bar.say(format!("{}: {}", case.words(), subject.name()));
             let outcome = round::run(case, *subject, profile, ends_too.then_some(profile))?;
             check_swaps(case, *subject, &outcome)?;
             outcomes.push(outcome);
-            bar.step();
+            bar.done_one();
         }
     }
     Ok(outcomes)

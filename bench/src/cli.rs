@@ -1,12 +1,11 @@
 //! The command line.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
+use isotherm_cli::{Exit, failed_lines, parse, print, say, to_stdout};
 
 use crate::chain::{self, ChainArgs};
 use crate::error::Error;
@@ -104,8 +103,7 @@ fn run(command: Command) -> Result<String, Error> {
             if counted.is_comparable(&committed) {
                 counted.compare(&committed, &path)?;
             } else {
-                let _ = writeln!(
-                    io::stderr(),
+                say(format_args!(
                     "isotherm-bench: {} holds for {} on {}, this is {} on {}: nothing was compared; write the figures anew with \
                      --bless where that is what the project is built with now",
                     path.display(),
@@ -113,7 +111,7 @@ fn run(command: Command) -> Result<String, Error> {
                     committed.architecture,
                     counted.compiler,
                     counted.architecture
-                );
+                ));
             }
             Ok(printed)
         }
@@ -123,7 +121,8 @@ fn run(command: Command) -> Result<String, Error> {
             if report.failed.is_empty() {
                 return Ok(text);
             }
-            let _ = io::stdout().write_all(text.as_bytes());
+            // The error says what counts.
+            let _ = to_stdout(text.as_bytes());
             Err(Error::Failed(report.failed))
         }
         Command::Scale(args) => {
@@ -148,16 +147,9 @@ pub(crate) fn plain(head: &[&str]) -> Table {
 
 /// Runs the program.
 #[must_use]
-pub fn main() -> ExitCode {
-    match run(Cli::parse().command) {
-        Ok(text) => {
-            // A reader that has gone away is no error.
-            let _ = io::stdout().write_all(text.as_bytes());
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            let _ = writeln!(io::stderr(), "isotherm-bench: {error}");
-            ExitCode::FAILURE
-        }
+pub fn main() -> Exit {
+    match run(parse::<Cli>().command) {
+        Ok(text) => print(&text, Exit::Ok),
+        Err(error) => failed_lines(&error, Exit::Failed),
     }
 }

@@ -21,7 +21,6 @@ mod kernel;
 mod machine;
 mod part;
 mod process;
-mod progress;
 mod rounds;
 mod scale;
 

@@ -1,5 +1,5 @@
 //! `isotherm-bench`: see the library.
 
 fn main() -> std::process::ExitCode {
-    isotherm_bench::main()
+    isotherm_bench::main().into()
 }

@@ -4,6 +4,7 @@ mod fit;
 mod offline;
 mod table;
 
+use isotherm_cli::Bar;
 use serde::Serialize;
 
 pub(crate) use offline::Offline;
@@ -13,7 +14,6 @@ use crate::chain::{Case, Measure, Profile, Row, Run, Subject, take_turns};
 use crate::error::Error;
 use crate::machine::Machine;
 use crate::part::Pace;
-use crate::progress::Bar;
 
 /// Arguments of `scale`.
 #[derive(Debug, Clone, clap::Args)]
@@ -119,7 +119,7 @@ fn live(args: &ScaleArgs, rounds: usize, report: &mut Report) -> Result<(), Erro
         })
         .collect();
     let own = Profile::own();
-    let bar = Bar::over((2 * cases.len() + 2) * rounds);
+    let bar = Bar::counting("", (2 * cases.len() + 2) * rounds);
     let subjects =
         |case: &Case| [Subject::Keyed, Subject::Service].map(|subject| (case.clone(), own.clone(), subject));
     let runs: Vec<Run> = cases.iter().flat_map(subjects).collect();

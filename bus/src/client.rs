@@ -28,8 +28,8 @@ const AGAIN: Duration = Duration::from_millis(250);
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct ClientOptions {
-    /// Address of the service or a router, repeatable (default: `ISOTHERM_CONNECT`, else isotherm/client.toml in your configuration
-    /// folder, else 127.0.0.1:7447)
+    /// Address of the service or a router, repeatable (default: `ISOTHERM_CONNECT`, else `connect` of
+    /// ~/.config/isotherm/client.toml, else 127.0.0.1:7447)
     #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
     pub connect: Vec<String>,
     /// Address to listen on, repeatable
@@ -38,7 +38,7 @@ pub struct ClientOptions {
     /// Zenoh configuration (JSON5)
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", hide_short_help = true))]
     pub zenoh_config: Option<PathBuf>,
-    /// Key prefix of the site, e.g. site/a
+    /// Zenoh namespace, a prefix of every key, e.g. site/a
     #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX", hide_short_help = true))]
     pub namespace: Option<String>,
 }

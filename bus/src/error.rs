@@ -85,7 +85,7 @@ pub enum BusError {
     },
     /// A reading that is announced as a count is no whole number of 32 bits.
     #[error(
-        "unit {unit}: a reading in the ticks from sequence {sequence} on is announced as a count but is no whole number of 32 bits"
+        "unit {unit}: a reading in the ticks from sequence {sequence} on is a count but not a whole number of 32 bits"
     )]
     NotCounts {
         /// Serial of the unit.
@@ -107,7 +107,7 @@ pub enum BusError {
     },
     /// Nobody subscribed to a raw topic in time.
     #[error(
-        "nobody subscribes to {key} after {waited:?}: is the service running, and connected to this session?"
+        "nobody subscribes to {key} after {waited:?}: check that the service runs and is connected to this session"
     )]
     NoSubscriber {
         /// The key.
@@ -116,7 +116,9 @@ pub enum BusError {
         waited: Duration,
     },
     /// The service did not answer in time.
-    #[error("no service answers on {key} after {waited:?}: is it running, and connected to this session?")]
+    #[error(
+        "no service answers on {key} after {waited:?}: check that it runs and is connected to this session"
+    )]
     NoService {
         /// The key.
         key: String,
@@ -124,17 +126,16 @@ pub enum BusError {
         waited: Duration,
     },
     /// The service has gone while it was needed.
-    #[error(
-        "the service is gone: the last of the tokens {key} has ended; it has stopped, or the connection to it is lost"
-    )]
+    #[error("the service is gone (no token {key}): it has stopped, or the connection to it is lost")]
     ServiceGone {
         /// Key expression of the tokens.
         key: String,
     },
     /// Nothing comes back on the corrected topic.
     #[error(
-        "unit {unit}: nothing came back on {key} for {waited:?} while {in_flight} ticks were under way; the service may hold \
-         the unit back (uncalibrated = \"hold\"), may have stopped, or may refuse the unit's messages: see its log and the unit's status"
+        "unit {unit}: nothing came back on {key} for {waited:?} while {in_flight} ticks were in flight: the service \
+         holds the unit (uncalibrated = \"hold\"), has stopped, or refuses its messages; see its log and the unit's \
+         status"
     )]
     NoAcknowledgement {
         /// Serial of the unit.
@@ -148,7 +149,7 @@ pub enum BusError {
     },
     /// A subscriber has not taken what was published for it.
     #[error(
-        "a subscriber has not taken within {waited:?} what was published for it ({key}): it is slow, or hangs, or the link to it is slow"
+        "a subscriber has not read everything within {waited:?} ({key}): it, or the link to it, is slow or hangs"
     )]
     NotTaken {
         /// Key expression of the receipts.

@@ -27,13 +27,14 @@ fn listen(endpoint: &str) -> Result<(), BusError> {
     let Err(error) = TcpListener::bind(host_and_port) else { return Ok(()) };
     let reason = match error.kind() {
         ErrorKind::AddrInUse => {
-            "another program listens there, perhaps a service; stop it, or give another address with --listen HOST:PORT".to_owned()
+            "another program listens there, perhaps a service: stop it, or give another address with --listen \
+             HOST:PORT".to_owned()
         }
         ErrorKind::AddrNotAvailable => {
-            "this machine does not have the address; give one of its own with --listen HOST:PORT".to_owned()
+            "this machine does not have that address: give one that it has with --listen HOST:PORT".to_owned()
         }
         ErrorKind::PermissionDenied => {
-            "this user may not take the port; give one from 1024 on with --listen HOST:PORT".to_owned()
+            "this user may not use that port: give one above 1023 with --listen HOST:PORT".to_owned()
         }
         _ => format!("{error}; give another address with --listen HOST:PORT"),
     };
@@ -51,7 +52,7 @@ pub(crate) fn after(config: &Config, limit: Duration) -> Option<BusError> {
 fn silent(endpoint: &str, limit: Duration) -> Option<String> {
     let at = address(endpoint);
     let address = host_and_port(endpoint)?;
-    let elsewhere = "say where the service is: --connect HOST:PORT or ISOTHERM_CONNECT";
+    let elsewhere = "give the service's address: --connect HOST:PORT or ISOTHERM_CONNECT";
     let addresses: Vec<SocketAddr> = match address.to_socket_addrs() {
         Ok(addresses) => addresses.collect(),
         Err(_) => return Some(format!("{at}: the host name is not known; {elsewhere}")),
@@ -61,8 +62,8 @@ fn silent(endpoint: &str, limit: Duration) -> Option<String> {
         match TcpStream::connect_timeout(&address, TRIAL) {
             Ok(_) => {
                 return Some(format!(
-                    "{at}: something listens there but does not answer as a service within {limit:?}; is it another program, a \
-                     stopped service, or one with other certificates? Else {elsewhere}"
+                    "{at}: something listens there but does not answer within {limit:?}: another program, a stopped \
+                     service, or one with other certificates; or {elsewhere}"
                 ));
             }
             Err(error) => last = Some(error),

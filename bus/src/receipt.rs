@@ -4,6 +4,7 @@
 //! is being written is given up, with everything behind it, and the close says that all is well. A query travels behind what was published
 //! before it at the same priority; once a subscriber's session has let the query go, it has taken everything.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use isotherm_protocol::key;
@@ -62,6 +63,55 @@ fn ask(session: &Session, limit: Duration) -> Result<(), BusError> {
         .map_err(|source| BusError::Declare { key: key::ALL_RECEIPTS.to_owned(), source })?;
     // It ends once everybody has let it go, or is not there any more. Zenoh itself replies for those who have not in time.
     if replies.into_iter().any(|reply| reply.result().is_err()) { Err(not_taken(limit)) } else { Ok(()) }
+}
+
+/// A session that gives receipts and is behind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Behind {
+    /// Its Zenoh id.
+    pub session: String,
+    /// Where it is: the other end of a link to it.
+    pub at: String,
+}
+
+/// Who gives receipts, is linked to this session, and has not taken within `limit` what this session has published at
+/// [`Priority::RealTime`].
+///
+/// Zenoh says nothing of what it drops for a subscriber; it drops nothing for one that is not behind. Whoever is behind a router, or gives
+/// no receipts, is not noticed.
+pub async fn behind(session: &Session, limit: Duration) -> Vec<Behind> {
+    let links: Vec<_> = session.info().links().await.collect();
+    let mut asked = BTreeMap::new();
+    for link in links {
+        let name = link.zid().to_string();
+        if asked.contains_key(&name) {
+            continue;
+        }
+        // Dropped where its queue is full: then it is behind, and nobody waits for it.
+        let question = session
+            .get(key::receipt(&name))
+            .target(QueryTarget::All)
+            .consolidation(ConsolidationMode::None)
+            .allowed_destination(Locality::Remote)
+            .congestion_control(CongestionControl::Drop)
+            .priority(Priority::RealTime)
+            .timeout(limit);
+        // Where the session is closed nobody is asked.
+        if let Ok(replies) = question.await {
+            asked.insert(name, (link.dst().to_string(), replies));
+        }
+    }
+    let mut behind = Vec::new();
+    for (session, (at, replies)) in asked {
+        // Each question has a limit of its own, which runs from when it was asked.
+        while let Ok(reply) = replies.recv_async().await {
+            if reply.result().is_err() {
+                behind.push(Behind { session: session.clone(), at: at.clone() });
+                break;
+            }
+        }
+    }
+    behind
 }
 
 fn not_taken(waited: Duration) -> BusError {

@@ -46,11 +46,11 @@ pub struct SessionOptions {
     /// Address of a router or peer to connect to, repeatable
     #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
     pub connect: Vec<String>,
-    /// Address to listen on, repeatable; port 0: one of the system's choice (default: 127.0.0.1:7447 unless --connect or a Zenoh
+    /// Address to listen on, repeatable; port 0: chosen by the system (default: 127.0.0.1:7447 unless --connect or a Zenoh
     /// configuration is given)
     #[cfg_attr(feature = "clap", arg(long, value_name = "HOST:PORT", value_parser = endpoint))]
     pub listen: Vec<String>,
-    /// Key prefix of the site, e.g. site/a
+    /// Zenoh namespace, a prefix of every key, e.g. site/a
     #[cfg_attr(feature = "clap", arg(long, value_name = "PREFIX"))]
     pub namespace: Option<String>,
     /// How long others wait for a sign of life before they close the connection, and how long a put with `Block` waits for others,

@@ -19,21 +19,18 @@ mod thermal;
 mod tumble;
 mod validate;
 
-use std::io::{self, Write};
-use std::process::ExitCode;
-
 use clap::{Parser, Subcommand};
-use isotherm_document::program::Common;
+use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
 
 use crate::error::Error;
 
-/// Makes calibration documents from logs, and judges them.
+/// Makes calibration documents from logs, judges and compares them.
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-calibrate",
     version,
-    after_help = "Exit codes: 0 ok, 1 failed, or the data do not allow what was asked for, 2 usage, 3 finished with data loss, \
-        78 bad mapping or calibration document."
+    after_help = "Exit codes: 0 ok, 1 failed, or the data do not allow the fit, 2 usage, 3 finished with data loss, \
+                  78 bad mapping or calibration document."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -59,7 +56,7 @@ enum Command {
 }
 
 /// Runs the command that the arguments name.
-fn run(cli: Cli) -> Result<(), Error> {
+fn run(cli: Cli) -> Result<Exit, Error> {
     match cli.command {
         Command::Board(args) => args.run(),
         Command::Diff(args) => args.run(),
@@ -73,11 +70,9 @@ fn run(cli: Cli) -> Result<(), Error> {
         Command::Thermal(args) => args.run(),
         Command::Tumble(args) => args.run(),
         Command::Validate(args) => args.run(),
-        Command::Common(common) => {
-            let done = common.run::<Cli>();
-            print(&done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?)
-        }
+        Command::Common(common) => return Ok(common.run::<Cli>()),
     }
+    .map(|()| Exit::Ok)
 }
 
 /// Refuses an argument that is no number above 0.
@@ -90,23 +85,13 @@ pub(crate) fn above_0(name: &str, value: f64) -> Result<(), Error> {
 
 /// Writes to standard output; a reader that has gone away is no error.
 pub(crate) fn print(text: &[u8]) -> Result<(), Error> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(text).and_then(|()| stdout.flush()) {
-        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout { source }),
-        _ => Ok(()),
-    }
+    to_stdout(text).map_err(|source| Error::Stdout { source })
 }
 
-/// Runs the program and maps what came of it to its exit code.
+/// Runs the program and says how it ended.
 #[must_use]
-pub fn main() -> ExitCode {
-    match run(isotherm_document::advanced::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            let _ = writeln!(io::stderr(), "isotherm-calibrate: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
+pub fn main() -> Exit {
+    run(parse()).unwrap_or_else(|error| failed_lines(&error, error.exit()))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::Path;
 
+use isotherm_cli::Exit;
 use thiserror::Error;
 
 use crate::finding::Finding;
@@ -21,7 +22,7 @@ pub enum Error {
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Found(Vec<Finding>),
     /// A document that was made is refused by its own reader; every problem, one per line.
-    #[error("the document that was made does not hold:\n{}", .0.join("\n"))]
+    #[error("the new document is invalid:\n{}", .0.join("\n"))]
     Document(Vec<String>),
     /// Arguments that do not go together.
     #[error("{0}")]
@@ -70,14 +71,14 @@ impl Error {
         }
     }
 
-    /// The program's exit code: 1 failed or refused, 2 usage, 3 finished with data loss, 78 bad mapping or calibration document.
+    /// The exit code that this error stands for.
     #[must_use]
-    pub fn exit_code(&self) -> u8 {
+    pub fn exit(&self) -> Exit {
         match self {
-            Self::Log(error) => error.exit_code(),
-            Self::Usage(_) => 2,
-            Self::CutShort(_) => 3,
-            _ => 1,
+            Self::Log(error) => Exit::blaming(error.is_usage(), error.is_document()),
+            Self::Usage(_) => Exit::Usage,
+            Self::CutShort(_) => Exit::DataLoss,
+            _ => Exit::Failed,
         }
     }
 }

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    isotherm_calibration::cli::main()
+    isotherm_calibration::cli::main().into()
 }

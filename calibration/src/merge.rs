@@ -129,7 +129,7 @@ impl Picked {
                 made.push((part, changed, without));
             } else if !without.is_empty() {
                 self.warnings.push(format!(
-                    "{} does not have {}, and makes nothing in its place: kept as in {}",
+                    "{} lacks {}: kept as in {}",
                     part.name,
                     without.join(", "),
                     base.name
@@ -167,7 +167,7 @@ impl Picked {
         if of.ends_with(" bias") && fits.len() > 1 {
             let names: Vec<&str> = fits.into_iter().map(String::as_str).collect();
             self.warnings.push(format!(
-                "the terms of {of} are of several fits ({}): each was made without the other's; judge the result with validate",
+                "the terms of {of} are from several separate fits ({}): judge the result with validate",
                 names.join(", ")
             ));
         }
@@ -196,8 +196,8 @@ impl Picked {
             let bound = dynamic.iter().any(|term| key.ends_with(&format!(".{term}")));
             if bound && find(source).and_then(filter_of) != filter {
                 conflicts.push(format!(
-                    "temperature.filter is taken from {from}, but {key} of {source} was fitted with another filter and is wrong \
-                     with this one: fit one of them again with the other's filter"
+                    "temperature.filter is taken from {from}, but {key} of {source} was fitted with another filter \
+                     and is wrong with this one: repeat one of the fits with the other's filter"
                 ));
             }
         }
@@ -219,13 +219,11 @@ fn conflict(key: &str, said: &[(String, Option<Value>)], chosen: Option<&Take>) 
         .map(|(name, value)| if value.is_some() { name.clone() } else { format!("{name} (does without it)") })
         .collect();
     match chosen {
-        Some(take) => format!(
-            "{key}: --take names {}, which has not made it; made by {}",
-            take.from,
-            names.join(" and ")
-        ),
+        Some(take) => {
+            format!("{key}: --take names {}, but only {} changed it", take.from, names.join(" and "))
+        }
         None => format!(
-            "{key}: made differently by {}; say which with --take {key}={}",
+            "{key}: made differently by {}; choose with --take {key}={}",
             names.join(" and "),
             said.first().map_or("", |(name, _)| name)
         ),

@@ -279,7 +279,7 @@ impl Run {
             return Ok(troubles);
         }
         let mut reasons = vec![format!(
-            "{}: nothing of unit {} could be corrected: is the document for this unit, and the mapping right?",
+            "{}: nothing of unit {} could be corrected: check that the document is for this unit, and the mapping",
             self.name, self.unit
         )];
         reasons.extend(troubles);

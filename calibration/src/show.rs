@@ -128,7 +128,7 @@ fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
         };
         let head: Vec<&str> = head.iter().map(String::as_str).collect();
         let heading = match argument {
-            "°C" => "Over temperature (in brackets: held, outside the fitted range)",
+            "°C" => "Over temperature (in brackets: clamped, outside the fitted range)",
             "°C/s" => "Over the temperature's rate",
             _ => "Over the temperature's acceleration",
         };

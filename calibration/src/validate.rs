@@ -86,7 +86,8 @@ pub fn validate(
         let (after, nominal) = (next(), next());
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = format!(
-                "{}: {name} makes no valid rate of any of its gyro ticks: is it the document of this unit, and the mapping right?",
+                "{}: {name} gives no valid rate for any gyro tick: check that it is the document of this unit, and \
+                 the mapping",
                 run.name
             );
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
@@ -105,7 +106,7 @@ pub fn validate(
         report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
         if log.known {
             report.warnings.push(format!(
-                "{} is among the logs that the document was made from: what it shows is in sample",
+                "{} is one of the logs that the document was made from: it is in sample",
                 run.name
             ));
         }
@@ -122,15 +123,16 @@ pub fn validate(
     for (verdict, limit) in report.verdicts.iter_mut().zip(limits) {
         let [before, after] = verdict.deciding();
         if before.count > 1 && before.deviation <= limit {
-            *verdict =
-                verdict.clone().refused("it does not change: the sensor is dead, or its column is wrong");
+            *verdict = verdict
+                .clone()
+                .refused("its reading is constant: the sensor is dead, or its column is wrong");
         } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME {
             let mine = report.residuals.iter().filter(|curve| curve.of == verdict.of);
             let flat = mine.flat_map(|curve| curve.before.iter().copied()).collect::<Vec<f64>>();
             verdict.reason = if is_white(&flat) {
                 format!("{FLAT}; left unchanged")
             } else {
-                "the document changes nothing of it".to_owned()
+                "the document does not change it".to_owned()
             };
         } else if verdict.accepted && (after.rms - before.rms).abs() <= before.rms * SAME_SHARE {
             "unchanged within 1 %".clone_into(&mut verdict.reason);
@@ -151,8 +153,8 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
         let length = force.iter().map(|size| size.mean * size.mean).sum::<f64>().sqrt();
         if !is_one_g(length) {
             doubts.push(format!(
-                "{name}: the mean specific force is {} m/s², gravity is 9.76 to 9.84: are the unit of the columns, their order, and \
-                 the document right?",
+                "{name}: the mean specific force is {} m/s², gravity is 9.76 to 9.84: check the unit of the columns, \
+                 their order, and the document",
                 short(length)
             ));
         }
@@ -189,7 +191,7 @@ fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place
 fn at_rest(name: &str, means: &Table) -> Option<String> {
     let refuse = |what: String| {
         Some(format!(
-            "{name}: the unit was not at rest: {what}. Cut the log to where it was, with --start and --duration"
+            "{name}: the unit was not at rest: {what}. Cut the log to the part at rest with --start and --duration"
         ))
     };
     for (axis, of) in ["x", "y", "z"].into_iter().enumerate() {
@@ -225,8 +227,8 @@ fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error>
     let rate = place.earth_rate_in_case(known.then(|| force.map(|size| size.mean)));
     let Some(rate) = rate else {
         return Err(Error::Refused(vec![format!(
-            "{name}: the unit cannot be levelled: {}. Give --roll and --pitch, or leave --latitude and --heading out, and each \
-             mean is taken off",
+            "{name}: the unit cannot be levelled: {}. Give --roll and --pitch, or remove --latitude and --heading: \
+             then each mean is removed",
             if known {
                 "its mean specific force is not 1 g, or x points up or down"
             } else {
@@ -247,8 +249,8 @@ fn missing(document: &Document, report: &mut FitReport) -> Result<(), Error> {
         if !gone.is_empty() {
             let (axes, with) = (gone.join(", "), gone.len());
             report.warnings.push(format!(
-                "{kind} {axes}: no window is whole and without flags, nothing can be said of {}: look at the flags with \
-                 isotherm-replay correct, and choose a shorter --window where the log has gaps",
+                "{kind} {axes}: no window is complete and without flags, so {} cannot be judged: check the flags \
+                 with isotherm-replay correct, and choose a shorter --window if the log has gaps",
                 if with == 1 { "it" } else { "them" }
             ));
         }
@@ -268,7 +270,7 @@ fn notes(curves: &[Curve], logs: &[JudgedLog], (window_s, placed): (f64, bool)) 
     let length = |curve: &Curve| curve.time_s.last().copied().unwrap_or(0.0);
     let hours = curves.iter().filter(|curve| curve.of == "gyro x").map(length).sum::<f64>() / 3600.0;
     let mut notes = vec![format!(
-        "Before is nominal: the document without what knows of temperature, bias or mode. Means over {} s, {} h.",
+        "Before is nominal: the document without its temperature, bias and mode terms. Means over {} s, {} h.",
         short(window_s),
         short(hours)
     )];
@@ -276,13 +278,13 @@ fn notes(curves: &[Curve], logs: &[JudgedLog], (window_s, placed): (f64, bool)) 
         notes.push(format!("Out of sample: {}.", outside.join(", ")));
     }
     if !inside.is_empty() {
-        notes.push(format!("In sample, the document was made from them: {}.", inside.join(", ")));
+        notes.push(format!("In sample (the document was made from them): {}.", inside.join(", ")));
     }
     notes.push(if placed {
-        "Earth rate is taken off the rates; of each specific force its mean over the run.".to_owned()
+        "Removed: Earth's rate from the rates, the mean over the run from each specific force.".to_owned()
     } else {
-        "Of each axis its mean over the run is taken off, before and after each its own: a constant bias is not judged. \
-                 With --latitude and --heading it is, of the gyros."
+        "Each axis' mean over the run is removed, before and after: a constant bias is not judged. With --latitude \
+         and --heading that of the gyros is."
             .to_owned()
     });
     notes

@@ -3,7 +3,7 @@ function units = isotherm(path)
 %
 %   units = isotherm('run.mcap')          a recording
 %   units = isotherm('corrected.wire')    frames of: isotherm-replay correct --format wire
-%   ticks = isotherm('corrected.parquet') a table of: isotherm-replay convert --to parquet (MATLAB only)
+%   ticks = isotherm('corrected.parquet') columns by name of: isotherm-replay convert --to parquet; a table in MATLAB
 %
 %   units(k).unit is a serial; units(k).sequence, .end_time_ns, .duration_ns, .ticks, .missed, .mode (1, -1, 0: none), .flags,
 %   .revision have a row for each output, .delta_angle_rad and .delta_velocity_m_per_s three columns, .gyro_flags and .accel_flags
@@ -12,18 +12,19 @@ function units = isotherm(path)
 %   warning that says how many and why. Recordings compressed with zstd need the program zstd on the path.
   [~, ~, extension] = fileparts(path);
   if strcmp(extension, '.parquet')
-    if exist('parquetread', 'file') == 0
-      error('isotherm:parquet', '%s: Octave reads no Parquet; give it the recording, or a file of --format wire', path);
+    if exist('parquetread', 'file') ~= 0
+      units = parquetread(path);
+      return
     end
-    units = parquetread(path);
+    bytes = contents(path);
+    try
+      units = parquet_columns(bytes);
+    catch problem
+      error('isotherm:file', '%s: no whole Parquet file of isotherm-replay convert: %s', path, problem.message);
+    end
     return
   end
-  file = fopen(path, 'r', 'ieee-le');
-  if file < 0
-    error('isotherm:file', '%s: cannot be opened', path);
-  end
-  bytes = fread(file, Inf, '*uint8')';
-  fclose(file);
+  bytes = contents(path);
   if numel(bytes) >= 8 && isequal(bytes(1:8), uint8([137 77 67 65 80 48 13 10]))
     frames = mcap_frames(bytes, path);
   else
@@ -58,6 +59,15 @@ function units = isotherm(path)
       units(place).(name{1}) = vertcat(columns{:});
     end
   end
+end
+
+function bytes = contents(path)
+  file = fopen(path, 'r', 'ieee-le');
+  if file < 0
+    error('isotherm:file', '%s: cannot be opened', path);
+  end
+  bytes = fread(file, Inf, '*uint8')';
+  fclose(file);
 end
 
 function frames = wire_frames(bytes, path)

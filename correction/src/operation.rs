@@ -156,7 +156,7 @@ pub enum Refusal {
     )]
     NoReversal,
     /// The calibration has no parameters for the drift estimator.
-    #[error("no gyro of the calibration in force has a [gyro.sensor.drift]: there is no estimator to feed")]
+    #[error("no gyro of the calibration in force has a [gyro.sensor.drift]: there is no drift estimator")]
     NoDrift,
     /// Settings of the pre-launch calibration are wrong.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]

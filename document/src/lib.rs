@@ -37,14 +37,11 @@
 //!
 //! Lengths of texts count bytes.
 
-#[cfg(feature = "clap")]
-pub mod advanced;
 pub mod escape;
+pub mod file;
 mod kind;
 mod number;
 mod problem;
-#[cfg(feature = "clap")]
-pub mod program;
 mod reader;
 mod schema;
 mod stand_in;

@@ -48,7 +48,7 @@ pub fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Prob
         let before =
             bytes.get(..valid).and_then(|before| std::str::from_utf8(before).ok()).unwrap_or_default();
         let (line, column) = Lines::new(before).position(valid);
-        let message = format!("is not UTF-8 at byte {valid}: save the document as UTF-8");
+        let message = format!("is not UTF-8 at byte {valid}: is it the right file, saved as UTF-8?");
         vec![Problem { line, column, ..unplaced(file, message) }]
     })
 }
@@ -64,7 +64,7 @@ impl<'t> Reader<'t> {
     pub(crate) fn root(&mut self, form: &Form) -> Option<Spanned<DeTable<'t>>> {
         let text = self.text();
         if text.len() > MAX_BYTES {
-            self.report_at(0, "", format!("is {} bytes long, may have {MAX_BYTES}", text.len()));
+            self.report_at(0, "", format!("has {} bytes, may have {MAX_BYTES}", text.len()));
             return None;
         }
         let (root, errors) = parse_toml(text);
@@ -93,7 +93,7 @@ impl<'t> Reader<'t> {
         let foreign = !(oldest..=newest).contains(&version);
         if foreign {
             let known = if oldest == newest { format!("{newest}") } else { format!("{oldest} to {newest}") };
-            let message = format!("is version {version}; this release reads {known}: nothing else was read");
+            let message = format!("is version {version}; this release reads {known}: the rest was not read");
             self.report_at(value.span().start, key, message);
         }
         foreign

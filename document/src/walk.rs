@@ -164,7 +164,7 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
             let advice = match closest(name, free.iter().copied()) {
                 Some(word) => format!("did you mean `{word}`?"),
                 None if free.is_empty() => "remove it".into(),
-                None => format!("remove it; not yet used here: {}", free.join(", ")),
+                None => format!("remove it; keys not used here: {}", free.join(", ")),
             };
             self.reader.report_at(
                 key.span().start,

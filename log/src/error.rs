@@ -61,13 +61,15 @@ impl Error {
         Self::File { path: path.display().to_string(), action, source }
     }
 
-    /// The exit code of a program that ends with it: 1 failed, 2 usage, 78 bad mapping or calibration document.
+    /// Whether the command line is to blame.
     #[must_use]
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Usage(_) | Self::Unit { .. } => 2,
-            Self::Mapping(_) | Self::Calibration(_) => 78,
-            _ => 1,
-        }
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Usage(_) | Self::Unit { .. })
+    }
+
+    /// Whether a mapping or calibration document is.
+    #[must_use]
+    pub fn is_document(&self) -> bool {
+        matches!(self, Self::Mapping(_) | Self::Calibration(_))
     }
 }

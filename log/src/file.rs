@@ -5,6 +5,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, absolute};
 
+use isotherm_document::file::read_bounded;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use crate::error::Error;
@@ -15,9 +16,7 @@ use crate::error::Error;
 /// [`Error::File`].
 pub fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
     let failed = |source| Error::file(path, action, source);
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(failed)?;
-    file.take(MAX_DOCUMENT_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    let bytes = read_bounded(path).map_err(failed)?;
     if bytes.len() > MAX_DOCUMENT_BYTES {
         let words = format!("longer than {MAX_DOCUMENT_BYTES} bytes: is it the right file?");
         return Err(failed(io::Error::other(words)));
@@ -46,7 +45,7 @@ pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
     let same = |other: &&&Path| resolved(out).is_some_and(|out| resolved(other) == Some(out));
     match others.iter().find(same) {
         Some(other) if out.is_file() || !out.exists() => Err(Error::Usage(format!(
-            "{} would be written over: this command has it as {} too",
+            "{} would be overwritten: it is also the {} of this command",
             out.display(),
             other.display()
         ))),

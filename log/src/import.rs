@@ -155,16 +155,19 @@ impl fmt::Display for Question {
                 write!(f, "The first rows: {}", rows.join(" ⏎ "))
             }
             Self::GyroUnit { columns, largest } => {
-                write!(f, "in which unit are the gyros {columns}? The largest reading is {largest}")
+                write!(f, "what is the unit of the gyros {columns}? The largest reading is {largest}")
             }
             Self::AccelUnit { columns, largest } => {
-                write!(f, "in which unit are the accelerometers {columns}? The largest reading is {largest}")
+                write!(
+                    f,
+                    "what is the unit of the accelerometers {columns}? The largest reading is {largest}"
+                )
             }
             Self::TimeUnit { column, step } => {
-                write!(f, "in which unit is the time {column}? It usually grows by {step}")
+                write!(f, "what is the unit of the time {column}? It usually grows by {step}")
             }
             Self::Rate { file } => {
-                write!(f, "{file} has no usable time: how many rows are there in a second?")
+                write!(f, "{file} has no usable time: how many rows per second?")
             }
         }
     }

@@ -11,8 +11,8 @@
 //! | [`recording`] | MCAP files with every message as it was on the bus |
 //! | [`message`] | one message and its topic |
 //! | [`source`] | a log of either kind as messages |
-//! | [`convert`] | a log in another form: its contents, its raw streams as rows |
-//! | [`ros2`], [`parquet`] | ROS 2 bags; Parquet files |
+//! | [`streams`] | its streams by unit, as rows |
+//! | [`ros2`] | messages of ROS 2 |
 //! | [`part`] | some of its units, some of its time |
 //! | [`schedule`] | when its messages are to go out again |
 //! | [`faults`] | delay, loss, duplication and reordering on purpose, from a seed |
@@ -26,7 +26,6 @@
 //! | [`mod@file`] | small files read whole, outputs that must not fall on inputs |
 //! | [`error`] | what can go wrong |
 
-pub mod convert;
 pub mod date;
 pub mod diff;
 pub mod error;
@@ -37,7 +36,6 @@ pub mod info;
 pub mod mapping;
 pub mod message;
 pub mod offline;
-pub mod parquet;
 pub mod part;
 pub mod plot;
 pub mod progress;
@@ -46,4 +44,5 @@ pub mod replica;
 pub mod ros2;
 pub mod schedule;
 pub mod source;
+pub mod streams;
 pub mod text;

@@ -161,13 +161,13 @@ impl Offline {
             "wrong_output_kind" => {
                 format!("{value} ticks refused: counts where the calibration has means, or the reverse")
             }
-            "not_finite_readings" => format!("{value} sensor readings are no numbers"),
+            "not_finite_readings" => format!("{value} sensor readings are not numbers"),
             "overrange_readings" => format!("{value} sensor readings are at or beyond the input range"),
             "temperature_rejected" => {
-                format!("{value} temperature readings are no numbers, out of range, or spikes")
+                format!("{value} temperature readings are not numbers, out of range, or spikes")
             }
             "temperature_late" => {
-                format!("{value} temperature readings came later than ticks that should have felt them")
+                format!("{value} temperature readings came too late for their ticks")
             }
             "temperature_out_of_order" => {
                 format!("{value} temperature readings are not newer than the one before")

@@ -156,7 +156,7 @@ pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
     let recording = |path: &PathBuf| is_recording(Path::new(path));
     match (paths.iter().find(|path| recording(path)), paths.iter().find(|path| !recording(path))) {
         (Some(recording), Some(other)) => Err(Error::Usage(format!(
-            "{} is a recording and {} is none (or cannot be read): give recordings alone, or the files of one text log",
+            "{} is a recording, but {} is not (or cannot be read): give recordings only, or the files of one text log",
             recording.display(),
             other.display()
         ))),

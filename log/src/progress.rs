@@ -29,4 +29,10 @@ impl Progress {
     pub fn total(&self) -> u64 {
         self.total
     }
+
+    /// Bytes there are, and how many have been read: what a progress bar takes.
+    pub fn watch(&self) -> (u64, impl Fn() -> u64 + Send + Sync + use<>) {
+        let watched = self.clone();
+        (self.total, move || watched.read())
+    }
 }

@@ -349,5 +349,5 @@ fn difference(own: &UnitStream, service: &UnitStream) -> String {
     if own.unit().state() != service.unit().state() {
         words.push(format!("state {} here, {} there", own.unit().state(), service.unit().state()));
     }
-    if words.is_empty() { "in what it remembers of its readings".to_owned() } else { words.join(", ") }
+    if words.is_empty() { "in the readings it remembers".to_owned() } else { words.join(", ") }
 }

@@ -189,7 +189,7 @@ impl CorrectedCsv {
                     ticks: same.iter().map(|tick| tick.tick.clone()).collect(),
                 };
                 let frame = codec::encode(&batch)
-                    .map_err(|error| Error::Usage(format!("a corrected tick is none: {error}")))?;
+                    .map_err(|error| Error::Usage(format!("a corrected tick is invalid: {error}")))?;
                 let received_ns = u64::try_from(last.tick.end_time.as_ns()).unwrap_or(0);
                 self.ready.push_back(Message { topic: Topic::Corrected(unit.clone()), received_ns, frame });
             }

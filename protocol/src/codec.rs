@@ -181,7 +181,7 @@ pub enum CodecError {
     #[error("body is malformed")]
     Malformed,
     /// Bytes are left over behind the body.
-    #[error("{count} bytes are left over behind the body")]
+    #[error("{count} bytes are left over after the body")]
     Trailing {
         /// How many.
         count: usize,
@@ -209,7 +209,7 @@ pub enum CodecError {
         need: usize,
     },
     /// Readings that are said to be counts and are none.
-    #[error("tick {index} of the batch has readings that are no counts of 32 bits")]
+    #[error("tick {index} of the batch has readings that are not counts of 32 bits")]
     NotCounts {
         /// Index of the first such tick.
         index: usize,

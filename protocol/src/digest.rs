@@ -15,7 +15,7 @@ pub struct Digest(#[serde(with = "hex")] pub [u8; 32]);
 
 /// A text is no digest.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{text:?} is no digest: must be 64 hexadecimal digits")]
+#[error("{text:?} is not a digest: must be 64 hexadecimal digits")]
 pub struct DigestError {
     /// The text.
     pub text: String,

@@ -16,17 +16,14 @@ mod show;
 mod simulate;
 mod step;
 
-use std::io::{self, Write};
-use std::process::ExitCode;
-
 use clap::{Parser, Subcommand};
+use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
 use isotherm_correction::units::Span;
-use isotherm_document::program::Common;
 
 use crate::error::Error;
 use log_args::LogArgs;
 
-/// Plays recorded logs into the service, corrects them offline, simulates new ones.
+/// Records, plays, corrects, compares, plots, converts and simulates logs.
 #[derive(Debug, Parser)]
 #[command(
     name = "isotherm-replay",
@@ -65,19 +62,8 @@ fn seconds(text: &str) -> Result<Span, String> {
     }
 }
 
-/// How a command that ran to its end went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
-    /// Everything is there.
-    Complete,
-    /// Something was lost on the way, and said so.
-    DataLoss,
-    /// What was compared is not the same, and it is said where.
-    Different,
-}
-
 /// Runs the command that the arguments name.
-fn run(cli: Cli) -> Result<Outcome, Error> {
+fn run(cli: Cli) -> Result<Exit, Error> {
     match cli.command {
         Command::Record(args) => record::run(&args),
         Command::Recover(args) => recover::run(&args),
@@ -92,33 +78,17 @@ fn run(cli: Cli) -> Result<Outcome, Error> {
         Command::Plot(args) => plot::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Simulate(args) => simulate::run(&args),
-        Command::Common(common) => {
-            let done = common.run::<Cli>();
-            print(&done.map_err(|(path, source)| Error::file(&path, "write manual pages into", source))?)?;
-            Ok(Outcome::Complete)
-        }
+        Command::Common(common) => Ok(common.run::<Cli>()),
     }
 }
 
 /// Writes to standard output; a reader that has gone away is no error.
 fn print(text: &[u8]) -> Result<(), Error> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(text).and_then(|()| stdout.flush()) {
-        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => Err(Error::Stdout { source }),
-        _ => Ok(()),
-    }
+    to_stdout(text).map_err(|source| Error::Stdout { source })
 }
 
-/// Runs the program and maps what came of it to its exit code.
+/// Runs the program and says how it ended.
 #[must_use]
-pub fn main() -> ExitCode {
-    match run(isotherm_document::advanced::parse()) {
-        Ok(Outcome::Complete) => ExitCode::SUCCESS,
-        Ok(Outcome::DataLoss) => ExitCode::from(3),
-        Ok(Outcome::Different) => ExitCode::from(1),
-        Err(error) => {
-            let _ = writeln!(io::stderr(), "isotherm-replay: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
+pub fn main() -> Exit {
+    run(parse()).unwrap_or_else(|error| failed_lines(&error, error.exit()))
 }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 
 use isotherm_bus::BusError;
+use isotherm_cli::Exit;
 use isotherm_log::text::LogError;
 use thiserror::Error;
 
@@ -55,16 +56,15 @@ impl Error {
         isotherm_log::error::Error::file(path, action, source).into()
     }
 
-    /// The program's exit code: 1 failed, 2 usage, 78 bad mapping, calibration document, scenario or Zenoh configuration.
+    /// The exit code that this error stands for.
     #[must_use]
-    pub fn exit_code(&self) -> u8 {
+    pub fn exit(&self) -> Exit {
         match self {
-            Self::Log(error) => error.exit_code(),
-            Self::Usage(_) => 2,
-            Self::Bus(error) if error.is_usage() => 2,
-            Self::Bus(error) if error.is_configuration() => 78,
-            Self::Scenario(_) => 78,
-            _ => 1,
+            Self::Log(error) => Exit::blaming(error.is_usage(), error.is_document()),
+            Self::Bus(error) => Exit::blaming(error.is_usage(), error.is_configuration()),
+            Self::Usage(_) => Exit::Usage,
+            Self::Scenario(_) => Exit::BadConfiguration,
+            _ => Exit::Failed,
         }
     }
 }

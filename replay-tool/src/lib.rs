@@ -7,20 +7,16 @@
 //! | [`play`], [`pace`] | a log to the raw topics, at a speed |
 //! | [`keyboard`] | keys pressed meanwhile |
 //! | [`record`] | what is on the bus to recordings |
-//! | [`convert`] | logs as text, ROS 2 bags, Parquet files and recordings |
 //! | [`output`], [`summary`] | corrected ticks as a file, and their figures |
 //! | [`simulated`] | a scenario as a text log |
-//! | [`progress`] | the progress bar |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod cli;
-pub mod convert;
 pub mod error;
 pub mod keyboard;
 pub mod output;
 pub mod pace;
 pub mod play;
-pub mod progress;
 pub mod record;
 pub mod simulated;
 pub mod summary;

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    isotherm_replay_tool::cli::main()
+    isotherm_replay_tool::cli::main().into()
 }

@@ -4,9 +4,9 @@ use std::io::{self, Write};
 
 use isotherm_correction::sample::{ChannelName, OutputKind, TemperatureReading};
 use isotherm_correction::units::Timestamp;
-use isotherm_log::convert::contents::{Shape, UnitContents};
-use isotherm_log::convert::raw_text::RawColumns;
-use isotherm_log::convert::rows::Row;
+use isotherm_log::streams::contents::{Shape, UnitContents};
+use isotherm_log::streams::raw_text::RawColumns;
+use isotherm_log::streams::rows::Row;
 use isotherm_simulator::{Scenario, Simulation, Step};
 
 use crate::error::Error;
@@ -115,7 +115,7 @@ fn take(readings: &mut Vec<TemperatureReading>, time: Timestamp) -> Vec<Temperat
 fn are_whole(output: OutputKind, values: &[f64]) -> io::Result<()> {
     let broken = values.iter().find(|value| output == OutputKind::Counts && value.fract() != 0.0);
     broken.map_or(Ok(()), |value| {
-        let words = format!("count {value} is not whole: switch the scenario's quantisation on");
+        let words = format!("count {value} is not whole: enable quantisation in the scenario");
         Err(io::Error::new(io::ErrorKind::InvalidData, words))
     })
 }

@@ -26,13 +26,13 @@ pub struct Attachment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum AttachmentError {
     /// It is not there.
-    #[error("has no attachment: its sender is no node of rmw_zenoh")]
+    #[error("has no attachment: its sender is not a node of rmw_zenoh")]
     None,
     /// It is as `rmw_zenoh` had it before jazzy 0.2.4.
     #[error("has the attachment of rmw_zenoh before 0.2.4 (jazzy) or 0.6.0 (rolling): update its sender")]
     Old,
     /// It is anything else.
-    #[error("has an attachment of {length} bytes that is none of rmw_zenoh, which has {LENGTH}")]
+    #[error("has an attachment of {length} bytes that is not of rmw_zenoh, which has {LENGTH}")]
     Other {
         /// Its length.
         length: usize,

@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, print, say};
 use isotherm_document::Problem;
 use isotherm_document::escape::escaped;
-use isotherm_service::exit::Exit;
-use isotherm_service::words::{print, say};
 use serde::Serialize;
 
 use crate::{Error, Mapping};

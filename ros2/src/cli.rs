@@ -5,12 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use isotherm_bus::{ClientOptions, Role, SessionOptions, close, endpoint, locators, open, open_config};
-use isotherm_document::advanced;
-use isotherm_document::program::Common;
-use isotherm_service::cli::unheld;
-use isotherm_service::exit::Exit;
-use isotherm_service::logging::LogArgs;
-use isotherm_service::words::{print, print_within, say};
+use isotherm_cli::{Common, Exit, failed, parse, print, print_within, say};
+use isotherm_service::logging::{LogArgs, unheld};
 use isotherm_service::{RunningService, Settings};
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
@@ -35,7 +31,7 @@ const ANY_PORT: &str = "tcp/127.0.0.1:0";
     about = "Corrects Imu topics of ROS 2 (rmw_zenoh: jazzy, kilted, lyrical, rolling), without ROS",
     version,
     arg_required_else_help = true,
-    after_help = "Exit codes: 0 done, 1 failed, 2 called wrongly, 3 finished, but data was lost, 78 bad mapping, configuration or document."
+    after_help = "Exit codes: 0 done, 1 failed, 2 usage, 3 finished, but data was lost, 78 bad mapping, configuration or document."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -60,16 +56,16 @@ Examples:
   isotherm-ros bridge config/ros2.toml --listen 0.0.0.0:7447 --calibration units
   isotherm-ros bridge config/ros2.toml --connect 10.0.0.5:7447 --service 10.0.0.6:7447
 
-The first corrects in this process and joins the router that `ros2 run rmw_zenoh_cpp rmw_zenohd` starts, the second is the router
+The first corrects in this process and joins the router of `ros2 run rmw_zenoh_cpp rmw_zenohd`, the second is the router
 itself, the third leaves the correction to `isotherm serve` elsewhere.")]
 pub struct BridgeArgs {
-    /// Which topics are which unit (TOML)
+    /// Mapping of topics to units (TOML)
     #[arg(value_name = "MAPPING")]
     pub mapping: PathBuf,
     /// Router of ROS 2 to connect to, repeatable (default: 127.0.0.1:7447 unless --listen or --zenoh-config is given)
     #[arg(long, value_name = "HOST:PORT", value_parser = endpoint)]
     pub connect: Vec<String>,
-    /// Be the router of ROS 2, on this address, repeatable; port 0: one of the system's choice
+    /// Be the router of ROS 2, on this address, repeatable; port 0: chosen by the system
     #[arg(long, value_name = "HOST:PORT", value_parser = endpoint)]
     pub listen: Vec<String>,
     /// Zenoh configuration (JSON5) of the session with ROS 2
@@ -104,19 +100,10 @@ pub struct BridgeArgs {
 /// Runs the command line and says how it ended.
 #[must_use]
 pub fn run() -> Exit {
-    match advanced::parse::<Cli>().command {
+    match parse::<Cli>().command {
         Command::Bridge(args) => unheld(&args.log.clone(), bridge(args)),
         Command::Check(args) => check::run(&args),
-        Command::Common(common) => match common.run::<Cli>() {
-            Ok(printed) => print(&String::from_utf8_lossy(&printed), Exit::Ok),
-            Err((folder, error)) => {
-                say(format_args!(
-                    "isotherm-ros: cannot write manual pages into {}: {error}",
-                    folder.display()
-                ));
-                Exit::Failed
-            }
-        },
+        Command::Common(common) => common.run::<Cli>(),
     }
 }
 
@@ -128,13 +115,12 @@ async fn bridge(args: BridgeArgs) -> Exit {
             print_within(PRINT_LIMIT, text + "\n", totals.exit())
         }
         Ok(None) => {
-            tracing::error!("stopped at once by a second signal");
+            tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
         Err(error) => {
             error.problems().iter().for_each(say);
-            say(format_args!("isotherm-ros: {error}"));
-            error.exit()
+            failed(&error, error.exit())
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What can keep the bridge from working.
 
 use isotherm_bus::BusError;
+use isotherm_cli::Exit;
 use isotherm_document::Problem;
 use isotherm_service::ServiceError;
-use isotherm_service::exit::Exit;
 use thiserror::Error;
 
 /// Why the bridge did not start, or a command failed.
@@ -34,7 +34,7 @@ impl Error {
         match self {
             Self::Mapping(_) => Exit::BadConfiguration,
             Self::Service(error) => error.exit(),
-            Self::Bus(error) => Exit::of_bus(error),
+            Self::Bus(error) => Exit::blaming(error.is_usage(), error.is_configuration()),
             Self::File(_) | Self::Signals(_) => Exit::Failed,
         }
     }

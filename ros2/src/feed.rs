@@ -48,7 +48,7 @@ pub enum Refusal {
         back_ns: i64,
     },
     /// It came before.
-    #[error("has the number {sequence}, which came already")]
+    #[error("has the number {sequence} again")]
     Repeated {
         /// Its number.
         sequence: i64,
@@ -60,9 +60,7 @@ pub enum Refusal {
     #[error("is of a second publisher: a unit has one")]
     SecondPublisher,
     /// Readings that are to be counts are not whole.
-    #[error(
-        "has readings that are no counts, though the mapping says so: they must be whole and fit 32 bits"
-    )]
+    #[error("has readings that are not counts as in the mapping: they must be whole and fit 32 bits")]
     NotCounts,
     /// More are waiting than may.
     #[error("found {waiting} messages waiting for the service")]

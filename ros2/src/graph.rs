@@ -111,13 +111,14 @@ fn tell(seen: &Seen, finding: &Finding) {
         Finding::Humble => tracing::warn!(
             node,
             topic,
-            "its publisher is of ROS 2 humble, whose keys have no hash of the type: nothing of it arrives; take jazzy or later"
+            "its publisher is of ROS 2 humble, whose keys have no hash of the type: nothing is received from it; use \
+             jazzy or later"
         ),
         Finding::OtherType(is) => tracing::warn!(
             node,
             topic,
             is,
-            "its publisher has another type than the mapping's topic: nothing of it arrives"
+            "its publisher has another type than the mapping's topic: nothing is received from it"
         ),
         Finding::OnOutput => {
             tracing::warn!(node, topic, "it publishes where corrected messages go: subscribers get both");

@@ -128,7 +128,7 @@ fn mapping(r: &mut Reader<'_>, keys: Keys) -> Option<Mapping> {
             temperatures.map(|(i, keys)| (keys.topic.clone(), join(&element(&channels, i), "topic")));
         for (topic, path) in own.chain(temperatures) {
             if let Some((_, first)) = used.iter().find(|(other, _)| *other == topic) {
-                r.report(&path, format!("is {topic:?}, which is the topic of {first} already: take another"));
+                r.report(&path, format!("is {topic:?}, already the topic of {first}: use another"));
             }
             used.push((topic, path));
         }
@@ -182,8 +182,8 @@ fn per_sqrt_s_of_deg(walk: f64) -> f64 {
 fn time(r: &mut Reader<'_>, path: &str, keys: &TimeKeys, tick: Span) -> TimeMapping {
     let measured = keys.duration.map_or(keys.stamp == Marks::End, |rule| rule == DurationRule::Measured);
     if measured && keys.stamp == Marks::Start {
-        let why = "is \"measured\", but a stamp that marks the start says only with the next message how long the tick was: say \
-                   duration = \"nominal\"";
+        let why = "is \"measured\", but with a stamp at the start of a tick its duration is known only with the next \
+                   message: set duration = \"nominal\"";
         r.report(&join(path, "duration"), why);
     }
     // A stamp that is off by this much may fall beyond the limit of a gap: three standard deviations at either end.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use comfy_table::{CellAlignment, Table, presets};
-use isotherm_service::exit::Exit;
+use isotherm_cli::Exit;
 use serde::Serialize;
 
 /// Account of one unit.

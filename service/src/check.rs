@@ -7,15 +7,14 @@ mod signer;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::{Exit, print, say};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
 use serde::Serialize;
 
 pub use signer::Signer;
 
-use crate::exit::Exit;
 use crate::signing::read_trusted_keys;
-use crate::words::{print, say};
 
 /// Arguments of `check`.
 #[derive(Debug, Clone, Args)]
@@ -28,17 +27,17 @@ Examples:
   isotherm check state/overlays/*.toml
 
 Every problem goes to stderr as file:line:column: key: message, one line per good file to stdout.
-A calibration document need not be signed, but a signature that does not hold makes it bad.
-An overlay is checked by itself; whether it fits the document that it is for, a swap says.
+A calibration document need not be signed, but a wrong signature makes it bad.
+An overlay is checked by itself; a swap checks whether it fits its document.
 Exit codes: 0 all good, 78 a file is bad, 1 a file cannot be read (and none is bad).")]
 pub struct CheckArgs {
     /// Files to validate
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// What the files are; without it told by extension and content
+    /// Kind of the files (default: by extension and content)
     #[arg(long, value_enum)]
     pub kind: Option<FileKind>,
-    /// Folder of public keys (*.pub): say which of them signed each calibration document
+    /// Folder of public keys (*.pub) that signatures are verified with
     #[arg(long, value_name = "FOLDER")]
     pub trusted_keys: Option<PathBuf>,
     /// Print one JSON object on stdout instead
@@ -98,7 +97,8 @@ pub struct Summary {
 }
 
 /// Validates the files and says what was found.
-pub(crate) fn run(args: &CheckArgs) -> Exit {
+#[must_use]
+pub fn run(args: &CheckArgs) -> Exit {
     let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
         Ok(trusted) => trusted,
         Err(problems) => {

@@ -22,7 +22,7 @@ use isotherm_protocol::digest::Digest;
 use zenoh::qos::CongestionControl;
 
 use crate::ServiceError;
-use crate::text::{self, read_bounded};
+use isotherm_document::file::{self, read_bounded};
 pub use metrics::MetricsSettings;
 pub use pair::{PairSettings, chunk};
 pub use swap::{FolderSettings, Severity, SwapSettings};
@@ -109,7 +109,7 @@ impl Settings {
     pub fn load(path: &Path) -> Result<Self, ServiceError> {
         let read = |source| ServiceError::Read { path: path.to_owned(), source };
         let bytes = read_bounded(path).map_err(read)?;
-        text::text(&bytes, &path.display().to_string())
+        file::text(&bytes, &path.display().to_string())
             .and_then(|text| Self::parse(text, path))
             .map(|settings| Self { digest: Some(Digest::of(&bytes)), ..settings })
             .map_err(ServiceError::Configuration)

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use isotherm_bus::BusError;
+use isotherm_cli::Exit;
 use isotherm_protocol::document::Problem;
 use thiserror::Error;
 
 use crate::control::store::StoreError;
-use crate::exit::Exit;
 
 /// Why the service did not start, or a command failed.
 #[derive(Debug, Error)]
@@ -40,8 +40,8 @@ pub enum ServiceError {
     },
     /// The folder of calibration documents cannot be read, and there is nothing to go on with.
     #[error(
-        "the folder of calibrations {path} cannot be read: {source}; make it, or correct `calibrations` (no last good set is in `state` \
-         to go on with, or strict_start is set)",
+        "the folder of calibrations {path} cannot be read: {source}; create it, or correct `calibrations` (`state` \
+         has no last good set, or strict_start is set)",
         path = path.display()
     )]
     NoCalibrations {
@@ -100,7 +100,7 @@ impl ServiceError {
             Self::Token { source, .. } if source.kind() == std::io::ErrorKind::InvalidData => {
                 Exit::BadConfiguration
             }
-            Self::Bus(error) => Exit::of_bus(error),
+            Self::Bus(error) => Exit::blaming(error.is_usage(), error.is_configuration()),
             _ => Exit::Failed,
         }
     }
@@ -109,7 +109,7 @@ impl ServiceError {
 /// What to do about a port that somebody else has.
 fn in_use(error: &std::io::Error) -> &'static str {
     match error.kind() {
-        std::io::ErrorKind::AddrInUse => "; take another port, or 0 for one of the system's choice",
+        std::io::ErrorKind::AddrInUse => "; choose another port, or 0 to let the system choose",
         _ => "",
     }
 }

@@ -1,4 +1,4 @@
-//! isotherm: corrects the raw increments of inertial units in a stream, over Zenoh.
+//! The service: corrects the raw increments of inertial units in a stream, over Zenoh.
 //!
 //! The asynchronous edge of the project: sessions, threads, files, commands and signals are here, and nothing that
 //! decides a corrected value. Every unit's frames go through [`isotherm_protocol::stream::UnitStream`], which the
@@ -6,19 +6,17 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`cli`] | the commands |
+//! | [`serve`] | the command that runs it |
 //! | [`config`] | the service configuration, checked |
 //! | [`service`] | start and stop of the whole |
 //! | [`receive`] | Zenoh → unit → Zenoh: what the receive threads do |
 //! | [`control`] | documents, swaps and commands, and what is remembered of them |
 //! | [`observe`] | status, metrics, totals |
-//! | [`operator`] | commands that talk to a running service from outside |
 //! | `pair` | other instances for the same stream |
 //! | `supervisor` | what systemd is told |
 //! | [`check`] | validation of calibration documents and configurations |
 //! | [`signing`] | keys, signed documents and who is trusted, as files |
-//! | [`logging`], [`words`] | what is said on stderr and stdout, for other programs too |
-//! | [`demo`] | the demonstration and its report |
+//! | [`logging`] | the log, for other programs too |
 //!
 //! How a message travels: Zenoh's receive thread calls [`receive::intake::Intake::receive`], which finds the unit, locks it, has
 //! it corrected and publishes what came out, all before it returns. A second thread, the status publisher, does what only a clock
@@ -26,23 +24,17 @@
 //! calibrations and commands, whoever gives them, writes them down and hands them to the units.
 
 pub mod check;
-pub mod cli;
 pub mod config;
 pub mod control;
-pub mod demo;
 mod error;
-pub mod exit;
 pub mod logging;
 pub mod observe;
-pub mod operator;
 mod pair;
 pub mod receive;
-mod serve;
+pub mod serve;
 pub mod service;
 pub mod signing;
 mod supervisor;
-mod text;
-pub mod words;
 
 pub use config::Settings;
 pub use error::ServiceError;

@@ -1,76 +1,15 @@
 //! Structured logs on stderr.
 
-mod queue;
-
 use std::io::{self, IsTerminal, Write};
-use std::sync::OnceLock;
-use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::stderr::{queue_lines, to_stderr};
+use isotherm_cli::{Exit, coloured, failed};
 use tracing_subscriber::EnvFilter;
-
-use crate::words::coloured;
-use queue::Queue;
 
 /// Zenoh warns of every peer without gossip, which here is how peers are meant to be.
 const QUIET_ZENOH: &str =
     "zenoh=warn,zenoh_transport=warn,zenoh_link_commons=warn,zenoh::net::routing::hat::peer=error";
-
-/// How long the end of the program waits for a log that takes no line.
-const PATIENCE: Duration = Duration::from_millis(500);
-
-/// The lines of this process, once it logs.
-static QUEUE: OnceLock<Queue> = OnceLock::new();
-
-/// Puts a line on standard error: through the queue where this process logs, else at once.
-pub(crate) fn to_stderr(line: String) {
-    match QUEUE.get() {
-        Some(queue) => queue.push(line.into_bytes()),
-        // Where stderr is gone or full, the exit code says the rest.
-        None => drop(io::stderr().write_all(line.as_bytes())),
-    }
-}
-
-/// Log lines that were dropped because standard error took none.
-pub(crate) fn dropped_lines() -> u64 {
-    QUEUE.get().map_or(0, Queue::dropped)
-}
-
-/// Waits when it is dropped until the log is written, unless nobody takes it.
-pub(crate) struct FinishLog;
-
-impl Drop for FinishLog {
-    fn drop(&mut self) {
-        if let Some(queue) = QUEUE.get() {
-            queue.drain(PATIENCE);
-        }
-    }
-}
-
-/// Has lines for standard error go through a queue, and starts the thread that writes it.
-///
-/// # Errors
-/// Where the system gives no thread.
-pub(crate) fn start_writer() -> io::Result<()> {
-    if QUEUE.get().is_some() {
-        return Ok(());
-    }
-    let write = || {
-        let Some(queue) = QUEUE.get() else { return };
-        queue.write_to(io::stderr(), |count| {
-            tracing::warn!(
-                count,
-                "log lines were dropped: stderr took none (a stopped terminal, a full pipe)"
-            );
-        });
-    };
-    // Before the thread, which would end without it.
-    let _ = QUEUE.set(Queue::default());
-    std::thread::Builder::new().name("isotherm-log".to_owned()).spawn(write)?;
-    // A panic is caught where it happens; its words must not wait for stderr either.
-    std::panic::set_hook(Box::new(|panic| to_stderr(format!("isotherm: {panic}\n"))));
-    Ok(())
-}
 
 /// Standard error, for events: each is one line, whatever is in it. What a file name or a document has of line breaks,
 /// control characters and marks of direction is shown by its code.
@@ -118,20 +57,22 @@ pub struct LogArgs {
     /// Form of the log on stderr
     #[arg(long, value_enum, default_value = "human", value_name = "FORM")]
     pub log_format: LogFormat,
-    /// What is logged: a level (error, warn, info, debug, trace), or filters such as info,zenoh=debug
+    /// Log level (error, warn, info, debug, trace), or filters such as info,zenoh=debug
     #[arg(long, env = "ISOTHERM_LOG", default_value = "info", value_name = "FILTER")]
     pub log_level: String,
 }
 
 impl LogArgs {
     /// Warnings only, unless the environment says otherwise: for commands that have no options for it.
-    pub(crate) fn quiet() -> Self {
+    #[must_use]
+    pub fn quiet() -> Self {
         let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| "warn".to_owned());
         Self { log_format: LogFormat::Human, log_level }
     }
 
     /// Nothing, unless the environment says otherwise: for commands that say themselves what went wrong.
-    pub(crate) fn silent() -> Self {
+    #[must_use]
+    pub fn silent() -> Self {
         let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| "off,zenoh=off".to_owned());
         Self { log_format: LogFormat::Human, log_level }
     }
@@ -163,6 +104,33 @@ impl LogArgs {
         };
         Ok(())
     }
+}
+
+/// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
+pub fn unheld(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+    let report = |count| {
+        tracing::warn!(count, "log lines were dropped: stderr was blocked (a stopped terminal, a full pipe)");
+    };
+    // Drained however this ends, by a panic too.
+    match queue_lines(report) {
+        Ok(_drained) => logged(log, command),
+        Err(error) => failed(format_args!("cannot start the thread of the log: {error}"), Exit::Failed),
+    }
+}
+
+/// Runs a command that logs and needs a runtime.
+pub fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
+    if let Err(words) = log.start() {
+        return failed(words, Exit::Usage);
+    }
+    let runtime = match tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(error) => return failed(format_args!("cannot start the runtime: {error}"), Exit::Failed),
+    };
+    let exit = runtime.block_on(command);
+    // A stop that was cut short may have left something hanging: it must not hold the process up.
+    runtime.shutdown_background();
+    exit
 }
 
 #[cfg(test)]

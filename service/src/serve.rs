@@ -2,21 +2,21 @@
 
 use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use clap::Args;
 use isotherm_bus::SessionOptions;
+use isotherm_cli::{Exit, failed, print_within, say};
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
 
-use crate::cli::ServeArgs;
 use crate::config::Settings;
 use crate::control::calibrations::Calibrations;
-use crate::exit::Exit;
+use crate::logging::LogArgs;
 use crate::observe::metrics::Endpoint;
 use crate::service::{open_store, start_on};
 use crate::supervisor;
-use crate::words::{print_within, say};
 use crate::{ServiceError, Totals};
 
 /// How long the end waits for a stdout that takes nothing.
@@ -29,28 +29,69 @@ const FURTHER_WORDS: Duration = Duration::from_secs(60);
 /// SIGXFSZ, sent where a write would make a file longer than the process may (`ulimit -f`, `LimitFSIZE=`).
 const FILE_TOO_LONG: SignalKind = SignalKind::from_raw(25);
 
+/// Arguments of `serve`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+  isotherm serve --config config/service.toml
+  isotherm serve --calibration config/calibration
+  isotherm serve --calibration units --listen 127.0.0.1:0 --announce | head -1
+
+Without a configuration it listens where the other commands look for it, on 127.0.0.1:7447.")]
+pub struct ServeArgs {
+    /// Service configuration (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Folder of calibration documents (default: as configured)
+    #[arg(long = "calibration", alias = "calibrations", value_name = "FOLDER")]
+    pub calibrations: Option<PathBuf>,
+    /// Folder for the audit file and every accepted document (default: as configured)
+    #[arg(long, value_name = "FOLDER")]
+    pub state: Option<PathBuf>,
+    /// Address for metrics and health over HTTP (default: as configured)
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub metrics: Option<SocketAddr>,
+    /// Serve the console in the browser too (default: as configured); `isotherm web` prints its address
+    #[arg(long)]
+    pub web: bool,
+    /// How to reach others; each option replaces the configured one
+    #[command(flatten)]
+    pub session: SessionOptions,
+    /// When ready, print one line of JSON on stdout: {"ready":true,"locators":[…],"metrics":"http://…"}
+    #[arg(long, hide_short_help = true)]
+    pub announce: bool,
+    /// When ready, write the same line to this file
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
+    pub ready_file: Option<PathBuf>,
+    /// Print the totals at the end as JSON on stdout instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// Logging
+    #[command(flatten)]
+    pub log: LogArgs,
+}
+
 /// Serves until a signal comes.
-pub(crate) async fn run(args: ServeArgs) -> Exit {
+pub async fn run(args: ServeArgs) -> Exit {
     let json = args.json;
     match serve(args).await {
         Ok(Some(totals)) => report(&totals, json),
         Ok(None) => {
-            tracing::error!("stopped at once by a second signal");
+            tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
-        Err(error) => failed(&error),
+        Err(error) => refused(&error),
     }
 }
 
 /// Says what is wrong, every problem on a line of its own.
-fn failed(error: &ServiceError) -> Exit {
+fn refused(error: &ServiceError) -> Exit {
     if let ServiceError::Configuration(problems) = error {
         for problem in problems {
             say(problem);
         }
     }
-    say(format_args!("isotherm: {error}"));
-    error.exit()
+    failed(error, error.exit())
 }
 
 /// Says what was done.

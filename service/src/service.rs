@@ -11,6 +11,7 @@ use isotherm_bus::receipt;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::pair::Member;
 use isotherm_protocol::status::Status;
+use tokio::task::JoinHandle;
 use tokio::time::Instant;
 use zenoh::Session;
 
@@ -22,6 +23,7 @@ use crate::control::swap_manager::{Found, Inbox, Opening, SwapManager, Worker};
 use crate::control::watch::{WatchSettings, Watcher};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
+use crate::observe::subscribers::Subscribers;
 use crate::observe::totals::Totals;
 use crate::observe::web::Web;
 use crate::pair::{Asker, Pair, Watch};
@@ -51,6 +53,7 @@ pub struct RunningService {
     inbox: Inbox,
     pair: Watch,
     metrics: Option<Endpoint>,
+    asking: JoinHandle<()>,
 }
 
 /// Starts the service on a session, with the last good sets of the state folder and the documents of the configured one.
@@ -91,7 +94,8 @@ pub(crate) async fn start_on(
     tell_keys(&settings);
     if settings.certified_names && !settings.session.has_access_control()? {
         tracing::warn!(
-            "certified_names is set, but the Zenoh configuration has no access control: whoever connects may use any name"
+            "certified_names is set, but the Zenoh configuration has no access control: anyone who connects may use \
+             any name"
         );
     }
     let opening = Opening::new();
@@ -114,11 +118,12 @@ pub(crate) async fn start_on(
     let control_status = work.control_status();
     let source =
         Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
-    let source = source.feeling(Arc::clone(&pulse));
+    let subscribers = Arc::<Subscribers>::default();
+    let source = source.feeling(Arc::clone(&pulse)).asking(Arc::clone(&subscribers));
     let swap_manager = SwapManager::start(opening, work).map_err(ServiceError::Thread)?;
-    let status_publisher =
-        StatusPublisher::start(&session, Arc::clone(&intake), control_status, &pair, &settings)
-            .map_err(ServiceError::Thread)?;
+    let said = (control_status, Arc::clone(&subscribers));
+    let status_publisher = StatusPublisher::start(&session, Arc::clone(&intake), said, &pair, &settings)
+        .map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let (watch, inbox) = (watch_settings(&settings), inbox.clone());
@@ -136,6 +141,7 @@ pub(crate) async fn start_on(
     if let Some(metrics) = &metrics {
         metrics.open(source, web);
     }
+    let asking = subscribers.watch(&session);
     Ok(RunningService {
         session,
         settings,
@@ -148,6 +154,7 @@ pub(crate) async fn start_on(
         inbox,
         pair: watch,
         metrics,
+        asking,
     })
 }
 
@@ -174,7 +181,7 @@ fn now_unix_ms() -> i64 {
 pub(crate) fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
     let Some(folder) = folder else {
         tracing::warn!(
-            "no state folder is configured (`state`): swaps, and what was done to a unit, are forgotten at the end"
+            "no state folder is configured (`state`): swaps and history are lost when the service ends"
         );
         return Ok((Store::in_memory(), Opened::default()));
     };
@@ -202,7 +209,7 @@ fn tell_keys(settings: &Settings) {
             for problem in &problems {
                 tracing::error!("{problem}");
             }
-            tracing::error!(folder = %folder.display(), "no key is trusted until every *.pub file is one");
+            tracing::error!(folder = %folder.display(), "no key is trusted until every *.pub file is valid");
         }
     }
 }
@@ -244,8 +251,11 @@ impl RunningService {
             swap_manager,
             pair,
             metrics,
+            asking,
             ..
         } = self;
+        // From here on the stop itself asks.
+        asking.abort();
         metrics.iter().for_each(Endpoint::stopping);
         let deadline = Instant::now() + settings.stop_timeout;
         let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
@@ -270,7 +280,7 @@ impl RunningService {
             receipt::all_taken(&session, left(deadline).saturating_sub(settings.stop_timeout / CLOSE_SHARE))
                 .await;
         if !flushed {
-            tracing::error!("not everything could be flushed within {:?}", settings.stop_timeout);
+            tracing::error!("not everything was published within {:?}", settings.stop_timeout);
         }
         let closed = isotherm_bus::close(session, left(deadline)).await;
         for error in [&taken, &closed].into_iter().filter_map(|done| done.as_ref().err()) {

@@ -14,5 +14,5 @@ pub use sign::SignArgs;
 pub use trusted::read_trusted_keys;
 
 pub(crate) use files::create;
-pub(crate) use keygen::run as keygen;
-pub(crate) use sign::run as sign;
+pub use keygen::run as keygen;
+pub use sign::run as sign;

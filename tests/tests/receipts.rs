@@ -13,6 +13,7 @@ use isotherm_bus::{SessionOptions, close, locators, open, presence};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_service::Settings;
 use isotherm_tests::bench::{Bench, LIMIT};
 use isotherm_tests::calibrations::{compile, identity};
@@ -101,6 +102,32 @@ async fn a_subscriber_that_hangs_is_told_and_does_not_hold_the_stop_up() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_subscriber_that_is_behind_is_named_in_the_status_of_the_service() {
+    let (let_go, held) = std::sync::mpsc::channel::<()>();
+    let held = Mutex::new(held);
+    let (mut bench, hanging) = service(LIMIT, move || held.lock().unwrap().recv().unwrap_or(())).await;
+    // The bench's own consumer takes all of it at once, and is never named.
+    corrected(&mut bench, 10).await;
+    let session = open(&bench.options).await.unwrap();
+    let fault = loop {
+        let replies = session.get(key::ALL_SERVICE_STATUS).timeout(LIMIT).await.unwrap();
+        let sample = replies.recv_async().await.unwrap().into_result().unwrap();
+        let status: ServiceStatus = codec::decode(&sample.payload().to_bytes()).unwrap();
+        if let Some(fault) = status.faults.into_iter().find(|fault| fault.kind == "subscriber_behind") {
+            break fault;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    };
+    let name = hanging.session.zid().to_string();
+    assert!(fault.first.contains(&name) && fault.first.contains("tcp/127.0.0.1:"), "{fault:?}");
+    drop(let_go);
+    close(session, LIMIT).await.unwrap();
+    let (totals, _) = bench.stop().await;
+    assert!(totals.stopped_in_time, "{totals:?}");
+    hanging.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_session_that_is_closed_behind_the_receipts_loses_nothing() {
     const COUNT: u64 = 2000;
     let source = open(&SessionOptions::default()).await.unwrap();
@@ -118,7 +145,7 @@ async fn a_session_that_is_closed_behind_the_receipts_loses_nothing() {
         publisher.put(vec![0; 20_000]).await.unwrap();
     }
     let error = all_taken(&source, Duration::from_millis(1)).await.unwrap_err();
-    assert!(error.to_string().starts_with("a subscriber has not taken within 1ms"), "{error}");
+    assert!(error.to_string().starts_with("a subscriber has not read everything within 1ms"), "{error}");
     all_taken(&source, LIMIT).await.unwrap();
     assert_eq!(slow.taken(), COUNT);
     slow.end().await;

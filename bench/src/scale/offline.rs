@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use isotherm_cli::Bar;
 use serde::{Deserialize, Serialize};
 
 use crate::chain::python;
 use crate::error::Error;
 use crate::machine::children_s;
 use crate::process::beside;
-use crate::progress::Bar;
 use crate::rounds::median;
 
 /// Ticks per second of one core, medians over the rounds; ratios are medians of those in one round.
@@ -65,17 +65,17 @@ pub(super) fn measure(rounds: usize, quick: bool) -> Result<(Offline, Vec<String
     let folder = tempfile::tempdir().map_err(|source| Error::file(&std::env::temp_dir(), source))?;
     let log = Log::make(folder.path(), if quick { DURATION_S / 20 } else { DURATION_S })?;
     let interpreter = python::interpreter();
-    let bar = Bar::over(rounds);
+    let bar = Bar::counting("", rounds);
     let (mut times, mut uncompressed) = (Vec::new(), Vec::new());
     let mut scripts = Vec::new();
     for _ in 0..rounds {
-        bar.show("correct, numpy");
+        bar.say("correct, numpy");
         times.push(log.correct(&log.recording, None)?);
         uncompressed.push(log.correct(&log.uncompressed, None)?);
         if interpreter.is_ok() {
             scripts.push(log.numpy()?);
         }
-        bar.step();
+        bar.done_one();
     }
     bar.finish();
     let numpy = if scripts.is_empty() { None } else { Some(compare(log.ticks, &times, &scripts)?) };

@@ -199,7 +199,7 @@ fn tell(
         let name = &sensor.name;
         match found {
             Err(kind) => {
-                report.warnings.push(format!("{}; its ratio stays", kind.clone().of(name)));
+                report.warnings.push(format!("{}; its ratio does not change", kind.clone().of(name)));
                 let verdict = report.verdicts.iter_mut().find(|verdict| verdict.of == name_of(*axis));
                 if let Some(verdict) = verdict.filter(|verdict| verdict.accepted) {
                     *verdict = verdict.clone().refused(kind.to_string());
@@ -220,7 +220,7 @@ fn tell(
                     fixed(low, 1),
                     fixed(high, 1),
                     if ratio.beside_own {
-                        ", found beside slopes of K and S, which are not written"
+                        ", fitted together with slopes of K and S, which are not written"
                     } else {
                         ""
                     }

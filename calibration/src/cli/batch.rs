@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use isotherm_cli::Bar;
 use isotherm_protocol::key::UnitId;
 use serde_json::json;
 
-use super::bar::Bar;
+use super::bar;
 use super::output::OutputArgs;
 use super::print;
 use super::runs::Reading;
@@ -56,8 +57,8 @@ pub(super) type Outcome<R> = (String, Result<R, Error>);
 
 type Runs = BTreeMap<UnitId, Vec<Run>>;
 
-const NOTHING: &str = "the logs have no raw readings of any unit: give recordings of the bus (isotherm-replay record), or text logs with \
-    --mapping; a ROS 2 bag holds other messages";
+const NOTHING: &str = "the logs have no raw readings of any unit: give recordings of the bus (isotherm-replay \
+                       record), or text logs with --mapping; a ROS 2 bag has other messages";
 
 impl Work {
     /// A unit's work with nothing to be said of its logs yet.
@@ -130,8 +131,8 @@ impl<'a> Named<'a> {
             let mut work = Work::new(Some(base), runs, judges);
             if !others.is_empty() {
                 work.warnings.push(format!(
-                    "the logs have unit {} too, which is left alone: the document is of {unit}. For all of them give --calibration the \
-                     folder that has UNIT.toml of each",
+                    "the logs also have unit {}, which is left out: the document is of {unit}. For all units give \
+                     --calibration a folder with UNIT.toml of each",
                     others.join(", ")
                 ));
             }
@@ -153,7 +154,7 @@ impl<'a> Named<'a> {
             let mut work = Work::new(base, runs, judges);
             if unjudged {
                 work.warnings.push(format!(
-                    "the logs of --judge have nothing of unit {unit}: it is fitted, and is judged by what it was fitted to only"
+                    "the logs of --judge have nothing of unit {unit}: it is fitted, but judged in sample only"
                 ));
             }
             Ok(work)
@@ -188,8 +189,8 @@ impl<'a> Named<'a> {
             Some(own) => Ok((own, others)),
             None if others.is_empty() => Err(Error::Refused(vec![NOTHING.to_owned()])),
             None => Err(Error::Refused(vec![format!(
-                "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit where the serial has \
-                 changed",
+                "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit if \
+                 the serial has changed",
                 others.join(", ")
             )])),
         }
@@ -201,14 +202,15 @@ fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
     let path = folder.join(format!("{unit}.toml"));
     if !path.exists() {
         return Err(Error::Refused(vec![format!(
-            "{} is not there: the folder that --calibration names needs a document of each unit; leave the unit out with --unit",
+            "{} does not exist: the folder of --calibration needs a document of each unit; leave the unit out with \
+             --unit",
             path.display()
         )]));
     }
     let written = Written::read(&path)?;
     if written.loaded.unit != *unit {
         return Err(Error::Refused(vec![format!(
-            "{} is of unit {}: correct its name, or its unit",
+            "{} is of unit {}: correct its name or its unit",
             path.display(),
             written.loaded.unit
         )]));
@@ -255,7 +257,7 @@ impl Batch<'_> {
         {
             let work = work?;
             let report =
-                one(&work, &Names(None), Bar::reading).map_err(|error| error.beside(&work.cuts()))?;
+                one(&work, &Names(None), bar::reading).map_err(|error| error.beside(&work.cuts()))?;
             let json = self.output.json;
             print(if json { format!("{}\n", report.to_json()) } else { report.to_text() }.as_bytes())?;
             return Error::end(refusals(&report, self.accept_partial), work.cuts());
@@ -264,7 +266,7 @@ impl Batch<'_> {
         let bar = Bar::counting("units done", units.len());
         let came = in_parallel(
             &units,
-            |ready| bar.at(ready),
+            |ready| bar.at(ready as u64),
             |(unit, work)| {
                 let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
                 one(work, &Names(Some(unit.as_str())), Bar::hidden)

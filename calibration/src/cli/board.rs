@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 
-use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::runs::LogArgs;
@@ -18,20 +18,20 @@ use crate::thermal::Site;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate board up.mcap down.mcap --calibration unit.toml --latitude 55.75 --heading 30 --pitch 35.264 --roll -135 \\\n      \
     --pitch -35.264 --roll 45 --out unit-board.toml --html board.html\n\n\
-    The accelerometers stay on their thermostat, or their temperature moves by itself. The case diagonal up and down serves all axes.")]
+    Keep the accelerometers on their thermostat, or vary their temperature independently. The case diagonal up and down serves all axes.")]
 pub(super) struct BoardArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Run to judge the document on, which it is not fitted to; may be repeated
+    /// Log to judge by, out of sample; repeatable
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
-    /// Document that names the boards' channels and is completed; for several units the folder that has UNIT.toml of each
+    /// Calibration document (TOML) to complete, with the boards' channels; several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', value_name = "FILE", required = true)]
     document: Option<PathBuf>,
     /// Temperature of the board at which the ratio is 1 (°C) (default: the middle of its range)
     #[arg(long, value_name = "DEG_C", allow_negative_numbers = true)]
     reference: Option<f64>,
-    /// Windows of the fit (s)
+    /// Length of the windows of the fit (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     fit_window: f64,
     #[command(flatten)]

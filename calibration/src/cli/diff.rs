@@ -17,8 +17,7 @@ use crate::written::Written;
     isotherm-calibrate diff before.toml after.toml --html shock.html\n  \
     isotherm-calibrate diff before.toml after.toml --axis-sigma 12\n  \
     isotherm-calibrate diff before.toml between.toml after.toml\n\n\
-    Axes in ″ beside their uncertainty, biases and scale factors over temperature, then every entry that differs. The exit code is 0 \
-    whether they differ or not.")]
+    Shows axes in ″ with their uncertainty, biases and scale factors over temperature, then every entry that differs. The exit code is 0 whether they differ or not.")]
 pub(super) struct DiffArgs {
     /// The earlier document
     #[arg(value_name = "A")]

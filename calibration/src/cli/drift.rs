@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::Bar;
 use isotherm_log::diff::is_csv;
 use serde_json::json;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Unit, Work};
 use super::output::OutputArgs;
 use super::runs::LogArgs;
@@ -20,7 +20,6 @@ use crate::drift::report::Report;
 use crate::drift::trend::FIT_H;
 use crate::error::Error;
 use crate::provenance::{TOOL, command_line, origin};
-use crate::runs::Watch;
 use crate::written::Written;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
@@ -29,31 +28,30 @@ use crate::written::Written;
     isotherm-calibrate drift static.mcap --html drift.html\n  \
     isotherm-calibrate drift rlg-static.imu.gz --mapping config/mappings/rlg-static.toml --increment-weight 0.1\n  \
     isotherm-calibrate drift static.mcap --calibration unit.toml --out unit-drift.toml\n\n\
-    With --calibration the log is corrected first, by the service's own code, and what is analysed is what the calibration leaves. \
+    With --calibration the log is first corrected by the service's own code, and the remainder is analysed. \
     Rates are in °/h, N in °/√h, K in °/h/√h, R in °/h², Q in ″.")]
 pub(super) struct DriftArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Look at the accelerometers instead of the gyros
+    /// Analyse the accelerometers instead of the gyros
     #[arg(long)]
     accelerometers: bool,
-    /// The log holds corrected ticks, as isotherm-replay correct writes them (its CSV is known by itself)
+    /// The recording has corrected ticks (a CSV of isotherm-replay correct is recognised)
     #[arg(long, conflicts_with_all = ["document", "increment_weight"])]
     corrected: bool,
-    /// Angle that one count of a gyro stands for (″), where the readings are counts and there is no document
+    /// Gyro angle per count (″), for counts without a document
     #[arg(long, value_name = "ARCSEC", conflicts_with = "document")]
     increment_weight: Option<f64>,
-    /// Calibration document (TOML): the log is corrected with it first, and --out is it with what the estimator is to expect of its
-    /// gyros; for several units the folder that has UNIT.toml of each
+    /// Calibration document (TOML) that corrects the log first; --out adds drift parameters to it; several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
-    /// Sigma of the constant part when the estimator starts (°/h), where you know it from several starts
+    /// Sigma of the constant part at start (°/h), if known from several starts
     #[arg(long, value_name = "DEG_PER_H")]
     initial_sigma: Option<f64>,
-    /// Distance of the averaging times
+    /// Spacing of the averaging times
     #[arg(long, value_enum, default_value_t = Taus::Octave)]
     taus: Taus,
-    /// Hours that the trend is fitted to before it is extrapolated
+    /// Length of the trend fit before extrapolation (h)
     #[arg(long, value_name = "HOURS", default_value_t = FIT_H)]
     fit_hours: f64,
     #[command(flatten)]
@@ -141,8 +139,8 @@ impl DriftArgs {
             .try_for_each(|(name, value)| value.map_or(Ok(()), |value| above_0(name, value)))?;
         if self.output.writes() && (self.document.is_none() || self.accelerometers) {
             return Err(Error::Usage(
-                "--out is the document with what the estimator is to expect of its gyros: give it with --calibration, and leave \
-                 --accelerometers out"
+                "--out writes drift parameters of gyros into a document: add --calibration, and remove \
+                 --accelerometers"
                     .to_owned(),
             ));
         }

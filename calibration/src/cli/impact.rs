@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::slice;
 
 use clap::{Args, ValueEnum};
+use isotherm_cli::Bar;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::diff::is_csv;
@@ -13,7 +14,7 @@ use isotherm_log::file::read_small_text;
 use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Document;
 
-use super::bar::Bar;
+use super::bar;
 use super::page::PageArgs;
 use super::print;
 use super::runs::{LogArgs, Reading};
@@ -24,7 +25,6 @@ use crate::error::Error;
 use crate::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::impact::over_starts;
 use crate::impact::scenario::Voyage;
-use crate::runs::Watch;
 use crate::runs::cut::Cut;
 
 /// Most hours of either part.
@@ -39,16 +39,14 @@ const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
     isotherm-calibrate impact --calibration unit-drift.toml --seeds 100\n  \
     isotherm-calibrate impact corrected.mcap --calibration-hours 21\n  \
     isotherm-calibrate impact --calibration unit-drift.toml --start-log monday.mcap --start-log tuesday.mcap --start-log friday.mcap\n\n\
-    The system is calibrated, then goes on alone; its level platform turns about the vertical at four times the Earth's rate. \
-    Each drift is sailed four times: held at its last value, and with the service's own drift estimator with a Markov part (002's \
-    model 1), with Markov part and trend, with the trend alone (002's new model).")]
+    The system is calibrated, then navigates alone; its level platform turns about the vertical at four times the Earth's rate. Each drift is run four times: held at its last value, and with the service's own drift estimator with a Markov part (002's model 1), with Markov part and trend, with the trend alone (002's new model).")]
 pub(super) struct ImpactArgs {
-    /// A log at rest: corrected ticks (CSV, .mcap), or raw ones with --calibration
+    /// Log at rest: corrected ticks (CSV, .mcap), or raw ones with --calibration
     #[arg(value_name = "LOG")]
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Calibration document (TOML) that says what the estimator is to expect; a raw log is corrected with it
+    /// Calibration document (TOML) with the drift; corrects a raw log
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     /// Straight trend from the calibration's beginning (°/h²)
@@ -63,13 +61,13 @@ pub(super) struct ImpactArgs {
     /// Constant that appears at departure, as after a shock (°/h)
     #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
     constant: Option<f64>,
-    /// Gyro that has the trend or the constant; without it each by itself, with --seeds all at once
+    /// Gyro with the trend or the constant (default: each alone, with --seeds all at once)
     #[arg(long, value_enum)]
     gyro: Option<Gyro>,
-    /// Sail many times with drifts from as many seeds, of the size that the document states; --trend comes on top
+    /// Number of random drifts of the size in the document; --trend is added
     #[arg(long, value_name = "NUMBER", conflicts_with = "log", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: Option<u32>,
-    /// Log at rest of one start, read as LOG is; with two or more, their means give the sigma of the constant over starts; repeatable
+    /// Log at rest of one start; the means of two or more give the sigma of the constant; repeatable
     #[arg(long, value_name = "LOG")]
     start_log: Vec<PathBuf>,
     /// The first seed
@@ -78,19 +76,19 @@ pub(super) struct ImpactArgs {
     /// Latitude (°)
     #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true)]
     latitude: f64,
-    /// Hours on its own
+    /// Length of the voyage without position (h)
     #[arg(long, value_name = "HOURS", default_value_t = 48.0)]
     hours: f64,
-    /// Hours of calibration before
+    /// Length of the calibration before it (h)
     #[arg(long, value_name = "HOURS", default_value_t = 21.0)]
     calibration_hours: f64,
-    /// Rate of the platform about the vertical, over the Earth's
+    /// Rate of the platform about the vertical (multiples of the Earth's)
     #[arg(long, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
     turn_ratio: f64,
-    /// Standard error of the rate that the calibration knows, per minute (°/h)
+    /// Standard error of the reference rate per minute (°/h)
     #[arg(long, value_name = "DEG_PER_H", default_value_t = 0.001)]
     reference_sigma: f64,
-    /// The velocity log does not keep the level gyros observable
+    /// No velocity log: level gyros are not observed during the voyage
     #[arg(long)]
     no_log_aid: bool,
     #[command(flatten)]
@@ -133,8 +131,7 @@ impl ImpactArgs {
         } else if self.trend.is_some() || self.constant.is_some() {
             self.sail_stated(&voyage, &parts)?
         } else {
-            let words =
-                "say which drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
+            let words = "give a drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
         report.notes.extend(starts);
@@ -165,11 +162,12 @@ impl ImpactArgs {
             }
         }
         if self.gyro.is_some() && self.trend.is_none() && self.constant.is_none() {
-            let words = "--gyro says which gyro has the trend or the constant: give --trend or --constant, or leave it out";
+            let words = "--gyro needs --trend or --constant: it names the gyro that has them";
             return Err(Error::Usage(words.to_owned()));
         }
         if self.gyro == Some(Gyro::Each) && self.seeds.is_some() {
-            let words = "--gyro each sails each gyro by itself, the drifts of --seeds are of all: give x, y, z or all";
+            let words =
+                "--gyro each runs each gyro alone, but --seeds makes drifts of all: give x, y, z or all";
             return Err(Error::Usage(words.to_owned()));
         }
         let inputs: Vec<&Path> =
@@ -232,7 +230,8 @@ impl ImpactArgs {
             format!("{} ({}…{})", short(found.sigma), short(low), short(high))
         };
         Ok(Some(format!(
-            "Sigma of the constant over {} starts, with its 95 % interval, gyros x, y, z: {} °/h. It stands in place of initial_sigma.",
+            "Sigma of the constant over {} starts, with its 95 % interval, gyros x, y, z: {} °/h. It replaces \
+             initial_sigma.",
             means.len(),
             found.iter().map(of).collect::<Vec<_>>().join(", ")
         )))
@@ -249,11 +248,11 @@ impl ImpactArgs {
             return columns;
         }
         let Some(document) = &self.document else {
-            return Err(Error::Usage("a raw log needs --calibration, to be corrected with".to_owned()));
+            return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));
         };
         let loaded = load_calibration(document)?;
         let run = args.run(Some(&loaded.unit))?;
-        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, [Bar::reading(), Bar::reading()]);
+        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, [bar::reading(), bar::reading()]);
         run.hand_on(cut);
         columns
     }

@@ -16,28 +16,27 @@ use crate::written::Written;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate merge nominal.toml thermal.toml positions.toml --out unit.toml\n  \
     isotherm-calibrate merge nominal.toml a.toml b.toml --take gyro.sensor.x=b.toml --out unit.toml\n\n\
-    Each part is compared with BASE, the document that the fits started from: what it states otherwise, it has made. What two \
-    parts have made differently is told by key, and nothing is written before --take decides.")]
+    Each part is compared with BASE, the document that the fits started from; its differences are taken. If two parts state a key differently, the key is reported, and nothing is written until --take decides.")]
 pub(super) struct MergeArgs {
     /// The document that the parts were made from
     #[arg(value_name = "BASE")]
     base: PathBuf,
-    /// Documents that each have a part of the calibration
+    /// Documents with a part of the calibration each
     #[arg(required = true, value_name = "PART")]
     part: Vec<PathBuf>,
     /// The new document
     #[arg(long, short, value_name = "NEW")]
     out: PathBuf,
-    /// Take a key, and all keys that begin with it, from this document; may be given several times, the last one decides
+    /// Take a key, and all keys that begin with it, from this document; repeatable, the last one decides
     #[arg(long, value_name = "KEY=DOC", value_parser = choice)]
     take: Vec<Take>,
-    /// Write over a file that is there
+    /// Replace an existing file
     #[arg(long)]
     overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD; default: today, UTC)
+    /// Date of the new document (YYYY-MM-DD; default: today, UTC)
     #[arg(long, value_name = "DATE")]
     created: Option<String>,
-    /// Print what was taken from where as one JSON object
+    /// Print the origin of each section as one JSON object
     #[arg(long)]
     json: bool,
 }

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_correction::earth::Place;
 use isotherm_correction::reversal::MAX_TRANSITION_TICKS;
 
-use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
@@ -22,44 +22,42 @@ use crate::modes::make::{Wanted, make};
     isotherm-calibrate modes chamber.mcap --calibration unit.toml --latitude 55.75 --heading 30 --out unit-modes.toml\n  \
     isotherm-calibrate modes up.mcap down.mcap --judge other.mcap --calibration unit.toml --latitude 55.75 --heading 30 \
     --html modes.html\n\n\
-    The runs are of units at rest, with mode reversal on, over the temperatures it is to work at. The document gives scale, axes, \
-    temperature channels and filter; its static, magnetic and slow-meander terms are replaced, with the transition ticks and the \
-    servo where the runs show them.")]
+    The runs are at rest, with mode reversal, over the temperatures of use. The document gives scale, axes, temperature channels and filter; its static, magnetic and slow-meander terms are replaced, and transition ticks and servo if the runs show them.")]
 pub(super) struct ModesArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Judge the constants on this log too, which they are not fitted to; may be repeated
+    /// Log to judge by, out of sample; repeatable
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
-    /// Calibration document (TOML) that the fit starts from; for several units the folder that has UNIT.toml of each
+    /// Calibration document (TOML) to start from; several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Order of the non-magnetic polynomial, 0 to 3; chosen by cross-validation without it
+    /// Order of the static polynomial, 0…3 (default: by cross-validation)
     #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
     static_order: Option<u8>,
-    /// Order of the magnetic polynomial, 0 to 3; chosen by cross-validation without it
+    /// Order of the magnetic polynomial, 0…3 (default: by cross-validation)
     #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
     magnetic_order: Option<u8>,
-    /// Order of the slow meander, 0 or 1; chosen by cross-validation without it
+    /// Order of the slow meander, 0 or 1 (default: by cross-validation)
     #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=1))]
     meander_order: Option<u8>,
-    /// Ticks that a switch loses, 1 to 32; found in the log without it
+    /// Ticks lost by a switch, 1…32 (default: found in the log)
     #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_TRANSITION_TICKS)))]
     transition_ticks: Option<u8>,
-    /// Leave out this much behind every switch (s); without it, as long as the servo's transient lasts
+    /// Time to leave out after every switch (s) (default: the servo's transient)
     #[arg(long, value_name = "SECONDS")]
     settle: Option<f64>,
-    /// Temperature that powers are taken about (°C); that of the document's biases without it, else 20
+    /// Reference temperature of the polynomials (°C) (default: the document's, else 20)
     #[arg(long, value_name = "DEG_C", allow_negative_numbers = true)]
     reference: Option<f64>,
     #[command(flatten)]
     output: OutputArgs,
 }
 
-const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not say what a count is worth: give --calibration with increment \
-    weights, input axes, temperature channels and filter";
+const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not state its increment weight: give \
+                           --calibration with increment weights, input axes, temperature channels and filter";
 
 impl ModesArgs {
     /// Does what the command says.

@@ -19,16 +19,16 @@ use crate::written::{Written, write_file};
 /// What a fit writes.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct OutputArgs {
-    /// Write the new document; of several units each to NEW-UNIT.toml
+    /// New document to write; several units: NEW-UNIT.toml each
     #[arg(long, short, value_name = "NEW")]
     out: Option<PathBuf>,
-    /// Replace documents and reports that are there already
+    /// Replace existing documents and reports
     #[arg(long)]
     overwrite: bool,
-    /// Date that the new document states (YYYY-MM-DD; default: today, UTC)
+    /// Date of the new document (YYYY-MM-DD; default: today, UTC)
     #[arg(long, value_name = "DATE", requires = "out")]
     created: Option<String>,
-    /// Write the report with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
+    /// HTML report to write, one file; several units: FILE-UNIT.html each, and a table in FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     /// Print everything as one JSON object
@@ -120,7 +120,7 @@ impl OutputArgs {
         report.warnings.extend(work.told());
         if let Some(out) = self.out.as_ref().filter(|_| !any_accepted) {
             let out = names.of(out);
-            report.warnings.push(format!("every sensor is refused: nothing is written to {}", out.display()));
+            report.warnings.push(format!("every sensor is refused: {} is not written", out.display()));
         }
         self.write(|| any_accepted.then(|| document(&report)).transpose(), || report.to_html(), names)?;
         Ok(report)

@@ -14,10 +14,10 @@ use crate::written::write_file;
 /// The page of a command that writes nothing else.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PageArgs {
-    /// Write everything with its diagrams as one HTML file; of several units each to FILE-UNIT.html, and the table to FILE
+    /// HTML report to write, one file; several units: FILE-UNIT.html each, and a table in FILE
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Replace a page that is there already
+    /// Replace an existing page
     #[arg(long, requires = "html")]
     overwrite: bool,
 }
@@ -68,14 +68,14 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
     };
     if !folder.exists() {
         return Err(Error::Usage(format!(
-            "{} cannot be written: make the folder first: mkdir -p {}",
+            "{} cannot be written: first create the folder with mkdir -p {}",
             out.display(),
             folder.display()
         )));
     }
     if !folder.is_dir() {
         return Err(Error::Usage(format!(
-            "{} cannot be written: {} is no folder",
+            "{} cannot be written: {} is not a folder",
             out.display(),
             folder.display()
         )));
@@ -86,10 +86,7 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
 /// Leaves a file alone that is there, unless it may be written over.
 pub(super) fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
     if out.exists() && !overwrite {
-        return Err(Error::Usage(format!(
-            "{} is there already: give another name, or --overwrite",
-            out.display()
-        )));
+        return Err(Error::Usage(format!("{} exists: give another name, or --overwrite", out.display())));
     }
     Ok(())
 }
@@ -107,6 +104,8 @@ fn probe(out: &Path, folder: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_cli::Exit;
+
     use super::*;
 
     #[test]
@@ -116,17 +115,17 @@ mod tests {
         std::fs::write(path("notes.txt"), "mine").unwrap();
         let refused = |name: &str, overwrite| {
             let tried = writable(&path(name), &[&path("log.mcap")], overwrite);
-            tried.err().map(|error| (error.exit_code(), error.to_string()))
+            tried.err().map(|error| (error.exit(), error.to_string()))
         };
         for (name, overwrite, wanted) in [
-            ("notes.txt", false, "is there already"),
-            ("no/such/x.toml", false, "make the folder first: mkdir -p "),
-            ("notes.txt/x.toml", false, "is no folder"),
+            ("notes.txt", false, "exists"),
+            ("no/such/x.toml", false, "first create the folder with mkdir -p "),
+            ("notes.txt/x.toml", false, "is not a folder"),
             (".", true, "is a folder: give the name of a file in it"),
-            ("log.mcap", true, "would be written over"),
+            ("log.mcap", true, "would be overwritten"),
         ] {
             let (code, words) = refused(name, overwrite).unwrap();
-            assert!(code == 2 && words.contains(wanted), "{name}: {words}");
+            assert!(code == Exit::Usage && words.contains(wanted), "{name}: {words}");
         }
         assert_eq!((refused("notes.txt", true), refused("new.toml", false)), (None, None));
         // Nothing has been touched.
@@ -138,6 +137,6 @@ mod tests {
     #[test]
     fn a_place_that_takes_no_file_is_told_before_anything_is_read() {
         let error = writable(Path::new("/proc/unit.toml"), &[], false).unwrap_err();
-        assert!(error.exit_code() == 1 && error.to_string().contains("/proc/unit.toml"), "{error}");
+        assert!(error.exit() == Exit::Failed && error.to_string().contains("/proc/unit.toml"), "{error}");
     }
 }

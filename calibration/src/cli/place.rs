@@ -15,13 +15,13 @@ pub(crate) struct PlaceArgs {
     /// Heading of the case's x axis from north (°)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires = "latitude")]
     heading: Option<f64>,
-    /// Pitch of the case's x axis above the horizon (°); without it the unit is levelled by its accelerometers
+    /// Pitch of the case's x axis above the horizon (°) (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires_all = ["latitude", "roll"])]
     pitch: Option<f64>,
-    /// Roll about the case's x axis (°)
+    /// Roll about the case's x axis (°) (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires_all = ["latitude", "pitch"])]
     roll: Option<f64>,
-    /// Do not remove the Earth rate: the attitude is not known
+    /// Remove the mean instead of the Earth's rate: the attitude is unknown
     #[arg(long, conflicts_with = "latitude")]
     remove_mean: bool,
 }
@@ -56,8 +56,8 @@ impl PlaceArgs {
             }
             let missing = if self.latitude.is_none() { "--latitude and --heading" } else { "--heading" };
             return Err(Error::Usage(format!(
-                "the Earth rate is to be removed: give {missing} (and --pitch and --roll where there are no accelerometers to level \
-                 with), or --remove-mean where the attitude is not known"
+                "to remove the Earth's rate, give {missing} (and --pitch and --roll without accelerometers); if the \
+                 attitude is unknown, --remove-mean"
             )));
         }
         self.known()

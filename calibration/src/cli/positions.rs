@@ -6,10 +6,10 @@ mod steps;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_protocol::document::AccelOutput;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
@@ -37,30 +37,26 @@ use steps::{first_document, judged, tracks};
     isotherm-calibrate positions --budget --positioning 5 --run-out 2\n  \
     isotherm-calibrate positions cold.mcap room.mcap hot.mcap --calibration unit.toml --latitude 55.75 --out unit-positions.toml --html positions.html\n  \
     isotherm-calibrate positions stand.mcap --plan my-plan.toml --gravity 9.8154 --times held.csv\n\n\
-    Still poses are found in the logs and known by the gyros' turns between them. Every set of positions works that shows each axis up \
-    and down; nine or more tell the stand's errors from the axes.")]
+    Still poses are found in the logs and identified by the gyros' turns between them. Any set of positions works that shows each axis up and down; nine or more separate the stand's errors from the axes.")]
 pub(super) struct PositionsArgs {
-    /// Recordings (.mcap), or the files of a text log in the order of its mapping: each temperature may be a log of its own
+    /// Recordings (.mcap), or the files of a text log in the mapping's order; one log per temperature is possible
     #[arg(value_name = "LOG", required_unless_present = "budget")]
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Print what a planned calibration will come to, and nothing else; the defaults are the example of 004
+    /// Print only the error budget of a planned calibration (default: the example of 004)
     #[arg(long, conflicts_with_all = ["log", "document", "out", "judge", "html", "times"])]
     budget: bool,
-    /// Positions in the order in which they are taken: "twelve" (those of 004; needs the turns in the log, or --times), "six", or
-    /// a file (TOML, CSV)
+    /// Positions in order: "twelve" (of 004; needs the turns in the log, or --times), "six", or a file (TOML, CSV)
     #[arg(long, value_name = "PLAN", default_value = "twelve")]
     plan: String,
-    /// Table of times (CSV: `start_s,end_s,position[,log]`): no poses are searched for. Needed with "twelve" where the logs
-    /// do not have the turns, unless one log has all positions in their order
+    /// Times of the positions (CSV: `start_s,end_s,position[,log]`), for logs without turns (default: found in the logs)
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    /// Calibration document (TOML) that is completed, without it the accelerometers must stand along the case axes; for several
-    /// units the folder that has UNIT.toml of each
+    /// Calibration document (TOML) to complete (default: accelerometers along the case axes); several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
-    /// Log that the fit must not see, to judge it by; may be repeated
+    /// Log to judge by, out of sample; repeatable
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
     #[command(flatten)]
@@ -71,31 +67,31 @@ pub(super) struct PositionsArgs {
     /// σ2: standard deviation of its axes' run-out (″)
     #[arg(long, value_name = "ARCSEC", default_value_t = 2.0)]
     run_out: f64,
-    /// How far the stand may be out of level (″, one sigma)
+    /// Level error of the stand (″, one sigma)
     #[arg(long, value_name = "ARCSEC", default_value_t = 60.0)]
     levelling: f64,
-    /// Window that stillness is looked for in (s)
+    /// Window of the search for still poses (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
     window: f64,
-    /// Variance over a window that is still, relative to that of the log's quietest fifth
+    /// Largest variance of a still window, relative to the log's quietest fifth
     #[arg(long, value_name = "FACTOR", default_value_t = 4.0)]
     threshold: f64,
-    /// Rate beyond which the unit turns (°/s)
+    /// Rate above which the unit turns (°/s)
     #[arg(long, value_name = "DEG_PER_S", default_value_t = 0.2)]
     still_rate: f64,
-    /// Taken off the beginning of each pose (s)
+    /// Time to leave out at the beginning of each pose (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 2.0)]
     settle: f64,
     /// Shortest pose (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     least: f64,
-    /// Temperature channels whose mean the axes follow; those of the document, or of the accelerometers, without it
+    /// Temperature channels that the axes follow by their mean (default: the document's, else the accelerometers')
     #[arg(long, value_name = "CHANNEL")]
     channel: Vec<String>,
-    /// Temperature that all polynomials are about (°C)
+    /// Reference temperature of the polynomials (°C)
     #[arg(long, value_name = "DEG_C", allow_hyphen_values = true)]
     reference: Option<f64>,
-    /// What a mean of an accelerometer is measured in, where there is no document: "V", or "m/s2"
+    /// Unit of the accelerometers' means without a document: "V" or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
     accelerometer_unit: String,
     #[command(flatten)]

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_correction::earth::Place;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{Document, GyroOutput};
 
-use super::bar::Bar;
 use super::batch::{Batch, Named, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
@@ -24,14 +24,11 @@ use crate::runs::Run;
     isotherm-calibrate rates x.mcap y.mcap z.mcap --axis x --axis y --axis z --rates 10,-10,50,-50,100,-100 \
     --calibration unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 --out unit-rates.toml\n  \
     isotherm-calibrate rates table.mcap --steps table.csv --calibration unit.toml --remove-mean\n\n\
-    Plateaus of steady rate are found in the log, in the order of --rates; rests between them are found too. --steps names a CSV \
-    with the columns log, axis, rate_deg_per_s, begin_s, end_s (the first and the last two may be left out), or TOML with a \
-    [[step]] of the same keys for each; judging logs are numbered on behind the others, and of several units each counts its own \
-    logs. Latitude and attitude are those of the beginning of each log.")]
+    Plateaus of steady rate and the rests between them are found in the log, in the order of --rates. --steps is a CSV with the columns log, axis, rate_deg_per_s, begin_s, end_s (log and times optional), or TOML with [[step]] tables of these keys; judging logs are numbered after the others, for each unit separately. Latitude and attitude are those of the beginning of each log.")]
 pub(super) struct RatesArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Judge what was found on this log too, which the fit does not see; may be repeated
+    /// Log to judge by, out of sample; repeatable
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
     /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log, then for each judging log
@@ -40,7 +37,7 @@ pub(super) struct RatesArgs {
     /// Rates of the table in their order (°/s), with commas
     #[arg(long, value_name = "RATES", value_delimiter = ',', allow_hyphen_values = true, requires = "axis")]
     rates: Vec<f64>,
-    /// Rates of the table in the judging logs (°/s), with commas; those of --rates without it
+    /// Rates of the table in the judging logs (°/s), with commas (default: --rates)
     #[arg(
         long,
         value_name = "RATES",
@@ -52,8 +49,7 @@ pub(super) struct RatesArgs {
     /// Table of the steps (CSV or TOML)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates", "judge_rates"])]
     steps: Option<PathBuf>,
-    /// Calibration document (TOML) that the fit starts from, nominal scale and axes without it; for several units the folder that
-    /// has UNIT.toml of each
+    /// Calibration document (TOML) to start from (default: nominal scale and axes); several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
@@ -61,7 +57,7 @@ pub(super) struct RatesArgs {
     /// Standard deviation of the table's rates (ppm)
     #[arg(long, value_name = "PPM", default_value_t = 0.0)]
     table_ppm: f64,
-    /// Add what is left of the bias to the document's static bias
+    /// Add the remaining bias to the document's static bias
     #[arg(long)]
     with_bias: bool,
     #[command(flatten)]
@@ -125,7 +121,7 @@ impl RatesArgs {
         match &self.steps {
             Some(path) => read(path, runs + judges),
             None if self.rates.is_empty() => Err(Error::Usage(
-                "what did the table do? Give --axis and --rates, or --steps FILE".to_owned(),
+                "the steps of the table are missing: give --axis and --rates, or --steps FILE".to_owned(),
             )),
             None => {
                 let judging = if self.judge_rates.is_empty() { &self.rates } else { &self.judge_rates };

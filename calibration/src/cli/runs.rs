@@ -11,7 +11,7 @@ use isotherm_log::part::{LogFiles, Part, are_recordings};
 use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
-use super::bar::Bar;
+use super::bar;
 use crate::error::Error;
 use crate::provenance::recordings_in;
 use crate::runs::{Run, units_of};
@@ -22,7 +22,7 @@ const BATCH_TICKS: usize = 512;
 /// Logs, of one unit or of several.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogArgs {
-    /// Recordings (.mcap), the files of a text log in the order of its mapping, or a folder that has them
+    /// Recordings (.mcap), the files of a text log in the mapping's order, or their folder
     #[arg(required = true, value_name = "LOG")]
     pub(crate) log: Vec<PathBuf>,
     #[command(flatten)]
@@ -32,16 +32,16 @@ pub(crate) struct LogArgs {
 /// How logs are read.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Reading {
-    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); ready ones are in config/mappings
+    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
-    /// The unit, where a recording has several; of a text log its serial (default: that of the document)
+    /// Unit serial, if a recording has several; text log: the serial to assign (default: the document's)
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Option<String>,
-    /// Leave out this much of each log's beginning (s); recordings are cut between messages
+    /// Start this long after each log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
-    /// Take this much of each log (s) (default: all)
+    /// Length to take of each log (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Span>,
     /// Stop this long after each log's beginning (s)
@@ -110,7 +110,7 @@ impl Reading {
         if !are_recordings(files)? {
             let unit = given.as_ref().or(fallback).cloned().ok_or_else(|| {
                 Error::Usage(format!(
-                    "{name} is a text log, which does not say of which unit it is: give --unit SERIAL, or --calibration, which has it"
+                    "{name} is a text log, which does not state its unit: give --unit SERIAL, or --calibration"
                 ))
             })?;
             let mapping = Box::new(self.text_mapping(files)?);
@@ -136,7 +136,7 @@ impl Reading {
             None => {
                 for file in files {
                     let mut log = Log::recordings(std::slice::from_ref(file))?;
-                    let (units, cut) = units_of(&mut log, Bar::reading())?;
+                    let (units, cut) = units_of(&mut log, bar::reading())?;
                     if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
                         return Err(Error::Refused(vec![format!("no raw readings can be read: {cut}")]));
                     }
@@ -165,7 +165,7 @@ impl Reading {
                 std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
             if about.is_file() && about.len() == 0 {
                 return Err(Error::Refused(vec![format!(
-                    "{} is empty, it has 0 bytes: was it recorded, and copied to its end?",
+                    "{} is empty: was it recorded and copied completely?",
                     path.display()
                 )]));
             }
@@ -173,12 +173,12 @@ impl Reading {
         let folder = logs.iter().find(|path| path.is_dir());
         Err(Error::Usage(match folder {
             Some(folder) => format!(
-                "the folder {} has no recording (.mcap) in it; a folder with the files of a text log needs --mapping FILE that names \
-                 them: ready ones are in config/mappings",
+                "the folder {} has no recording (.mcap) in it; a folder with the files of a text log needs --mapping \
+                 FILE that names them: examples are in config/mappings",
                 folder.display()
             ),
             None => format!(
-                "{} is no recording, and a text log needs --mapping FILE: ready ones are in config/mappings",
+                "{} is not a recording, and a text log needs --mapping FILE: examples are in config/mappings",
                 names(logs)
             ),
         }))

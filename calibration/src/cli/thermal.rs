@@ -31,49 +31,49 @@ pub(super) use stands::StandArgs;
 pub(super) struct ThermalArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// How the coefficients are found
+    /// Method of the fit
     #[arg(long, value_enum, default_value_t = MethodArg::Joint)]
     method: MethodArg,
-    /// Who chooses the terms: cross-validation, or nobody (the largest model of the method)
+    /// Choice of terms: cross-validation, or the largest model
     #[arg(long, value_enum, default_value_t = TermsArg::Auto)]
     terms: TermsArg,
-    /// Run to judge the document on, which it is not fitted to; may be repeated
+    /// Log to judge by, out of sample; repeatable
     #[arg(long, value_name = "LOG")]
     judge: Vec<PathBuf>,
-    /// Leave out this much of each judging log's beginning (s)
+    /// Start this long after each judging log's beginning (s)
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_start: Option<f64>,
-    /// Take this much of each judging log (s); without it, all
+    /// Length to take of each judging log (s) (default: all)
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_duration: Option<f64>,
-    /// Document that the fit starts from and completes; for several units the folder that has UNIT.toml of each
+    /// Calibration document (TOML) to start from and complete; several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
-    /// End with 0 although a sensor was refused
+    /// Exit code 0 although a sensor was refused
     #[arg(long)]
     accept_partial: bool,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
     stands: StandArgs,
-    /// Windows of the fit (s)
+    /// Length of the windows of the fit (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     fit_window: f64,
-    /// Windows over which residuals are stated (s); without it those of the fit, in runs of hours up to ten of them together
+    /// Windows of the stated residuals (s) (default: those of the fit, up to ten of them in runs of hours)
     #[arg(long, value_name = "SECONDS")]
     window: Option<f64>,
-    /// Smoothing of the temperature (s); searched without it
+    /// Smoothing of the temperature (s) (default: by cross-validation)
     #[arg(long, value_name = "SECONDS")]
     smoothing: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum MethodArg {
-    /// Plateaus first, then rate, then acceleration of the temperature (the paper's)
+    /// Plateaus, then rate, then acceleration of temperature (paper 000)
     Sequential,
-    /// Plateaus, then the rate alone (what the paper compares with)
+    /// Plateaus, then the rate alone
     Rate,
-    /// All terms at once, as much of each as holds on stretches that were left out
+    /// All terms at once, shrunk by cross-validation
     #[value(alias = "lag")]
     Joint,
 }
@@ -137,7 +137,7 @@ impl ThermalArgs {
             logs.iter().enumerate().find(|(at, log)| logs.iter().take(*at).any(|other| same(log, other)));
         if let Some((_, log)) = again {
             return Err(Error::Usage(format!(
-                "{} is given twice: a log counts once, and cross-validation would find it again",
+                "{} is given twice: cross-validation needs each log once",
                 log.display()
             )));
         }
@@ -150,8 +150,8 @@ impl ThermalArgs {
         match self.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
             None => Ok(()),
             Some(judge) => Err(Error::Usage(format!(
-                "--judge {}: the document is fitted to the same part of it, which cannot judge it: give another log, or other parts of this \
-                 one (--duration here, --judge-start there)",
+                "--judge {}: the document is fitted to the same part of it: give another log, or another part \
+                 (--duration, --judge-start)",
                 judge.display()
             ))),
         }

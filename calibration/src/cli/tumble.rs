@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
 use super::above_0;
-use super::bar::Bar;
 use super::batch::{Batch, Named, Names, Work};
 use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
@@ -27,33 +27,31 @@ use crate::written::Written;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate tumble gyro.txt.gz acc.txt.gz --mapping config/mappings/tumble-mems.toml --unit TUMBLE-0001 --gravity 9.81744 --out tumble.toml --html tumble.html\n  \
     isotherm-calibrate tumble tumbled.mcap --calibration unit.toml --latitude 55.75 --out unit-tumbled.toml\n\n\
-    Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The case axes \
-    are defined by the accelerometers: z is that of the third, y lies in the plane of the second and third.")]
+    Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The accelerometers define the case axes: z is the third's, y lies in the plane of the second and third.")]
 pub(super) struct TumbleArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Calibration document (TOML) that is completed; without it everything else stands as the log has it; for several units the
-    /// folder that has UNIT.toml of each
+    /// Calibration document (TOML) to complete (default: everything else as in the log); several units: a folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     document: Option<PathBuf>,
     #[command(flatten)]
     gravity: GravityArgs,
-    /// Time at the beginning that the unit was left alone (s)
+    /// Still time at the beginning (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
     still_start: f64,
-    /// Window that stillness is looked for in (s)
+    /// Window of the search for still poses (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
     window: f64,
-    /// Variance over a window that is still, relative to that of the still start; the best of 2 to 10 without it
+    /// Largest variance of a still window, relative to the still start (default: the best of 2 to 10)
     #[arg(long, value_name = "FACTOR")]
     threshold: Option<f64>,
-    /// Rate beyond which the unit turns (°/s)
+    /// Rate above which the unit turns (°/s)
     #[arg(long, value_name = "DEG_PER_S", default_value_t = 1.0)]
     still_rate: f64,
-    /// Shortest pose (s), after half a window was taken off either end
+    /// Shortest pose (s), less half a window at either end
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
     least: f64,
-    /// What a mean of an accelerometer is measured in, where there is no document: "V" (converter readings too), or "m/s2"
+    /// Unit of the accelerometers' means without a document: "V" (converter readings too) or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
     accelerometer_unit: String,
     #[command(flatten)]
@@ -163,8 +161,8 @@ impl TumbleArgs {
         let mut document = bare(&series, output)?;
         if output == AccelOutput::Volts {
             document.note = Some(
-                "What this document calls V is the accelerometers' reading as the log has it: volts, or counts of a converter with \
-                 its zero at mid-scale, which the bias then holds."
+                "V in this document is the accelerometers' reading in the log: volts, or counts of a converter with \
+                 its zero at mid-scale, which is then part of the bias."
                     .to_owned(),
             );
         }

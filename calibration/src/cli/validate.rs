@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Bar;
 use isotherm_protocol::key::UnitId;
 
-use super::bar::Bar;
+use super::bar;
 use super::batch::{Outcome, close};
 use super::page::PageArgs;
 use super::place::PlaceArgs;
@@ -24,19 +25,17 @@ use crate::written::Written;
     isotherm-calibrate validate FOG-0001.toml judging.mcap --html judgement.html\n  \
     isotherm-calibrate validate chamber-mems.toml chamber.tsv --mapping config/mappings/chamber-mems.toml\n  \
     isotherm-calibrate validate config/calibration fleet-1.mcap fleet-2.mcap --json\n\n\
-    The unit is at rest in the logs. Before is nominal: the document without what knows of temperature, bias or mode. \
-    Exit code 1 where the document makes an axis worse than nominal. With a folder of documents every unit of the logs is judged \
-    by the document of its serial, several at a time; each has an HTML file of its own, FILE-SERIAL.html.")]
+    The unit is at rest in the logs. Before is nominal: the document without its temperature, bias and mode terms. Exit code 1 if the document makes an axis worse than nominal. With a folder of documents every unit of the logs is judged by its own document, with its own HTML file, FILE-SERIAL.html.")]
 pub(super) struct ValidateArgs {
     /// The document, or a folder with the documents of several units
     #[arg(value_name = "DOC")]
     document: PathBuf,
-    /// Recordings (.mcap), or text logs with --mapping; every one is a run for itself
+    /// Recordings (.mcap), or text logs with --mapping; each is a run
     #[arg(required = true, value_name = "LOG")]
     log: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// Length of the windows that are averaged over; without it 10 s, in logs of an hour and more up to 100 s, as thermal has them
+    /// Averaging windows (s) (default: 10, up to 100 in logs of an hour and more)
     #[arg(long, value_name = "SECONDS")]
     window: Option<f64>,
     #[command(flatten)]
@@ -71,11 +70,11 @@ impl ValidateArgs {
             if folder { None } else { documents.values().next().map(|(_, d)| d.loaded.unit.clone()) };
         let work = self.work(documents, folder, fallback.as_ref())?;
         let reports = if let [only] = work.as_slice() {
-            vec![only.judged(wanted, Bar::reading())]
+            vec![only.judged(wanted, bar::reading())]
         } else {
             work.iter().try_for_each(|work| self.page.check_unit(work.unit.as_str()))?;
             let bar = Bar::counting("units judged", work.len());
-            let reports = in_parallel(&work, |ready| bar.at(ready), |work| work.judged(wanted, ()));
+            let reports = in_parallel(&work, |ready| bar.at(ready as u64), |work| work.judged(wanted, ()));
             bar.finish();
             reports
         };
@@ -117,7 +116,7 @@ impl ValidateArgs {
             let unit = written.document.unit.clone();
             if let Some((other, _)) = documents.get(&unit) {
                 return Err(Error::Refused(vec![format!(
-                    "{other} and {} are both for unit {unit}: name the one to judge",
+                    "{other} and {} are both for unit {unit}: choose the one to judge",
                     name(&path)
                 )]));
             }

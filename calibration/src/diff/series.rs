@@ -56,7 +56,7 @@ impl Series {
             sheet.notes.push(format!("warning: the documents are for units {}", units.join(", ")));
         }
         sheet.notes.push(format!(
-            "Each column is the later document less the earlier one, at {} °C; the last is the whole.",
+            "Each column is the later document less the earlier one, at {} °C; the last is the total.",
             short(self.whole.reference_deg_c)
         ));
         let columns: Vec<String> =
@@ -94,11 +94,7 @@ impl Series {
             row(&format!("{of}, {unit}"), self.columns().map(changed))
         });
         let head_of_values = head("");
-        sheet.table(
-            "Biases and scale factors: by how much they change",
-            &as_str(&head_of_values),
-            values.collect(),
-        );
+        sheet.table("Changes of biases and scale factors", &as_str(&head_of_values), values.collect());
         sheet
     }
 

@@ -24,7 +24,7 @@ impl Changes {
     pub fn headline(&self) -> String {
         let [before, after] = &self.names;
         if self.entries.is_empty() {
-            return format!("{before} and {after} state the same.");
+            return format!("{before} and {after} are the same.");
         }
         let largest = self.axes.iter().max_by(|a, b| a.turned_arcsec.total_cmp(&b.turned_arcsec));
         let axes = match largest {
@@ -32,7 +32,7 @@ impl Changes {
                 let beyond = self.turned();
                 let names: Vec<&str> = beyond.iter().map(|axis| axis.of.as_str()).collect();
                 let judged = if self.axes.iter().all(|axis| axis.significance.is_none()) {
-                    "no document states how sure that is".to_owned()
+                    "no document states its uncertainty".to_owned()
                 } else if names.is_empty() {
                     format!("no axis beyond {BEYOND} σ")
                 } else {
@@ -74,8 +74,8 @@ impl Changes {
         }
         if self.axes.iter().any(|axis| axis.significance.is_none() && axis.turned_arcsec > 0.0) {
             sheet.notes.push(
-                "Where a document does not state standard errors of its axes ([origin.details.sigma]), give that of your stand with \
-                 --axis-sigma."
+                "If a document does not state standard errors of its axes ([origin.details.sigma]), give that of \
+                 your stand with --axis-sigma."
                     .to_owned(),
             );
         }
@@ -132,11 +132,7 @@ impl Changes {
             cells
         };
         let head: Vec<&str> = head.iter().map(String::as_str).collect();
-        sheet.table(
-            "Biases and scale factors: by how much they change",
-            &head,
-            self.values.iter().map(row).collect(),
-        );
+        sheet.table("Changes of biases and scale factors", &head, self.values.iter().map(row).collect());
     }
 
     fn entries_table(&self, sheet: &mut Sheet) {
@@ -149,10 +145,10 @@ impl Changes {
         sheet.table("Entries that differ", &["key", "before", "after"], matter.collect());
         let rest: Vec<_> = self.entries.iter().filter(|entry| about(&entry.key)).collect();
         let shown = rest.iter().take(MOST_ABOUT).map(|entry| row(entry)).collect();
-        sheet.table("Where they come from", &["key", "before", "after"], shown);
+        sheet.table("Origins", &["key", "before", "after"], shown);
         if rest.len() > MOST_ABOUT {
             sheet.notes.push(format!(
-                "Of {} entries about where the documents come from, {MOST_ABOUT} are shown; --json has all.",
+                "Of {} entries about origins, {MOST_ABOUT} are shown; --json has all.",
                 rest.len()
             ));
         }
@@ -166,7 +162,7 @@ impl Changes {
         });
         let panels: Vec<_> = panels.collect();
         if !panels.is_empty() {
-            let caption = "By how much each bias and scale factor changes.".to_owned();
+            let caption = "Change of each bias and scale factor.".to_owned();
             let x = Axis::of("temperature", "°C");
             let chart = Chart { caption, x, panels, marks: Vec::new() };
             sheet.charts.push(("Over temperature".to_owned(), chart));

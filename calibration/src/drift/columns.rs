@@ -67,11 +67,11 @@ impl Columns {
     pub fn of_gyros(series: Series, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
         let Series { unit, gyros, .. } = series;
         let scale = match (gyros.output, increment_weight_arcsec) {
-            (None, _) => return Err(nothing("gyro ticks", "--accelerometers looks at the accelerometers")),
+            (None, _) => return Err(nothing("gyro ticks", "for the accelerometers use --accelerometers")),
             (Some(OutputKind::Counts), None) => {
                 return Err(Error::Refused(vec![
-                    "the gyro readings are counts: give the angle that one stands for with --increment-weight ARCSEC, or \
-                     a calibration document with --calibration"
+                    "the gyro readings are counts: give the angle per count with --increment-weight ARCSEC, or a \
+                     calibration document with --calibration"
                         .to_owned(),
                 ]));
             }
@@ -89,10 +89,7 @@ impl Columns {
         let Series { unit, accels, .. } = series;
         let scale = match accels.output {
             None => {
-                return Err(nothing(
-                    "accelerometer ticks",
-                    "leave --accelerometers out to look at the gyros",
-                ));
+                return Err(nothing("accelerometer ticks", "for the gyros remove --accelerometers"));
             }
             Some(OutputKind::Counts) => {
                 return Err(Error::Refused(vec![
@@ -104,8 +101,8 @@ impl Columns {
         };
         let mut columns = Self::build(unit, Kind::Force, accels, scale);
         columns.notes.push(
-            "The readings are the accelerometers' mean outputs as the log has them. Where they are volts, m/s² stands for V; \
-             --calibration makes specific force of them."
+            "The readings are the accelerometers' mean outputs in the log. If they are volts, read V for m/s²; \
+             --calibration converts them to specific force."
                 .to_owned(),
         );
         Ok(columns)
@@ -195,7 +192,8 @@ impl Columns {
         }
         columns.map_or_else(
             || {
-                let none = nothing("corrected ticks", "isotherm-replay correct makes them of a raw log");
+                let none =
+                    nothing("corrected ticks", "make them from a raw log with isotherm-replay correct");
                 Err(none.beside(cut.words().map(str::to_owned).as_slice()))
             },
             Self::finish,
@@ -235,7 +233,7 @@ impl Columns {
         if self.end_ns.is_empty() {
             return Err(nothing(
                 "ticks that could be corrected",
-                "is the document for this unit, and the mapping right?",
+                "check that the document is for this unit, and the mapping",
             ));
         }
         Ok(self)

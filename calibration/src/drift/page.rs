@@ -31,16 +31,16 @@ pub fn page(report: &Report) -> String {
     page.chart(&allan(report));
     tabulate(&mut page, report.noise_rows());
     page.paragraph(
-        "Coefficients are fitted to the overlapping variances with their covariance; intervals hold 95 %. A coefficient that the \
-         log does not show is given as the limit that it is below.",
+        "Coefficients are fitted to the overlapping variances with their covariance; intervals hold 95 %. A \
+         coefficient that the log does not show is given as an upper limit.",
     );
     report.noise_words().iter().for_each(|words| page.paragraph(words));
     page.heading("Drift");
     page.chart(&slow(report));
     tabulate(&mut page, report.drift_rows());
     page.paragraph(
-        "σ and correlation time are the most likely ones beside trend, white noise and daily lines. The plain autocorrelation falls \
-         too early, because mean and trend were fitted to the drift itself.",
+        "σ and correlation time are most likely together with trend, white noise and daily lines. The plain \
+         autocorrelation falls too early, because mean and trend were fitted to the drift itself.",
     );
     if let Some(chart) = autocorrelation(report) {
         page.chart(&chart);
@@ -49,8 +49,9 @@ pub fn page(report: &Report) -> String {
     if !rows.is_empty() {
         page.heading("How far a trend can be trusted");
         page.paragraph(
-            "A straight line is fitted to the beginning, as long as a system is calibrated, and extrapolated over the rest. In 002 it \
-             missed by up to 30 %: for this reason the estimator takes the trend's rate as a Markov process.",
+            "A straight line is fitted to the beginning, the length of a calibration, and extrapolated over the \
+             rest. In 002 it missed by up to 30 %: therefore the estimator treats the trend's rate as a Markov \
+             process.",
         );
         page.chart(&extrapolation(report));
         page.table(&Table { head, rows });
@@ -60,7 +61,7 @@ pub fn page(report: &Report) -> String {
     report.line_words().iter().for_each(|words| page.paragraph(words));
     tabulate(&mut page, report.allan_rows());
     if !report.parameters.is_empty() {
-        page.heading("What the estimator is to expect");
+        page.heading("Parameters of the estimator");
         let fields = [
             "sigma_deg_per_h",
             "correlation_time_h",

@@ -51,8 +51,8 @@ impl Parameters {
             // Of what is slower than the log only the random walk is seen, of size σ²/τ: that stays.
             Some((sigma, time)) if time.value > length_h => {
                 notes.push(format!(
-                    "the correlation time is longer than the log of {length_h:.1} h can tell ({:.0} h fit best): the log's length is \
-                     written, and the sigma that gives the same random walk",
+                    "the log of {length_h:.1} h is too short for the correlation time ({:.0} h fit best): the log's \
+                     length is written, with the sigma of the same random walk",
                     time.value
                 ));
                 (sigma.value * (length_h / time.value).sqrt(), length_h)
@@ -60,15 +60,15 @@ impl Parameters {
             Some((sigma, time)) => {
                 if time.value > length_h / 3.0 {
                     notes.push(format!(
-                        "the correlation time of {:.1} h rests on a log of {length_h:.1} h: three times as much is needed to \
-                         tell it from a trend",
+                        "the correlation time of {:.1} h is from a log of {length_h:.1} h: three times as much is \
+                         needed to separate it from a trend",
                         time.value
                     ));
                 }
                 (sigma.value, time.value)
             }
             None => {
-                notes.push("no slow drift stands out of the white noise: sigma is 0".to_owned());
+                notes.push("no slow drift exceeds the white noise: sigma is 0".to_owned());
                 (0.0, length_h)
             }
         };
@@ -76,8 +76,8 @@ impl Parameters {
         let (trend_sigma, trend_time_h) = match trend {
             Trend::Seen { slope, .. } if length_h < LEAST_TREND_H => {
                 notes.push(format!(
-                    "a trend of {} °/h² shows, but in {length_h:.1} h a slow drift looks the same too often: it is left out; \
-                     log for {LEAST_TREND_H} h",
+                    "a trend of {} °/h² is possible, but in {length_h:.1} h a slow drift often looks the same: it is \
+                     left out; log for {LEAST_TREND_H} h",
                     short(slope)
                 ));
                 (0.0, TREND_CORRELATION_TIME_H)
@@ -85,7 +85,7 @@ impl Parameters {
             Trend::Seen { slope, holds_h } => (slope.abs(), holds_h),
             Trend::NotSeen { error } => {
                 notes.push(format!(
-                    "no trend is seen; one of up to {} °/h² would not be",
+                    "no trend is found; one of up to {} °/h² would not be",
                     short(TREND_SIGMAS * error)
                 ));
                 (0.0, TREND_CORRELATION_TIME_H)
@@ -94,15 +94,16 @@ impl Parameters {
         let walk = walk(analysis, &mut notes) / 60.0;
         let initial = initial_sigma.unwrap_or_else(|| {
             notes.push(format!(
-                "one log at rest cannot tell the constant part from the Earth's rate: initial_sigma is {CONSTANT_SIGMAS} \
-                 standard deviations of the slow part; state what you know with --initial-sigma"
+                "one log at rest cannot separate the constant part from the Earth's rate: initial_sigma is \
+                 {CONSTANT_SIGMAS} standard deviations of the slow part; if you know it, state --initial-sigma"
             ));
             CONSTANT_SIGMAS * analysis.slow_deviation
         });
         // A time below the range is only told: what is so quick is noise for an estimator that sees minutes.
         if sigma > 0.0 && time_h < TIME_RANGE_H[0] {
             notes.push(format!(
-                "the correlation time of {} h is below the {} h that a document allows, which stands in its place: log for longer",
+                "the correlation time of {} h is below the least of {} h in a document, which replaces it: log for \
+                 longer",
                 short(time_h),
                 TIME_RANGE_H[0]
             ));
@@ -127,7 +128,8 @@ impl Parameters {
         let [shortest, longest] = TIME_RANGE_H;
         if trend_sigma > 0.0 && !(shortest..=longest).contains(&trend_time_h) {
             notes.push(format!(
-                "the trend holds for {} h, a document allows {shortest} to {longest} h: the nearer end stands in its place",
+                "the trend's correlation time is {} h, a document allows {shortest} to {longest} h: the nearer limit \
+                 replaces it",
                 short(trend_time_h)
             ));
         }
@@ -157,7 +159,7 @@ fn walk(analysis: &Analysis, notes: &mut Vec<String>) -> f64 {
     if let Some(noise) = analysis.stated_noise() {
         let walk = noise.of_term(Term::AngleRandomWalk);
         if let Coefficient::NotObservable { .. } = walk {
-            notes.push("angle random walk is not observable: its upper limit stands in its place".to_owned());
+            notes.push("angle random walk is not observable: its upper limit replaces it".to_owned());
         }
         return walk.value_or_limit();
     }
@@ -167,7 +169,8 @@ fn walk(analysis: &Analysis, notes: &mut Vec<String>) -> f64 {
     let nearest = overlapping.min_by(|a, b| far(a.0).total_cmp(&far(b.0)));
     let (tau_s, deviation) = nearest.unwrap_or((1.0, analysis.deviation));
     notes.push(format!(
-        "the five noise terms do not describe the log: the angle random walk is that of means over {} s, as long as a reference",
+        "the five noise terms do not describe the log: the angle random walk is from means over {} s, the length of \
+         a reference",
         short(tau_s)
     ));
     deviation * tau_s.sqrt()
@@ -239,8 +242,8 @@ pub fn put(
         let along = ["x", "y", "z"].into_iter().zip(row).find(|(_, cosine)| cosine.abs() >= SMALLEST_COSINE);
         let Some((axis, _)) = along else {
             reasons.push(format!(
-                "gyro {} of the document lies along no case axis ({row:?}), so its own drift cannot be told from corrected \
-                 rates: analyse the raw readings (without --calibration) and put the printed table in by hand",
+                "gyro {} of the document lies along no case axis ({row:?}), so corrected rates do not show its own \
+                 drift: analyse the raw readings (without --calibration) and insert the printed table by hand",
                 sensor.name
             ));
             continue;

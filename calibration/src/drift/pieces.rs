@@ -88,8 +88,8 @@ impl Grid {
         let places = count + missing;
         if uneven * 100 > count {
             notes.push(format!(
-                "{:.1} % of the ticks are more than 5 % longer or shorter than the middle one of {:.6} s; they are taken as \
-                 equal.",
+                "{:.1} % of the ticks are more than 5 % longer or shorter than the median of {:.6} s; they are \
+                 treated as equal.",
                 uneven as f64 * 100.0 / count as f64,
                 middle_ns as f64 * 1e-9
             ));
@@ -104,7 +104,7 @@ impl Grid {
                 Ok(bad) => {
                     if bad > 0 {
                         grid.notes.push(format!(
-                            "{called}: {} no good numbers and count as missing.",
+                            "{called}: {} not valid numbers and count as missing.",
                             counted(bad, "reading is", "readings are")
                         ));
                     }
@@ -143,8 +143,8 @@ impl Spacing {
         let intervals: Vec<i64> = end_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
         if let Some(at) = intervals.iter().position(|interval| *interval <= 0) {
             return refused(format!(
-                "time does not go on at tick {} of {count} ({} ns, then {} ns): are these logs of two runs, or given in the \
-                 wrong order? Give one run",
+                "time does not increase at tick {} of {count} ({} ns, then {} ns): are these logs of two runs, or in \
+                 the wrong order? Give one run",
                 at + 2,
                 end_ns.get(at).copied().unwrap_or_default(),
                 end_ns.get(at + 1).copied().unwrap_or_default(),
@@ -202,7 +202,8 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
     if let Some(longest) = long.iter().map(|gap| gap.missing).max() {
         let missing: usize = long.iter().map(|gap| gap.missing).sum();
         notes.push(format!(
-            "{} ({}, the longest of {} s) {} the log into {} pieces: no Allan difference and no spectrum reaches over a gap.",
+            "{} ({}, the longest of {} s) {} the log into {} pieces: Allan differences and spectra do not extend \
+             over a gap.",
             counted(long.len(), "gap", "gaps"),
             counted(missing, "tick", "ticks"),
             short(longest as f64 * tick_s),
@@ -220,8 +221,8 @@ pub(crate) fn check(called: &str, column: &[f64]) -> Result<usize, String> {
     let share = bad as f64 / column.len().max(1) as f64;
     if share > LARGEST_BAD_SHARE {
         return Err(format!(
-            "{called}: {bad} of {} readings ({:.1} %) are no good numbers, at most 1 % may be: look for a broken column or a \
-             sensor beyond its limit",
+            "{called}: {bad} of {} readings ({:.1} %) are not valid numbers, at most 1 % may be: look for a broken \
+             column or a sensor beyond its limit",
             column.len(),
             share * 100.0
         ));
@@ -315,12 +316,12 @@ mod tests {
         let grid = Grid::of(columns(times.clone(), vec![wave(1000), vec![7.0; 1000], some_bad])).unwrap();
         assert_eq!((grid.sensors.len(), grid.sensors[1].pieces.len()), (2, 1), "one bad reading is bridged");
         assert!(grid.refused[0].contains("gyro 1: every reading is 7"), "{:?}", grid.refused);
-        assert!(grid.notes.iter().any(|note| note.contains("1 reading is no good numbers")));
+        assert!(grid.notes.iter().any(|note| note.contains("1 reading is not valid numbers")));
         let mut back = times.clone();
         back[10] = 0;
         for (times, values, words) in [
             (times[..63].to_vec(), vec![wave(63)], "at least 64"),
-            (back, vec![wave(1000)], "time does not go on at tick 11"),
+            (back, vec![wave(1000)], "time does not increase at tick 11"),
             (times.clone(), vec![vec![f64::NAN; 1000]], "100.0 %"),
             (times, vec![vec![0.0; 1000]; 3], "the sensor is dead"),
         ] {

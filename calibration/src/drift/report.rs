@@ -54,7 +54,7 @@ impl Report {
             let walk = analysis.stated_noise().map(|noise| noise.of_term(Term::AngleRandomWalk));
             let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
             let mut words = match walk {
-                None if analysis.noise.is_some() => "more in it than the five noise terms".to_owned(),
+                None if analysis.noise.is_some() => "more than the five noise terms".to_owned(),
                 Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
                 Some(Coefficient::NotObservable { below }) => {
                     format!("N below {} {unit}", short(below * factor))
@@ -65,7 +65,7 @@ impl Report {
                 Some((_, time)) if time.value > self.length_h => {
                     let _ = write!(
                         words,
-                        ", a drift slower than this log of {} h can tell",
+                        ", a drift slower than this log of {} h can show",
                         short(self.length_h)
                     );
                 }
@@ -77,7 +77,7 @@ impl Report {
                         short(time.value)
                     );
                 }
-                None => words.push_str(", no slow drift beside the noise"),
+                None => words.push_str(", no slow drift above the noise"),
             }
             match trend(analysis) {
                 Trend::Seen { slope, .. } => {
@@ -214,13 +214,14 @@ impl Report {
             let of = format!("{} {}", self.kind.sensor(), sensor.name);
             Some(if noise.describes() {
                 format!(
-                    "{of}: the five terms describe the Allan deviations no better than to {error} each: that is the model error of the \
-                     coefficients."
+                    "{of}: the five terms describe the Allan deviations to {error} each at best: this is the model \
+                     error of the coefficients."
                 )
             } else {
                 format!(
-                    "{of}: the five terms do not describe this log, not even with a model error of {error} (χ² per degree of freedom {}): \
-                     vibration, motion or a change of temperature is in it. Read the diagram; coefficients are not stated.",
+                    "{of}: the five terms do not describe this log, not even with a model error of {error} (χ² per \
+                     degree of freedom {}): it contains vibration, motion or a change of temperature. See the \
+                     diagram; coefficients are not stated.",
                     short(noise.chi_square_per_degree)
                 )
             })
@@ -247,8 +248,8 @@ impl Report {
             }
             for line in &sensor.lines {
                 words.push(format!(
-                    "{kind} {}: a line at {} Hz ({} s) of {} {measure}, {} times its neighbourhood: look for what turns or \
-                     switches at that rate.",
+                    "{kind} {}: a line at {} Hz ({} s) of {} {measure}, {} times its neighbourhood: find what turns \
+                     or switches at that rate.",
                     sensor.name,
                     short(line.frequency_hz),
                     short(1.0 / line.frequency_hz),
@@ -259,7 +260,7 @@ impl Report {
         }
         if self.length_h < 48.0 {
             words.push(format!(
-                "A line at 24 h cannot be seen in {:.1} h, it takes two days{}.",
+                "A line at 24 h needs two days, the log has {:.1} h{}.",
                 self.length_h,
                 if self.length_h < 16.0 { "; one at 8 h takes 16 h" } else { "" }
             ));

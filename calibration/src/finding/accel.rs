@@ -74,7 +74,7 @@ impl Display for AccelKind {
                 "the document has no board_channel for it: name the temperature channel of its electronics there (--calibration)",
             ),
             Self::NoReadings { channel } => {
-                write!(f, "a run has no readings of temperature channel {channel:?}: look at the mapping")
+                write!(f, "a run has no readings of temperature channel {channel:?}: check the mapping")
             }
             Self::BoardStays { channel, range: [low, high], needed } => write!(
                 f,
@@ -97,28 +97,30 @@ impl Display for AccelKind {
             ),
             Self::BoardFollows { channels: [board, sensor], own: [own, needed] } => write!(
                 f,
-                "the board's channel {board:?} goes with the accelerometer's {sensor:?}: it has {} °C rms of its own, {needed} are needed to \
-                 tell the board's ratio from the scale factor. Keep the accelerometers on their thermostat, or warm the board by itself",
+                "the board's channel {board:?} goes with the accelerometer's {sensor:?}: it has {} °C rms of its \
+                 own, {needed} are needed to separate the board's ratio from the scale factor. Keep the \
+                 accelerometers on their thermostat, or warm the board alone",
                 short(*own)
             ),
             Self::FewWindows { windows } => {
-                write!(f, "{windows} windows are whole, 20 are needed: look for gaps and flags")
+                write!(f, "{windows} windows are complete, 20 are needed: look for gaps and flags")
             }
             Self::BiasFollowsBoard { slope: [slope, sigma] } => write!(
                 f,
-                "{} ± {} m/s² per °C of the board do not go with the input, which a document has no place for: they are left in",
+                "{} ± {} m/s² per °C of the board do not depend on the input; a document has no key for this, and it \
+                 is not corrected",
                 short(*slope),
                 short(*sigma)
             ),
             Self::MadeWorse { axis } => write!(
                 f,
-                "the output along {} would become worse: did the unit stand as --pitch and --roll say?",
+                "the output along {} would become worse: check --pitch and --roll",
                 AXES.get(*axis).copied().unwrap_or_default()
             ),
             Self::AxisMoved { deg_c, logs: [before, after], turn: [turn, sigma] } => write!(
                 f,
-                "its axis turned by {turn:.1} ± {sigma:.1}″ at {} °C between {before} and {after}: no polynomial over temperature holds \
-                 such a hysteresis. Count it in the budget with --hysteresis {turn:.0}",
+                "its axis turned by {turn:.1} ± {sigma:.1}″ at {} °C between {before} and {after}: a polynomial over \
+                 temperature cannot express this hysteresis. Include it in the budget with --hysteresis {turn:.0}",
                 fixed(*deg_c, 1)
             ),
         }

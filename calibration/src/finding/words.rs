@@ -41,23 +41,24 @@ impl Display for Kind {
                 fixed(*deg_c, 1)
             ),
             Self::NoStepStated { log } => {
-                write!(f, "no step is stated of {log}: name it in --steps, or leave it out")
+                write!(f, "{log} has no step: add one to --steps, or leave the log out")
             }
             Self::Dead { log } => write!(
                 f,
-                "it reads the same all the time in {log}: it is dead, or its column is the wrong one; look at the mapping, or leave the \
-                 log out"
+                "its reading is constant in {log}: it is dead, or its column is wrong; check the mapping, or leave \
+                 the log out"
             ),
             Self::NoTicks { window_s: [from, to] } => write!(f, "there are no ticks from {from} s to {to} s"),
             Self::StepsOverlap { windows_s: [[from, to], [other, end]] } => write!(
                 f,
-                "two steps overlap, {from}…{to} s and {other}…{end} s: a stretch of the log may count once only. Mend begin_s and end_s in --steps"
+                "two steps overlap, {from}…{to} s and {other}…{end} s: each part of the log may count only once. \
+                 Correct begin_s and end_s in --steps"
             ),
             Self::SomeTimes => f.write_str("either all steps of a log state begin_s and end_s, or none"),
             Self::OtherPlateaus { stated, turning, found } => write!(
                 f,
-                "{} of the table {} stated, {} like the slowest of them or faster; found were {}. State all steps in their order, or \
-                 their begin_s and end_s with --steps",
+                "{} of the table {} stated, {} like the slowest of them or faster; found: {}. State all steps in \
+                 their order, or their begin_s and end_s with --steps",
                 counted(*stated, "step", "steps"),
                 if *stated == 1 { "is" } else { "are" },
                 counted(*turning, "plateau turns", "plateaus turn"),
@@ -65,16 +66,16 @@ impl Display for Kind {
             ),
             Self::OutOfProportion { window_s: [from, to], shown, stated, allowed, found } => write!(
                 f,
-                "the plateau of {from:.1}…{to:.1} s turns at {} °/s by the scale of the fastest one, its step is stated as {stated} °/s; \
-                 {} °/s of difference are allowed. Is the order of the rates right? Found were {}",
+                "the plateau of {from:.1}…{to:.1} s turns at {} °/s by the scale of the fastest one, its step is \
+                 stated as {stated} °/s; {} °/s of difference are allowed. Check the order of the rates. Found: {}",
                 short(*shown),
                 short(*allowed),
                 turning_plateaus(found)
             ),
             Self::UnstatedTurn { stated, turn, allowed: [most, alike], found } => write!(
                 f,
-                "a plateau turns steadily that is none of the {}: {}. A rest shows {} °/s at most and differs from the others by {} °/s \
-                 at most. Found were {}. State all steps in their order, or their begin_s and end_s with --steps",
+                "a steady plateau is none of the {}: {}. A rest shows at most {} °/s and differs from the others by \
+                 at most {} °/s. Found: {}. State all steps in their order, or their begin_s and end_s with --steps",
                 counted(*stated, "stated step", "stated steps"),
                 plateaus(&[turn]),
                 short(*most),
@@ -83,8 +84,8 @@ impl Display for Kind {
             ),
             Self::BesideGaps { kind, share } => write!(
                 f,
-                "{kind}; in {:.0} % of the half seconds ticks are missing or cannot be used: the log has gaps, or the tick length or the \
-                 unit of the time column in the mapping is not that of the log",
+                "{kind}; in {:.0} % of the half seconds ticks are missing or unusable: the log has gaps, or the \
+                 mapping has a wrong tick length or unit of the time column",
                 100.0 * share
             ),
             Self::TurnedOtherwise { window_s: [from, to], stated: (rate, axis), shown, instead } => {
@@ -100,14 +101,15 @@ impl Display for Kind {
                 match instead.as_ref() {
                     Instead::Axis(turned, [angle_deg, most]) => write!(
                         f,
-                        "the unit turned about {}, {angle_deg:.0}° off the stated axis, {most}° are allowed. State axis and sign of the \
-                         rates as they were, or mend the order of the columns in the mapping",
+                        "the unit turned about {}, {angle_deg:.0}° off the stated axis, {most}° are allowed. State \
+                         the true axis and sign of the rates, or correct the order of the columns in the mapping",
                         about(*turned)
                     ),
                     Instead::Factor([factor, most]) => write!(
                         f,
-                        "that is {} times the stated rate by the document's weights, {} to {most} times are allowed. State axis and \
-                         rates (°/s) as they were, or mend the columns of the mapping or the weights of the document",
+                        "that is {} times the stated rate by the document's weights, {} to {most} times are allowed. \
+                         State the true axis and rates (°/s), or correct the columns of the mapping or the weights \
+                         of the document",
                         short(*factor),
                         1.0 / most
                     ),
@@ -115,14 +117,14 @@ impl Display for Kind {
             }
             Self::Unsteady { window_s: [from, to], stated, range: [low, high] } => write!(
                 f,
-                "the rate is not steady in the step of {from:.1}…{to:.1} s ({stated} °/s): it lies between {} and {} °/s. Are the times \
-                 of the steps those of the log? Leave the table's acceleration out of them",
+                "the rate is not steady in the step of {from:.1}…{to:.1} s ({stated} °/s): it lies between {} and {} \
+                 °/s. Check the times of the steps, and leave out the table's acceleration",
                 short(*low),
                 short(*high)
             ),
             Self::Lost { window_s: [from, to], share: [share, most] } => write!(
                 f,
-                "{:.1} % of the step of {from:.1}…{to:.1} s cannot be used, {:.0} % may be lost: cut it with --steps",
+                "{:.1} % of the step of {from:.1}…{to:.1} s is unusable, at most {:.0} % may be: cut it with --steps",
                 100.0 * share,
                 100.0 * most
             ),
@@ -142,8 +144,8 @@ impl Display for Kind {
                 );
                 write!(
                     f,
-                    "the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, or mend the columns \
-                     of the accelerometers in the mapping"
+                    "the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, \
+                     or correct the columns of the accelerometers in the mapping"
                 )?;
                 troubles.iter().try_for_each(|trouble| write!(f, "; {trouble}"))
             }
@@ -151,14 +153,14 @@ impl Display for Kind {
                 let names: Vec<&str> = axes.iter().filter_map(|axis| AXES.get(*axis).copied()).collect();
                 write!(
                     f,
-                    "all steps about {} turn one way: an asymmetry of the scale factor is taken for scale and bias. Turn both ways, at \
-                     equal rates",
+                    "all steps about {} turn one way: an asymmetry of the scale factor enters scale and bias. Turn \
+                     both ways, at equal rates",
                     names.join(", about ")
                 )
             }
             Self::NoAttitude => f.write_str(
-                "the Earth rate is not known: steps are cut to whole turns, and its share along the table's axis is in the bias. Give \
-                 --latitude, --heading, --pitch and --roll of the beginning of each log",
+                "the Earth's rate is unknown: steps are cut to whole turns, and its share along the table's axis is \
+                 in the bias. Give --latitude, --heading, --pitch and --roll of the beginning of each log",
             ),
             Self::ShortSteps { rates } => {
                 let mut named: Vec<String> = rates.iter().map(ToString::to_string).collect();
@@ -166,7 +168,7 @@ impl Display for Kind {
                 named.dedup();
                 write!(
                     f,
-                    "{} of {} °/s {} than a turn: up to the Earth's 15 °/h is left in that; let steps last for whole turns",
+                    "{} of {} °/s {} than a turn: up to the Earth's 15 °/h remains; make steps of whole turns",
                     counted(rates.len(), "step", "steps"),
                     named.join(", "),
                     if rates.len() == 1 { "is shorter" } else { "are shorter" }
@@ -179,7 +181,7 @@ impl Display for Kind {
                     if *broken > 0 {
                         write!(
                             f,
-                            "; ticks are missing at {} before it, over which the table is taken to turn on",
+                            "; ticks are missing at {} before it, during which the table is assumed to turn on",
                             counted(*broken, "place", "places")
                         )?;
                     }
@@ -203,15 +205,15 @@ impl Display for Kind {
             ),
             Self::OtherScale { factor, most } => write!(
                 f,
-                "it shows {} times the rate that the document's weight makes of it, {} to {most} times are a result: are the table's \
-                 axis, the sign and the unit of its rates right, and the document's weight too?",
+                "it shows {} times the rate by the document's weight, {} to {most} times are accepted: check the \
+                 table's axis, the sign and unit of its rates, and the document's weight",
                 short(*factor),
                 1.0 / most
             ),
             Self::NotStraight { left, share: [share, most], chi_square } => write!(
                 f,
-                "the straight line leaves {} °/s of a step, {} % of the largest rate, at most {} % are a result (χ² {} per degree of \
-                 freedom): are the stated rates those of the log?",
+                "the straight line leaves {} °/s of a step, {} % of the largest rate, at most {} % are accepted (χ² \
+                 {} per degree of freedom): check the stated rates",
                 short(*left),
                 short(100.0 * share),
                 100.0 * most,
@@ -219,7 +221,7 @@ impl Display for Kind {
             ),
             Self::Worse { axis } => write!(
                 f,
-                "its weight and axis make the rate about {} worse than it was",
+                "its weight and axis make the rate about {} worse",
                 AXES.get(*axis).copied().unwrap_or_default()
             ),
             Self::Passed { words } => f.write_str(words),

@@ -45,8 +45,8 @@ pub fn drift(
     let length_h = last.saturating_sub(first) as f64 * 1e-9 / HOUR_S;
     if length_h < voyage.calibration_h + SHORTEST_H {
         return Err(refused(format!(
-            "the log is {length_h:.2} h, {:.1} h of calibration and at least {SHORTEST_H} h of voyage are needed: shorten the \
-             calibration with --calibration-hours, or {otherwise}",
+            "the log has {length_h:.2} h, but {:.1} h of calibration and at least {SHORTEST_H} h of voyage are \
+             needed: shorten the calibration with --calibration-hours, or {otherwise}",
             voyage.calibration_h
         )));
     }

@@ -93,7 +93,7 @@ impl Choice {
         );
         let [chosen, other] = if self.model == Model::Trend { [trend, other] } else { [other, trend] };
         format!(
-            "Gyro {}: the calibration's likelihood bears out {chosen} {sure} {other} (difference {}).",
+            "Gyro {}: the calibration's likelihood favours {chosen} {sure} {other} (difference {}).",
             self.gyro,
             short(self.difference)
         )

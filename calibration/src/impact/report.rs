@@ -82,13 +82,16 @@ impl Report {
         let middle = if self.seeds > 0 { "in the middle of all seeds " } else { "" };
         let gain = without.radial_largest_m / with.radial_largest_m.max(f64::MIN_POSITIVE);
         let judgement = if without.radial_largest_m <= 0.0 && with.radial_largest_m <= 0.0 {
-            "the trend state neither gains nor costs".to_owned()
+            "the trend state makes no difference".to_owned()
         } else if gain >= 1.05 {
             format!("the trend state cuts the error {gain:.1}×")
         } else if gain > 1.0 / 1.05 {
-            "the trend state neither gains nor costs".to_owned()
+            "the trend state makes no difference".to_owned()
         } else {
-            format!("the trend state costs {:.1}×: its trend_sigma is too large for this gyro", 1.0 / gain)
+            format!(
+                "the trend state increases the error {:.1}×: its trend_sigma is too large for this gyro",
+                1.0 / gain
+            )
         };
         let judgement = format!("{judgement}; {} with the trend alone", distance(alone.radial_largest_m));
         let hours = short(self.voyage.hours);
@@ -97,9 +100,9 @@ impl Report {
             && held.radial_largest_m < EXACT * without.radial_largest_m.min(with.radial_largest_m)
         {
             return format!(
-                "{}: over {hours} h {middle}{} of position with the estimator without trend state, {} with it: {judgement}. Known \
-                 exactly at departure and held from then on, the drift would leave {} of position and {}′ of heading: the rest is what \
-                 the estimator does not see for noise.",
+                "{}: over {hours} h {middle}{} of position with the estimator without trend state, {} with it: \
+                 {judgement}. A drift known exactly at departure and held would leave {} of position and {}′ of \
+                 heading; the rest is what noise hides from the estimator.",
                 worst.case,
                 distance(without.radial_largest_m),
                 distance(with.radial_largest_m),
@@ -108,8 +111,8 @@ impl Report {
             );
         }
         format!(
-            "{}: over {hours} h {middle}{} of position and {}′ of heading where the drift is held at its last value; {} with the \
-             estimator without trend state, {} with it: {judgement}.",
+            "{}: over {hours} h {middle}{} of position and {}′ of heading if the drift is held at its last value; {} \
+             with the estimator without trend state, {} with it: {judgement}.",
             worst.case,
             distance(held.radial_largest_m),
             short(held.heading_largest_arcmin),
@@ -157,8 +160,9 @@ impl Report {
     fn said_of_models(&self) -> Vec<String> {
         let [least, median, most] = table_3_gains();
         let paper = format!(
-            "002's table 3, {} starts of six gyros: its model with trend, which has no Markov part, cuts the position error {least:.0}…{most:.0}×, \
-             {median:.1}× in the middle. It does worse where the drift has one: let the likelihood of a log choose.",
+            "002's table 3, {} starts of six gyros: its model with trend, which has no Markov part, cuts the \
+             position error {least:.0}…{most:.0}×, {median:.1}× in the middle. It is worse if the drift has one: \
+             let the likelihood of a log choose.",
             TABLE_3.len()
         );
         let chosen = self.choices.iter().map(Choice::words);
@@ -263,7 +267,7 @@ impl Report {
             let left = course.points.iter().zip(&course.left);
             left.map(|((hours, _), left)| (*hours, left[axis] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
         };
-        let title = format!("drift of gyro {} that is left", ["x", "y", "z"][axis]);
+        let title = format!("remaining drift of gyro {}", ["x", "y", "z"][axis]);
         let panel = |title: &str, unit: &str, content| Panel {
             title: title.to_owned(),
             unit: unit.to_owned(),

@@ -21,7 +21,7 @@ pub struct Voyage {
     pub turn_ratio: f64,
     /// Hours of calibration.
     pub calibration_h: f64,
-    /// Hours on its own.
+    /// Length of the voyage without position (h).
     pub hours: f64,
     /// Whether the level gyros stay observable through the velocity log.
     pub log_aids_level: bool,
@@ -74,7 +74,7 @@ impl Care {
 pub struct Course {
     /// What was done.
     pub care: Care,
-    /// Hours on its own, and the errors then.
+    /// Length of the voyage without position (h), and the errors then.
     pub points: Vec<(f64, Errors)>,
     /// Drift that was left, at the same times (rad/s).
     pub left: Vec<[f64; 3]>,

@@ -71,7 +71,8 @@ fn accel_words(output: AccelOutput) -> String {
 
 fn differing(key: &str, here: &str, base: &str, there: &str, part: &str) -> String {
     format!(
-        "{key} is {here} in {base} and {there} in {part}: only documents of one unit with the same sensors go together"
+        "{key} is {here} in {base} and {there} in {part}: only documents of one unit with the same sensors can be \
+         merged"
     )
 }
 
@@ -81,14 +82,14 @@ pub(super) fn check(base: &Named, parts: &[Named], take: &[Take]) -> Result<(), 
     let distinct: BTreeSet<&&str> = names.iter().collect();
     if distinct.len() < names.len() {
         return Err(Error::Usage(format!(
-            "the documents are told by their names, and two have the same: {}. Rename one",
+            "two documents have the same name: {}. Rename one",
             names.join(", ")
         )));
     }
     for choice in take {
         if !names.contains(&choice.from.as_str()) {
             return Err(Error::Usage(format!(
-                "--take {}={} names no document of this merge: {}",
+                "--take {}={} is not a document of this merge: {}",
                 choice.key,
                 choice.from,
                 names.join(", ")
@@ -96,7 +97,7 @@ pub(super) fn check(base: &Named, parts: &[Named], take: &[Take]) -> Result<(), 
         }
         if is_about(&choice.key) {
             return Err(Error::Usage(format!(
-                "--take {}: of origin, note and date nothing can be chosen",
+                "--take {}: origin, note and date cannot be chosen",
                 choice.key
             )));
         }

@@ -122,9 +122,9 @@ fn a_term_that_takes_the_place_of_another_takes_it_away_and_a_missing_one_is_kep
     });
     let merged = merge(&base, &[without], &[]).unwrap();
     assert!(merged.written.document.gyro.sensor[0].thermal_rate.is_some());
-    assert!(merged.warnings[0].contains("does not have gyro.sensor.x.thermal_rate"), "{:?}", merged.warnings);
+    assert!(merged.warnings[0].contains("lacks gyro.sensor.x.thermal_rate"), "{:?}", merged.warnings);
     let text = merged.sheet("new.toml").to_text();
-    assert!(text.contains("warning: positions.toml does not have"), "{text}");
+    assert!(text.contains("warning: positions.toml lacks"), "{text}");
 }
 
 #[test]

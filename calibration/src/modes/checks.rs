@@ -47,12 +47,12 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     let [plus, minus, none] = switches.of_mode;
     if plus + minus == 0 {
         reasons.push(format!(
-            "none of the {none} gyro ticks states a lasing mode: without it the magnetic bias cannot be told from the static one. \
+            "none of the {none} gyro ticks states a lasing mode, which separates the magnetic from the static bias. \
              Map the log's mode column (mode in the [gyro] table of its mapping), or use isotherm-calibrate thermal"
         ));
     } else if plus == 0 || minus == 0 {
         reasons.push(format!(
-            "all {} ticks are in one lasing mode ({}): record with mode reversal on, as the unit is to run",
+            "all {} ticks are in one lasing mode ({}): record with mode reversal",
             plus + minus,
             if minus == 0 { "plus" } else { "minus" }
         ));
@@ -89,14 +89,14 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     if counts != (output == OutputKind::Counts) {
         let [log, of] = if counts { ["mean rates", "counts"] } else { ["counts", "mean rates"] };
         reasons.push(format!(
-            "the log's gyro readings are {log}, the document's gyro.output is {of}: a weight of one is none of the other; correct \
-             the mapping or the document"
+            "the log's gyro readings are {log}, the document's gyro.output is {of}: correct the mapping or the \
+             document"
         ));
     }
     let name = |sensor: &usize| document.gyro.sensor.get(*sensor).map_or("?", |sensor| sensor.name.as_str());
     for dead in switches.dead.iter().map(name) {
         reasons.push(format!(
-            "gyro {dead} gives the same reading, or no number, in all {} ticks: it is dead, or its column is mapped wrongly",
+            "gyro {dead} has a constant reading, or no number, in all {} ticks: it is dead, or its column is wrong",
             switches.ticks
         ));
     }
@@ -105,8 +105,8 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     {
         if let Some(Stay { reading, from_s, to_s, .. }) = seen.frozen(switches.period_s()) {
             reasons.push(format!(
-                "gyro {} gives the same reading, {}, from {from_s:.0} s to {to_s:.0} s, and changes all the time elsewhere: it failed, or its \
-                 output was lost; cut the log to where it lives with --start and --duration",
+                "gyro {} gives the same reading, {}, from {from_s:.0} s to {to_s:.0} s, but varies elsewhere: it \
+                 failed, or its output was lost; cut the log to the valid part with --start and --duration",
                 name(&sensor),
                 six(reading + 0.0)
             ));
@@ -123,8 +123,8 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
         if lost > TRANSITION_TICKS && is_longer {
             let ms = short(1e3 * TRANSITION_S);
             reasons.push(format!(
-                "readings are lost up to tick {lost} behind a switch, which takes {ms} ms at most: does the log mark the \
-                 tick of the command? State --transition-ticks to leave it at that"
+                "readings are lost up to tick {lost} after a switch, which takes at most {ms} ms: does the log mark \
+                 the tick of the command? To accept this, state --transition-ticks"
             ));
         } else if lost == 0 {
             reasons.extend(units::late(switches));
@@ -145,17 +145,14 @@ pub fn behind(
     let [there, missing] = gathered.ticks.map(real);
     if missing > MISSING * (there + missing) {
         reasons.push(format!(
-            "{missing} of {} ticks are missing, {:.0} % are allowed: cut the log with --start and --duration, or record it anew",
+            "{missing} of {} ticks are missing, {:.0} % are allowed: cut the log with --start and --duration, or \
+             record again",
             there + missing,
             100.0 * MISSING
         ));
     }
     for (count, what, todo) in [
-        (
-            gathered.invalid,
-            "have a gyro reading that cannot be used",
-            "look at the log with isotherm-replay info",
-        ),
+        (gathered.invalid, "have an unusable gyro reading", "look at the log with isotherm-replay info"),
         (
             gathered.stale,
             "have no fresh temperature of a gyro",
@@ -164,7 +161,7 @@ pub fn behind(
         (
             gathered.warming_up,
             "lack readings of a temperature channel that the document has",
-            "does the log have all channels of the document? Take those that it lacks out of the document",
+            "does the log have all channels of the document? Remove those that it lacks from the document",
         ),
     ] {
         if real(count) > UNUSABLE * there {
@@ -175,7 +172,11 @@ pub fn behind(
         }
     }
     if gathered.cells.is_empty() && reasons.is_empty() {
-        reasons.push("no settled stretch of ticks is left between the switches: is --settle shorter than the switches are apart?".to_owned());
+        reasons.push(
+            "no settled ticks are left between the switches: --settle must be shorter than the time between \
+                      them"
+                .to_owned(),
+        );
     }
     let steps = steps::found(&gathered.seconds, names);
     reasons.extend(if steps.is_empty() { motion(&gathered.seconds, names, count_arcsec) } else { steps });
@@ -185,8 +186,8 @@ pub fn behind(
             let rate = median(&rates) - earth[place];
             if rate.abs() > TURNING_DEG_PER_H {
                 reasons.push(format!(
-                    "gyro {name} shows {rate:.1} °/h beside the Earth, {TURNING_DEG_PER_H} °/h are allowed at rest: the unit turns, or \
-                     its increment weight is wrong"
+                    "gyro {name} shows {rate:.1} °/h besides the Earth's rate, {TURNING_DEG_PER_H} °/h are allowed \
+                     at rest: the unit turns, or its increment weight is wrong"
                 ));
             }
         }

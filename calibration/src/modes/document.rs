@@ -154,8 +154,9 @@ pub(super) fn inverted(
     let names: Vec<&str> = sensors.map(|(sensor, _)| sensor.name.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "{}: the magnetic bias is that of the document with the other sign: is the log's mode column (+1 is plus), or the sign of the gyro's column, the other way round? The \
-             document holds only where the mode has the same sign as in this log",
+            "{}: the magnetic bias is that of the document with the other sign: is the log's mode column (+1 is \
+             plus), or the sign of the gyro's column, the other way round? The document is valid only for modes \
+             with the sign of this log",
             gyros_in_words(&names)
         )
     })

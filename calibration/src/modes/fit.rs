@@ -143,7 +143,7 @@ pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
         noise = whole.noise();
         let solution = whole
             .solve(noise)
-            .ok_or("its terms cannot be told apart: are both modes seen at every temperature?")?;
+            .ok_or("its terms cannot be separated: both modes are needed at every temperature")?;
         let white = whole.whitened(noise);
         let left = &white.value - &white.columns * &solution.coefficients;
         let far: Vec<bool> = left.iter().map(|x| x.abs() > FAR_SIGMAS).collect();
@@ -168,7 +168,7 @@ pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
         return Err(format!("{} means are too few for {width} coefficients: take a longer run", own.len()));
     }
     let noise = own.noise();
-    let singular = "its terms cannot be told apart: are both modes seen at every temperature?";
+    let singular = "its terms cannot be separated: both modes are needed at every temperature";
     let solution = own.solve(noise).ok_or(singular)?;
     let covariance = own.covariance(noise).ok_or(singular)?;
     let coefficients = model.terms().into_iter().enumerate().map(|(index, (term, power))| Fitted {

@@ -158,14 +158,14 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     warnings.extend(document::inverted(wanted.base, &gyros, reference_deg_c));
     if wanted.place.is_none() {
         warnings.push(
-            "the Earth rate is not known: the static bias keeps its constant, only its shape is fitted. Give --latitude and \
-             --heading to fit it"
+            "the Earth's rate is unknown: the static bias keeps its constant, only its shape is fitted. Give \
+             --latitude and --heading to fit it"
                 .to_owned(),
         );
     }
     if !switches.has_meander() {
         warnings.push(
-            "the log does not say which phase the slow meander has: what it does is in the static bias, and no term of its own is \
+            "the log does not state the phase of the slow meander: its effect is in the static bias, and no term is \
              written"
                 .to_owned(),
         );
@@ -206,8 +206,8 @@ impl Made {
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::Refused(vec![format!(
-                "no window of {:.0} s, of whole reversal periods, is without lost ticks: nothing of the fit can be judged. Record without \
-                 gaps; isotherm-replay info shows where they are",
+                "no window of {:.0} s, of whole reversal periods, is without lost ticks: the fit cannot be judged. \
+                 Record without gaps; isotherm-replay info shows them",
                 self.window_s
             )]));
         }
@@ -219,8 +219,7 @@ impl Made {
         for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
             let axis = format!("gyro {}", ["x", "y", "z"][document::main_axis(row)]);
             if worse.contains(&axis) {
-                self.gyros[sensor] =
-                    Err(format!("its terms make {axis} worse than it was: it keeps the old ones"));
+                self.gyros[sensor] = Err(format!("its terms make {axis} worse: it keeps the old ones"));
             }
         }
         let mut document = document::fitted(&self.before.document, self, constants);

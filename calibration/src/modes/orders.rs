@@ -122,9 +122,7 @@ pub fn choose(
 ) -> Result<(Model, Vec<Score>), String> {
     let limited = |name: &str, asked: Option<usize>, largest: usize, remarks: &mut Vec<String>| match asked {
         Some(order) if order > largest => {
-            remarks.push(format!(
-                "{name} order {order} was asked for, {largest} is the most that this run can tell"
-            ));
+            remarks.push(format!("{name} order {order} was requested, {largest} is the most for this run"));
             vec![largest]
         }
         Some(order) => vec![order],
@@ -135,7 +133,8 @@ pub fn choose(
     let of_meander: Vec<Option<usize>> = match (full.meander_order, asked.meander_order) {
         (None, Some(_)) => {
             remarks.push(
-                "the log does not say which phase the slow meander has: its term cannot be told from the static bias".to_owned(),
+                "the log does not state the phase of the slow meander: its term cannot be separated from the static \
+                 bias".to_owned(),
             );
             vec![None]
         }

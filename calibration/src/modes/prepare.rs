@@ -38,8 +38,8 @@ pub(super) fn transition_ticks(wanted: &Wanted<'_>, switches: &Switches, warning
     let seen = u8::try_from(switches.transition_ticks()).unwrap_or(u8::MAX);
     if seen == 0 {
         warnings.push(format!(
-            "no reading behind a switch looks lost: {} is taken as the number of transition ticks; state --transition-ticks where you \
-             know it",
+            "no reading after a switch looks lost: {} transition ticks are assumed; if you know them, state \
+             --transition-ticks",
             stated.unwrap_or(1)
         ));
     }

@@ -72,8 +72,8 @@ fn notes(made: &Made, report: &mut FitReport) {
         short(made.window_s)
     ));
     report.notes.push(format!(
-        "Powers of temperature are taken about {} °C, those of the slow meander about 25 °C. Standard errors rest on white noise, \
-         whole counts and a first-order Markov drift where the means show one, at the upper limits of their estimates.",
+        "Powers of temperature are taken about {} °C, those of the slow meander about 25 °C. Standard errors include \
+         white noise, whole counts and a first-order Markov drift if the means show one, at their upper limits.",
         short(made.reference_deg_c)
     ));
 }
@@ -132,10 +132,10 @@ fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
         report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
     }
     let delay = servo.rest.delay_s.map_or_else(String::new, |delay_s| {
-        format!("; the filtered temperature is {} s behind the dither's", short(delay_s))
+        format!("; the filtered temperature lags the dither's by {} s", short(delay_s))
     });
     report.notes.push(format!(
-        "gyro {name}: behind {} switches the dither is low by {} Hz rms in the first tick{delay}.",
+        "gyro {name}: after {} switches the dither is low by {} Hz rms in the first tick{delay}.",
         own.switches,
         short(own.loss_hz)
     ));

@@ -48,7 +48,7 @@ pub fn fit(behind: &[Behind], sensor: usize, lost: usize) -> Result<Transient, R
     let rows: Vec<&[f64]> = behind.iter().filter_map(|one| one.dither_hz.get(sensor)?.get(lost..)).collect();
     if rows.len() < LEAST[1] {
         return Err(format!(
-            "{} switches have half-period counts behind them, {} are needed to tell the servo's time constant",
+            "{} switches are followed by half-period counts, {} are needed for the servo's time constant",
             rows.len(),
             LEAST[1]
         ));
@@ -56,7 +56,8 @@ pub fn fit(behind: &[Behind], sensor: usize, lost: usize) -> Result<Transient, R
     let length = rows.iter().map(|row| row.len()).min().unwrap_or(0);
     if length < LEAST[0] {
         return Err(format!(
-            "{length} ticks lie between the lost ones and the next switch, {} are needed to tell the servo's time constant",
+            "{length} ticks lie between the lost ones and the next switch, {} are needed for the servo's time \
+             constant",
             LEAST[0]
         ));
     }
@@ -83,14 +84,14 @@ pub fn fit(behind: &[Behind], sensor: usize, lost: usize) -> Result<Transient, R
     let noise = energy(&found.decay, &settled) / count;
     // Energies of so many squares scatter by their mean times √(2/n), and there are two sums of them.
     if -least < SEEN * 2.0 * (noise * noise * count).sqrt() {
-        return Err("no transient of the dither frequency shows behind the switches".to_owned());
+        return Err("the dither frequency shows no transient after the switches".to_owned());
     }
     let across = energy(&found.turn, &settled) / count;
     let relative = (across / -least).sqrt() / found.bend;
     let inside = log_tau > range[0] + 0.01 && log_tau < range[1] - 0.01;
     if relative.is_nan() || relative >= COARSEST || !inside {
         return Err(format!(
-            "the servo's time constant cannot be told from {} switches at ticks of {tick_s:.4} s",
+            "{} switches at ticks of {tick_s:.4} s do not determine the servo's time constant",
             rows.len()
         ));
     }

@@ -58,12 +58,12 @@ fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>)
     let good: Vec<f64> = raw.iter().map(of).filter(|deg_c| deg_c.is_finite()).collect();
     let numbers = match raw.len() - good.len() {
         0 => String::new(),
-        bad => format!(", {bad} of {} readings are no numbers", raw.len()),
+        bad => format!(", {bad} of {} readings are not numbers", raw.len()),
     };
     let [from, to] =
         good.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
     if good.is_empty() {
-        return (true, format!("{name} reads no numbers"));
+        return (true, format!("{name} has no numbers"));
     }
     let reads = format!("{name} reads {}…{} °C", short(from), short(to));
     if from < low || to > high {

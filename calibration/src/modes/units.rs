@@ -36,9 +36,10 @@ pub(super) fn rates(switches: &Switches, document: &Document) -> Option<String> 
     let largest = rates.iter().map(|rate| rate.abs()).fold(0.0, f64::max);
     (largest > TURNING_DEG_PER_H + EARTH_DEG_PER_H).then(|| {
         format!(
-            "by the document's weights the gyros show {} °/h in the mean, at rest they show the Earth's {EARTH_DEG_PER_H} °/h in all and at most \
-             {TURNING_DEG_PER_H} °/h of bias: either the unit turns, or the readings are in another unit of measure than the mapping and the \
-             document have (1 rad is 57.3°, 1° is 3600″), or the document's increment weights are those of another unit",
+            "by the document's weights the gyros show {} °/h in the mean, at rest they show the Earth's \
+             {EARTH_DEG_PER_H} °/h in all and at most {TURNING_DEG_PER_H} °/h of bias: the unit turns, or the \
+             mapping or the document has another unit of measure (1 rad is 57.3°, 1° is 3600″), or the document is \
+             of another unit",
             rates.iter().map(|rate| short(*rate)).collect::<Vec<_>>().join(", ")
         )
     })
@@ -46,7 +47,8 @@ pub(super) fn rates(switches: &Switches, document: &Document) -> Option<String> 
 
 /// What is wrong with the half-period counts, in words.
 pub(super) fn half_periods(switches: &Switches, document: &Document) -> Vec<String> {
-    const MEND: &str = "The correction takes the dither out by them: mend their columns in the mapping, or leave them out of it";
+    const MEND: &str = "The correction removes the dither by them: correct their columns in the mapping, or leave \
+                        them out";
     let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("?", |sensor| sensor.name.as_str());
     let mut reasons = Vec::new();
     let seen = || switches.seen.iter().enumerate();
@@ -103,8 +105,9 @@ pub(super) fn late(switches: &Switches) -> Option<String> {
     let ticks = late_s / switches.tick_s;
     (ticks.abs() > LATE_TICKS + 0.5).then(|| {
         format!(
-            "the mode changes {} s ({:.0} ticks) {} the switch command in the median, and nothing is lost where it changes: the log's mode is not \
-             that of its readings. Mend the mode or the switch column, or state --transition-ticks where the unit works like that",
+            "the mode changes {} s ({:.0} ticks) {} the switch command in the median, but no reading is lost there: \
+             the log's mode is not that of its readings. Correct the mode or the switch column, or, if the unit \
+             works like that, state --transition-ticks",
             short(late_s.abs()),
             ticks.abs(),
             if late_s > 0.0 { "behind" } else { "before" }

@@ -37,7 +37,7 @@ pub struct Settings {
     pub levelling_rad: f64,
     /// Channels that the orientation follows; those of the accelerometers where empty.
     pub channels: Vec<String>,
-    /// Temperature that all polynomials are about (°C); chosen where absent.
+    /// Reference temperature of the polynomials (°C); chosen where absent.
     pub reference_deg_c: Option<f64>,
 }
 
@@ -142,8 +142,8 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let curved = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
     if curved {
         warnings.push(
-            "C bends with temperature: the quadratic terms are no accident. The document holds the best straight line; the report \
-             has both, and what the line leaves"
+            "C bends with temperature: the quadratic terms are significant. The document has the best straight line; \
+             the report has both, and the remainder"
                 .to_owned(),
         );
     }
@@ -205,7 +205,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
         let poses = Pose::of(track, run, &intervals);
         if poses.is_empty() {
             reasons.push(format!(
-                "{}: the unit stands still nowhere for {} s after {} s of settling: state less with --least and --settle, or give \
+                "{}: the unit is never still for {} s after {} s of settling: reduce --least and --settle, or give \
                  the times with --times",
                 track.run, settings.limits.least_s, settings.limits.settle_s
             ));
@@ -255,7 +255,7 @@ fn intensity(tracks: &[Track], poses: &[Pose]) -> Result<Vec<f64>, Vec<String>> 
     let found = intensities(tracks, poses);
     if found.iter().any(|intensity| intensity.is_nan()) {
         return Err(vec![
-            "the positions are too short to tell the noise: each needs two seconds at least".to_owned(),
+            "the positions are too short to measure the noise: each needs at least two seconds".to_owned(),
         ]);
     }
     // Without any noise a stand's errors alone would have to make a covariance that can be inverted.

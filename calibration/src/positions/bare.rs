@@ -22,7 +22,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     let mut reasons = Vec::new();
     if series.gyros.output != Some(OutputKind::Mean) {
         reasons.push(
-            "the log's gyros put out counts: the angle of one is known to a document only, give one with --calibration"
+            "the log's gyro readings are counts: give a document with increment weights (--calibration)"
                 .to_owned(),
         );
     }
@@ -33,8 +33,8 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
             reasons.push(format!("the log has no {kind}: see [file.gyro] and [file.accel] of its mapping"));
         } else if count != MIN_SENSORS {
             reasons.push(format!(
-                "the log has {count} {kind}, from {MIN_SENSORS} to {MAX_SENSORS} are possible, but only three stand along \
-                 the case axes by themselves: give their nominal axes with --calibration"
+                "the log has {count} {kind}, from {MIN_SENSORS} to {MAX_SENSORS} are possible, but only three have \
+                 known axes: give the nominal axes with --calibration"
             ));
         }
     }
@@ -54,7 +54,8 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     }
     if !other.is_empty() {
         reasons.push(format!(
-            "temperature {} {} not read °C (most readings are outside {} to {} °C, or no numbers): give the conversion with --calibration",
+            "temperature {} {} not read °C (most readings are outside {} to {} °C, or not numbers): give the \
+             conversion with --calibration",
             if other.len() == 1 { "channel" } else { "channels" },
             if other.len() == 1 { format!("{} does", other[0]) } else { format!("{} do", other.join(", ")) },
             RANGE_DEG_C[0],

@@ -142,7 +142,8 @@ impl Budget {
         let count = counted(plan.positions.len(), "position", "positions");
         if let Some([known, later]) = self.known_by(plan, levelling_rad) {
             return format!(
-                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with what hysteresis, housing and measured temperature add."
+                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with \
+                 hysteresis, housing and measured temperature."
             );
         }
         let all: Vec<usize> = (0..plan.positions.len()).collect();
@@ -165,7 +166,7 @@ impl Budget {
             let level = if plan.tells_level() {
                 String::new()
             } else {
-                format!(", with a level that is known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD)
+                format!(", with a level known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD)
             };
             format!(
                 "The weighted least-squares fit of the plan uses every position for every element{level}: it will state {mean:.1}″ on \
@@ -173,7 +174,7 @@ impl Budget {
             )
         });
         format!(
-            "{}\n\nBy the formula of 004, which adds up its errors whatever the plan: {:.1}″.\n\n{}\n\nError by the measured \
+            "{}\n\nBy the formula of 004, which adds its errors independent of the plan: {:.1}″.\n\n{}\n\nError by the measured \
              temperature: {}.\n{of_plan}",
             self.headline(plan, levelling_rad),
             self.total_arcsec(),

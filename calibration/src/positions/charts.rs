@@ -66,7 +66,7 @@ pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
         }
     };
     Chart {
-        caption: "Specific force less what must be there, by position in the order of the table.".to_owned(),
+        caption: "Error of the specific force, by position in the order of the table.".to_owned(),
         x: Axis::of("number of the position", ""),
         panels: (0..3).map(panel).collect(),
         marks: Vec::new(),
@@ -122,7 +122,7 @@ pub(super) fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[Stri
         }
     };
     Chart {
-        caption: "Elements of C over temperature: each temperature by itself, and the line of the document."
+        caption: "Elements of C over temperature: each temperature alone, and the line of the document."
             .to_owned(),
         x: Axis::of("temperature", "°C"),
         panels: shown(analysis).into_iter().map(panel).collect(),

@@ -52,9 +52,9 @@ pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
     }
     let factor = per_degree.sqrt();
     warnings.push(format!(
-        "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² {chi_square:.0} with {} of \
-         freedom); all standard errors are widened by that. Look at the largest residuals: a position that is mistaken for \
-         another, a unit that was not settled, a stand that is worse than --positioning and --run-out say",
+        "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² \
+         {chi_square:.0} with {} of freedom); all standard errors are widened by this. Check the largest residuals: \
+         a position mistaken for another, a unit not settled, a stand worse than --positioning and --run-out",
         counted(degrees, "degree", "degrees")
     ));
     factor
@@ -82,18 +82,15 @@ pub(super) fn few(
             warnings.push(format!("{at}missing positions: {}", missing.join(", ")));
         }
         if !repeated.is_empty() {
-            warnings.push(format!(
-                "{at}positions taken more than once, all of them used: {}",
-                repeated.join(", ")
-            ));
+            warnings.push(format!("{at}repeated positions, all of them used: {}", repeated.join(", ")));
         }
     }
     let different =
         (0..plan.positions.len()).filter(|p| taken.iter().any(|taken| taken.position == *p)).count();
     if plan.has_stand() && different < GOOD_POSITIONS {
         warnings.push(format!(
-            "{} not tell the stand's level from the axes, {GOOD_POSITIONS} or more do: the standard errors of C hold what --levelling \
-             states ({:.0}″)",
+            "{} not separate the stand's level from the axes, {GOOD_POSITIONS} or more do: the standard errors of C \
+             include --levelling ({:.0}″)",
             if different == 1 { "1 position does".to_owned() } else { format!("{different} different positions do") },
             settings.levelling_rad * budget::ARCSEC_PER_RAD
         ));
@@ -133,7 +130,7 @@ pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mu
         ),
     };
     warnings.push(format!(
-        "{what}, or is the unit mounted otherwise than the plan says? {}",
+        "{what}, or is the unit mounted differently from the plan? {}",
         sense::found_along("accelerometer", &beside, &turned)
     ));
 }
@@ -172,7 +169,7 @@ pub(super) fn spread(plan: &Plan, taken: &[Taken], bad: &[usize]) -> Vec<String>
     let positions: Vec<usize> = taken.iter().map(|taken| taken.position).collect();
     let lacking = unseen(plan, &positions);
     let lacking = if lacking.is_empty() {
-        "the outputs do not follow the positions: is the plan the right one, and the columns of the mapping too?".to_owned()
+        "the outputs do not follow the positions: check the plan and the columns of the mapping".to_owned()
     } else {
         format!("no position has {}", lacking.join(", "))
     };
@@ -198,15 +195,16 @@ pub(super) fn sound(analysis: &Analysis) -> Result<(), Vec<String>> {
     let known: Vec<String> = bad.iter().map(|sensor| short(sigma(*sensor) * 100.0)).collect();
     let why = if analysis.widened > 1.0 {
         format!(
-            "the positions scatter {} times as much as positioning, run-out and noise explain. Is a position mistaken for another \
-             (--times, --plan), is the unit of measure another one in some logs or from some row on, did zeros drift?",
+            "the positions scatter {} times as much as positioning, run-out and noise explain. Is a position \
+             mistaken for another (--times, --plan), does the unit of measure change between or within logs, did \
+             zeros drift?",
             short(analysis.widened)
         )
     } else {
-        "longer or more positions would help, and look at the noise of the sensors".to_owned()
+        "use longer or more positions, and check the noise of the sensors".to_owned()
     };
     Err(vec![format!(
-        "{}: {} known to {} % only, at most {} % is a result: {why}",
+        "{}: {} known only to {} %, at most {} % is accepted: {why}",
         faults::several("accelerometer", &bad),
         if bad.len() == 1 { "its scale factor is" } else { "their scale factors are" },
         known.join(", "),
@@ -234,8 +232,8 @@ pub(super) fn no_solution(why: &NoSolution, degrees: Degrees, sensors: usize) ->
         "the positions",
         name,
         "take each axis up and down at each temperature, in two orientations",
-        "no scale factors, biases and axes were found that fit all positions: is the plan the right one, and every column of the \
-         mapping, in one unit of measure throughout?",
+        "no scale factors, biases and axes fit all positions: check the plan, every column of the mapping, and that \
+         the unit of measure is the same throughout",
     )
 }
 
@@ -248,7 +246,7 @@ mod tests {
         let degrees = Degrees { sensor: 1, axes: 1 };
         let of = |why: NoSolution| no_solution(&why, degrees, 3);
         let words = of(NoSolution::NoMinimum("LostPatience".to_owned()));
-        assert!(!words.contains("Lost") && words.contains("is the plan the right one"), "{words}");
+        assert!(!words.contains("Lost") && words.contains("check the plan"), "{words}");
         let named = |index: usize| of(NoSolution::NotDetermined(index));
         assert!(
             named(0).contains("do not determine the scale factor of accelerometer x: take"),

@@ -50,7 +50,7 @@ impl Fault {
     fn words(self, kind: &str) -> String {
         match self {
             Self::Dead(value) => format!(
-                "one value in every tick, {}: dead, or the wrong column; look at the mapping, or replace the sensor",
+                "one value in every tick, {}: dead, or the wrong column; check the mapping, or replace the sensor",
                 six(value)
             ),
             Self::Twin(twin) => {
@@ -60,8 +60,8 @@ impl Fault {
                 )
             }
             Self::Missing([missing, all]) => format!(
-                "{missing} of {all} readings are no numbers, at most {} % may be: look at the recording, or cut it with --start and \
-                 --duration",
+                "{missing} of {all} readings are not numbers, at most {} % may be: check the recording, or cut it \
+                 with --start and --duration",
                 NOT_FINITE_SHARE * 100.0
             ),
         }
@@ -128,8 +128,8 @@ pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
         let at: Vec<&Pose> = poses.iter().filter(constant).collect();
         if let (Some(first), true) = (at.first(), at.len() < poses.len()) {
             reasons.push(format!(
-                "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there; use a wider range, or leave \
-                 these poses out",
+                "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there: use a wider \
+                 range, or leave these poses out",
                 name(sensor),
                 six(value(first)),
                 at.len(),
@@ -188,7 +188,7 @@ mod tests {
             dead.starts_with("log, other: accelerometers x, y and z: one value in every tick, 0: "),
             "{dead}"
         );
-        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are no numbers"), "{none}");
+        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are not numbers"), "{none}");
         assert!(twice.starts_with("log, other: gyro z: the same in every tick as gyro x"), "{twice}");
     }
 }

@@ -44,8 +44,8 @@ pub fn stated(
         (None, None) => Ok((
             STANDARD_M_PER_S2,
             Some(format!(
-                "gravity is taken as {STANDARD_M_PER_S2} m/s²; at your place it differs by up to 0.3 %, and all scale factors \
-                 with it: state --gravity, or --latitude and --height"
+                "gravity is assumed as {STANDARD_M_PER_S2} m/s²; at your place it, and all scale factors, may differ \
+                 by up to 0.3 %: state --gravity, or --latitude and --height"
             )),
         )),
     }
@@ -56,7 +56,7 @@ fn radians(latitude: f64) -> Option<String> {
     let may_be = latitude != 0.0 && latitude.abs() <= std::f64::consts::FRAC_PI_2;
     may_be.then(|| {
         format!(
-            "--latitude is {latitude}°, near the equator: is it not in radians? That would be {}°, and gravity {} % more",
+            "--latitude is {latitude}°, near the equator: is it in radians? That would be {}°, and gravity {} % more",
             six(latitude.to_degrees()),
             short(100.0 * (normal(latitude.to_degrees(), 0.0) / normal(latitude, 0.0) - 1.0))
         )

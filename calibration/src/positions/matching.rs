@@ -53,7 +53,7 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
             "the log has no turns".to_owned()
         } else {
             format!(
-                "gyros and accelerometers agree on the turns between the poses on {:.0} % of the ways, at least {:.0} % is needed",
+                "gyros and accelerometers agree on {:.0} % of the turns between the poses, at least {:.0} % is needed",
                 share * 100.0,
                 AGREEMENT * 100.0
             )
@@ -87,8 +87,8 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         return Ok(Matched { positions, doubt });
     }
     Err(unclear(&format!(
-        "they are not the plan's {count} positions in their order, one is missing or repeated{}. Say which pose is which with \
-         --times, or record the turns too",
+        "they are not the plan's {count} positions in their order, one is missing or repeated{}. Identify the poses \
+         with --times, or record the turns too",
         unseen(plan).unwrap_or_default()
     )))
 }
@@ -145,8 +145,8 @@ fn unseen(plan: &Plan) -> Option<String> {
     let pair =
         (1..plan.positions.len()).find(|position| up(*position).angle(&up(position - 1)) < DIRECTION_RAD)?;
     Some(format!(
-        " (from {:?} to {:?} the unit turns about the vertical only, which accelerometers do not feel: without turns only a complete set \
-         in the plan's order and in one log is known, anything else needs --times)",
+        " (from {:?} to {:?} the unit turns about the vertical only, which accelerometers do not sense: without \
+         turns only a complete set in the plan's order and in one log is recognised, others need --times)",
         plan.positions[pair - 1].name,
         plan.positions[pair].name
     ))
@@ -218,8 +218,8 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
     }
     if poses.iter().any(|pose| pose.outputs.len() != 3) {
         return Err(
-            "the document's accelerometers do not give 1 g, and with more than three of them directions cannot be guessed: state \
-             their nominal scale factors and axes in --calibration"
+            "the document's accelerometers do not give 1 g, and with more than three of them directions cannot be \
+             guessed: give a document with nominal scale factors and axes (--calibration)"
                 .to_owned(),
         );
     }

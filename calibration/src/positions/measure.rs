@@ -19,18 +19,18 @@ const DEG: f64 = 180.0 / std::f64::consts::PI;
 
 /// How many times too large readings are by which mistake.
 const OF_ACCELEROMETERS: [(f64, &str); 5] = [
-    (1.0 / G, "as of readings in g that are taken for m/s²"),
-    (G, "as of m/s² that are multiplied by g once more"),
-    (1000.0 / G, "as of readings in mg (or cm/s²) that are taken for m/s²"),
-    (1.0 / 0.3048, "as of ft/s² that are taken for m/s²"),
-    (1.0 / (1000.0 * G), "as of readings in thousands of g"),
+    (1.0 / G, "as for readings in g taken as m/s²"),
+    (G, "as for m/s² multiplied by g again"),
+    (1000.0 / G, "as for readings in mg (or cm/s²) taken as m/s²"),
+    (1.0 / 0.3048, "as for ft/s² taken as m/s²"),
+    (1.0 / (1000.0 * G), "as for readings in thousands of g"),
 ];
 const OF_GYROS: [(f64, &str); 5] = [
-    (DEG, "as of °/s that are taken for rad/s"),
-    (1.0 / DEG, "as of rad/s that are taken for °/s"),
-    (3600.0, "as of °/h that are taken for °/s"),
-    (3600.0 * DEG, "as of °/h that are taken for rad/s"),
-    (1.0 / 3600.0, "as of °/s that are taken for °/h"),
+    (DEG, "as for °/s taken as rad/s"),
+    (1.0 / DEG, "as for rad/s taken as °/s"),
+    (3600.0, "as for °/h taken as °/s"),
+    (3600.0 * DEG, "as for °/h taken as rad/s"),
+    (1.0 / 3600.0, "as for °/s taken as °/h"),
 ];
 
 /// What scale factors of a kind of sensors are beside the stated ones.
@@ -70,7 +70,7 @@ impl Beside {
             times: found.iter().zip(stated).map(|(found, stated)| (stated / found).abs()).collect(),
             stated: true,
             mistakes: &OF_GYROS,
-            hint: "look at their unit and scale in the mapping, and at the range that they were set to",
+            hint: "check their unit and scale in the mapping, and the range they were set to",
         }
     }
 
@@ -89,8 +89,8 @@ impl Beside {
         let Self { kind, .. } = self;
         (ratio > LARGEST_RATIO).then(|| {
             format!(
-                "{kind} {} and {kind} {}: their readings are {} and {} times what the document at hand, or else the log, states, {} \
-                 times apart: is the unit of measure of each column in the mapping the right one?",
+                "{kind} {} and {kind} {}: their readings are {} and {} times those of the document, or else the log, \
+                 {} times apart: check the unit of measure of each column in the mapping",
                 faults::name(most),
                 faults::name(least),
                 short(size(&most)),
@@ -107,11 +107,11 @@ impl Beside {
         let times = libm::exp(logs / self.times.len() as f64);
         (self.stated && times.is_finite() && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&times)).then(|| {
             format!(
-                "{}s: their readings are {} times what the document at hand, or else the log, states, {}: {}. The new document holds the \
-                 scale factors that were found, for logs with this mapping",
+                "{}s: their readings are {} times those of the document, or else the log, {}: {}. The new document \
+                 has the fitted scale factors, for logs with this mapping",
                 self.kind,
                 short(times),
-                self.mistake(times).unwrap_or("as of no usual unit of measure"),
+                self.mistake(times).unwrap_or("as for no usual unit of measure"),
                 if self.mistake(times).is_some() { "correct the unit of measure in the mapping" } else { self.hint },
             )
         })
@@ -136,8 +136,8 @@ pub fn already_m_per_s2(output: AccelOutput, found: &[f64], stated: &[f64]) -> O
     let placeholder = output == AccelOutput::Volts && is_placeholder(stated);
     let near = found.iter().all(|k| (k - 1.0).abs() < NEAR_ONE);
     (placeholder && near).then(|| {
-        "accelerometers: 1 V of the log is 1 m/s² but for some per cent: it is in m/s² already; state --accelerometer-unit m/s2, or the \
-         document says V"
+        "accelerometers: 1 V of the log is about 1 m/s²: it is already in m/s²; state --accelerometer-unit m/s2, \
+         otherwise the document has V"
             .to_owned()
     })
 }
@@ -159,12 +159,12 @@ mod tests {
             let words = accel(output, found, stated).unwrap();
             assert!(words.contains(name), "{words}");
         };
-        named(MetresPerSecondSquared, 0.102, 1.0, "in g that are taken for m/s²");
-        named(MetresPerSecondSquared, 9.8, 1.0, "multiplied by g once more");
+        named(MetresPerSecondSquared, 0.102, 1.0, "in g taken as m/s²");
+        named(MetresPerSecondSquared, 9.8, 1.0, "multiplied by g again");
         named(MetresPerSecondSquared, 102.0, 1.0, "in mg (or cm/s²)");
-        named(MetresPerSecondSquared, 2.2, 1.0, "as of no usual unit of measure");
+        named(MetresPerSecondSquared, 2.2, 1.0, "as for no usual unit of measure");
         named(MetresPerSecondSquared, 414.0, 1.0, "map them as \"raw\"");
-        named(Volts, 4060.0, 414.0, "multiplied by g once more");
+        named(Volts, 4060.0, 414.0, "multiplied by g again");
         let apart = Beside::accelerometers(Volts, &[414.0, 828.0, 412.0], &[1.0; 3]).words().unwrap();
         assert!(
             apart.starts_with("accelerometer y and accelerometer z: ") && apart.contains(" 2.01 times apart"),
@@ -172,12 +172,12 @@ mod tests {
         );
         let gyros = |found: [f64; 3], stated| Beside::gyros(&found, &[stated; 3]).words();
         assert_eq!(gyros([1.309, -1.312, 1.311], 1.0), None);
-        assert!(gyros([0.0302; 3], 1.0).unwrap().contains("33.1 times what the document"));
-        assert!(gyros([0.0229; 3], 1.0).unwrap().contains("°/s that are taken for rad/s"));
+        assert!(gyros([0.0302; 3], 1.0).unwrap().contains("33.1 times those of the document"));
+        assert!(gyros([0.0229; 3], 1.0).unwrap().contains("°/s taken as rad/s"));
         assert!(
             gyros([6.5; 3], 1.3)
                 .unwrap()
-                .contains("as of no usual unit of measure: look at their unit and scale")
+                .contains("as for no usual unit of measure: check their unit and scale")
         );
         let one = gyros([1.3, 75.0, 1.3], 1.0).unwrap();
         assert!(one.starts_with("gyro z and gyro y: ") && one.contains(" 57.7 times apart"), "{one}");

@@ -79,7 +79,7 @@ fn far(length: &Verdict, gravity: f64) -> Option<String> {
     let share = after.rms / gravity;
     (share > LARGEST_LEFT_SHARE).then(|| {
         format!(
-            "{} % of g are left{}, at most {} % is a result: is the unit of measure in it the same, and the unit?",
+            "{} % of g remain{}, at most {} % is accepted: check that unit of measure and unit are the same",
             short(100.0 * share),
             if length.out_of_sample.is_some() { " in the log that judges" } else { "" },
             100.0 * LARGEST_LEFT_SHARE
@@ -96,7 +96,7 @@ fn as_a_whole(verdicts: Vec<Verdict>) -> Vec<Verdict> {
             return verdict;
         }
         verdict.refused(format!(
-            "K, S and C of all accelerometers are one fit and are taken as a whole, and {} is refused",
+            "K, S and C of all accelerometers are one fit, accepted as a whole, and {} is refused",
             bad.join(", ")
         ))
     };
@@ -138,8 +138,8 @@ fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<S
     ];
     if let Some((_, chi_square, terms, accident)) = &analysis.quadratic {
         notes.push(format!(
-            "Quadratic terms of C: χ² {chi_square:.1} with {terms} of them, an accident with probability {}; the straight line of the \
-             document is off by {:.1}″ at most.",
+            "Quadratic terms of C: χ² {chi_square:.1} with {terms} of them, by chance with probability {}; the \
+             straight line of the document is off by {:.1}″ at most.",
             short(*accident),
             arcsec(bend(analysis))
         ));

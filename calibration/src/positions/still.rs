@@ -13,7 +13,7 @@ pub struct StillLimits {
     pub window_s: f64,
     /// Variance over a window that is still, relative to that of the quietest fifth of the run, or of the given rest.
     pub factor: f64,
-    /// Rate beyond which the unit turns (°/s), unless noise asks for more.
+    /// Rate above which the unit turns (°/s), unless noise asks for more.
     pub rate_deg_per_s: f64,
     /// Shortest interval that counts (s), after `settle_s` was taken off its beginning.
     pub least_s: f64,

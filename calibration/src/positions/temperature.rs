@@ -100,8 +100,9 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
     }
     let words = |(channel, sensors, [low, high]): (String, Vec<usize>, [f64; 2])| {
         format!(
-            "{}: what K and S follow is {channel}, which goes from {} to {} °C over {levels} temperatures of the axes, more than \
-             {LEVEL_GAP_DEG_C} °C are needed: name the channel that measures it in the document, or give the logs of one temperature",
+            "{}: K and S follow {channel}, which goes from {} to {} °C over {levels} temperatures of the axes, more \
+             than {LEVEL_GAP_DEG_C} °C are needed: name its own channel in the document, or give the logs of one \
+             temperature",
             faults::several("accelerometer", &sensors),
             fixed(low, 1),
             fixed(high, 1)
@@ -122,8 +123,8 @@ pub(super) fn stuck(channels: &[String], axes: &[f64], own: &[Vec<f64>]) -> Opti
         (wide.first()?, wide.iter().map(|(sensor, ..)| *sensor).collect::<Vec<_>>());
     (high - low <= LEVEL_GAP_DEG_C).then(|| {
         format!(
-            "C follows {}, which goes from {} to {} °C only, but the channel of {} goes from {} to {} °C: is it stuck, or not of this \
-             unit? Name another one with --channel",
+            "C follows {}, which goes from {} to {} °C only, but the channel of {} goes from {} to {} °C: is it \
+             stuck, or of another unit? Name another channel with --channel",
             names(channels),
             fixed(low, 1),
             fixed(high, 1),
@@ -170,15 +171,15 @@ pub(super) fn followed(
     let gone: Vec<String> = stated.iter().filter(gone).cloned().collect();
     if !settings.channels.is_empty() {
         return Err(vec![format!(
-            "--channel: {} not in every position: name channels that the logs have and the document knows",
+            "--channel: {} not in every position: name channels of the logs and the document",
             if gone.len() == 1 { format!("{} is", names(&gone)) } else { format!("{} are", names(&gone)) }
         )]);
     }
     let own = of_accelerometers(document);
     if let Some(deg_c) = of(&own) {
         warnings.push(format!(
-            "C follows the accelerometers' own channels here: {} has no reading in some position, and the new document says so too where \
-             there are several temperatures",
+            "C follows the accelerometers' own channels here: {} has no reading in some position; with several \
+             temperatures the new document does the same",
             names(&gone)
         ));
         return Ok(Followed { channels: own, deg_c });
@@ -186,14 +187,14 @@ pub(super) fn followed(
     let runs: BTreeSet<usize> = poses.iter().map(|(pose, _)| pose.run).collect();
     if gone.is_empty() && runs.len() > 1 {
         warnings.push(format!(
-            "the document names no temperature channel for the accelerometers: all {} logs count as one temperature. If they are of \
-             several, name the channels in the document",
+            "the document names no temperature channel for the accelerometers: all {} logs count as one temperature. \
+             If they are not, name the channels in the document",
             runs.len()
         ));
     } else if !gone.is_empty() {
         warnings.push(format!(
-            "{} has gaps or is not in the logs: all positions count as one temperature. Cut the logs to where it is read, or name \
-             others with --channel",
+            "{} has gaps or is not in the logs: all positions count as one temperature. Cut the logs to the part \
+             with readings, or name others with --channel",
             names(&gone)
         ));
     }

@@ -45,7 +45,7 @@ impl Times {
             };
             let number = |cell: &str| {
                 let value: Option<f64> = cell.parse().ok().filter(|value: &f64| value.is_finite());
-                value.ok_or_else(|| wrong(line, format!("{cell:?} is no number of seconds")))
+                value.ok_or_else(|| wrong(line, format!("{cell:?} is not a number of seconds")))
             };
             let span = [number(start)?, number(end)?];
             if span[1] <= span[0] {
@@ -71,7 +71,7 @@ impl Times {
             let Some(position) = plan.index_of(name) else {
                 let names: Vec<&str> = plan.positions.iter().map(|position| position.name.as_str()).collect();
                 reasons.push(format!(
-                    "--times: {name:?} is no position of the plan, which has {}",
+                    "--times: {name:?} is not a position of the plan, which has {}",
                     names.join(", ")
                 ));
                 continue;

@@ -125,8 +125,8 @@ impl Track {
         let share = broken as f64 / self.len().max(1) as f64;
         if share > MANY {
             return Some(format!(
-                "{:.0} % of the accelerometer ticks do not begin where the one before ends: the log has gaps, or the tick length ({} s) \
-                 or the unit of the time column in the mapping is not that of the log",
+                "{:.0} % of the accelerometer ticks do not begin at the end of the one before: the log has gaps, or \
+                 the mapping has a wrong tick length ({} s) or unit of the time column",
                 100.0 * share,
                 six(tick_s)
             ));
@@ -135,8 +135,8 @@ impl Track {
         let (missing_s, length_s) = (missing.iter().sum::<f64>(), self.start_s(self.len().saturating_sub(1)));
         (missing_s > MANY * length_s).then(|| {
             format!(
-                "{missing_s:.0} s of {length_s:.0} s are missing, in {}: a pose that has one is none; record without gaps, or cut the log \
-                 to where it has none with --start and --duration",
+                "{missing_s:.0} s of {length_s:.0} s are missing, in {}: poses must have no gap; record without \
+                 gaps, or cut the log with --start and --duration",
                 counted(missing.len(), "gap", "gaps")
             )
         })

@@ -49,7 +49,7 @@ pub(super) fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> 
                 return verdict;
             }
             let grown = format!(
-                "the errors of its steps grow, {}: are the table's axis and rates, and the temperature of all logs, as stated?",
+                "the errors of its steps grow, {}: check the table's axis and rates, and the temperature of all logs",
                 verdict.reason
             );
             verdict.refused(grown)

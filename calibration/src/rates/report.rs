@@ -38,9 +38,9 @@ pub(super) fn report(made: &Made) -> FitReport {
         counted(made.steps.len() - turning, "rest", "rests")
     ));
     report.notes.push(
-        "Before and after are the errors of the corrected rate over the steps, Earth rate and mean error (bias) taken off. The \
-         increment weight is that of the mean of positive and negative input; asymmetry and nonlinearity have no place in a \
-         document and stand in origin.details."
+        "Before and after are the errors of the corrected rate over the steps, less Earth's rate and mean error \
+         (bias). The increment weight is the mean for positive and negative input; asymmetry and nonlinearity are \
+         in origin.details."
             .to_owned(),
     );
     let mut told: Vec<(&str, String)> = Vec::new();
@@ -48,7 +48,8 @@ pub(super) fn report(made: &Made) -> FitReport {
         match made.gyros.get(index) {
             Some(Ok(found)) => {
                 if found.axis.is_none() {
-                    let stays = "the steps turn about fewer than three directions: the input axis stays that of the document";
+                    let stays = "the steps turn about fewer than three directions: the input axis is kept from the \
+                                 document";
                     told.push((&sensor.name, stays.to_owned()));
                 }
                 let weight = sensor
@@ -58,7 +59,7 @@ pub(super) fn report(made: &Made) -> FitReport {
                 coefficients(&sensor.name, found, weight, &mut report);
                 linearity(made, index, &sensor.name, found, &mut report);
             }
-            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis stay"))),
+            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis are kept"))),
             None => {}
         }
     }
@@ -174,8 +175,8 @@ fn other_weights(made: &Made) -> Option<String> {
     let (names, changes): (Vec<&str>, Vec<String>) = other.unzip();
     (!names.is_empty()).then(|| {
         format!(
-            "{}: the weight changes by {}, more than {:.0} %: are the stated rates those of the table, are the readings in the unit of measure that \
-             the mapping has, and is the document that of this unit?",
+            "{}: the weight changes by {}, more than {:.0} %: check the stated rates, the unit of measure in the \
+             mapping, and that the document is of this unit",
             gyros(&names),
             changes.join(", "),
             100.0 * OTHER_WEIGHT
@@ -192,9 +193,9 @@ fn widened(made: &Made) -> Option<String> {
     });
     let (names, times): (Vec<&str>, Vec<String>) = wide.unzip();
     let place = if made.earth_known {
-        ", or latitude and attitude that are not those of the beginning of each log"
+        ", or latitude and attitude other than at the beginning of each log"
     } else {
-        ", or the Earth's rate, which is not taken off"
+        ", or the Earth's rate, which is not removed"
     };
     (!names.is_empty()).then(|| {
         format!(
@@ -240,7 +241,7 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
     let chi = if found.chi_square.is_finite() {
         format!("χ² {:.2} per degree of freedom", found.chi_square)
     } else {
-        "no step to spare".to_owned()
+        "no degree of freedom left".to_owned()
     };
     report.notes.push(format!(
         "gyro {name}: linearity error at most {} ppm of full scale ({} °/s), {chi}.",
@@ -249,7 +250,7 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
     ));
     if let Some([value, sigma]) = found.asymmetry.filter(|[value, sigma]| value.abs() > SEEN * sigma) {
         report.warnings.push(format!(
-            "gyro {name}: positive and negative scale factor differ by {} ± {} ppm, which the document cannot hold",
+            "gyro {name}: positive and negative scale factor differ by {} ± {} ppm, which is not in the document",
             short(1e6 * value),
             short(1e6 * sigma)
         ));
@@ -280,7 +281,7 @@ fn chart(made: &Made) -> Chart {
         })
     };
     Chart {
-        caption: "What the straight line leaves of each step, over the input rate.".to_owned(),
+        caption: "Residual of each step from the straight line, over the input rate.".to_owned(),
         x: Axis::of("input rate", "°/s"),
         panels: made.gyros.iter().enumerate().filter_map(panel).collect(),
         marks: Vec::new(),

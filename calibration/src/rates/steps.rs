@@ -175,7 +175,8 @@ fn of_csv(text: &str) -> Result<Vec<Row>, String> {
     for name in &head {
         if !["log", "axis", "rate_deg_per_s", "begin_s", "end_s"].contains(name) {
             return Err(format!(
-                "line 1: column {name:?} is none of log, axis, rate_deg_per_s, begin_s, end_s (axis by name; vectors go into TOML)"
+                "line 1: column {name:?} is not one of log, axis, rate_deg_per_s, begin_s, end_s (axis by name; \
+                 vectors go into TOML)"
             ));
         }
     }
@@ -195,13 +196,14 @@ fn of_csv(text: &str) -> Result<Vec<Row>, String> {
         };
         let number = |name: &str| {
             let parse = |text: &str| {
-                text.parse().map_err(|_| format!("line {}: {name} is {text:?}, no number", index + 1))
+                text.parse().map_err(|_| format!("line {}: {name} is {text:?}, not a number", index + 1))
             };
             field(name).map(parse).transpose()
         };
         let need = |name: &str| format!("line {}: {name} is missing", index + 1);
-        let log = field("log")
-            .map(|text| text.parse().map_err(|_| format!("line {}: log is {text:?}, no number", index + 1)));
+        let log = field("log").map(|text| {
+            text.parse().map_err(|_| format!("line {}: log is {text:?}, not a number", index + 1))
+        });
         Ok(Row {
             log: log.transpose()?,
             axis: Axis::Name(field("axis").ok_or_else(|| need("axis"))?.to_owned()),

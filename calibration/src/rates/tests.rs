@@ -2,6 +2,7 @@
 
 mod over_temperature;
 
+use isotherm_cli::Exit;
 use isotherm_correction::earth::Place;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
@@ -294,7 +295,7 @@ fn tables_of_steps_are_read_or_refused_with_their_line() {
         ("g.csv", "", "it is empty"),
     ] {
         let error = read(name, text).unwrap_err();
-        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.exit(), Exit::Usage);
         assert!(error.to_string().contains(expected), "{error}");
     }
 }

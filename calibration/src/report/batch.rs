@@ -76,8 +76,7 @@ impl BatchTable {
         let [accepted, refused, failed] = self.counts();
         let count = self.units.len();
         let units = if count == 1 { "unit" } else { "units" };
-        let failed =
-            if failed == 0 { String::new() } else { format!(", {failed} of the units came to nothing") };
+        let failed = if failed == 0 { String::new() } else { format!(", {failed} of the units failed") };
         format!("{count} {units}: {accepted} of {} sensors {}{failed}.", accepted + refused, self.done)
     }
 

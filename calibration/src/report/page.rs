@@ -49,7 +49,7 @@ impl FitReport {
             section(&mut page, "Cross-validation", validation);
         }
         if let Some(chart) = spectrum(&self.residuals) {
-            page.heading("Spectrum of what is left");
+            page.heading("Spectrum of the residual");
             page.chart(&chart);
         }
         self.tables.iter().for_each(|(heading, rows)| section(&mut page, heading, rows));
@@ -76,7 +76,7 @@ impl FitReport {
                 .collect();
             panels.extend(temperatures(&curves));
             page.chart(&Chart {
-                caption: format!("{}, {}: what is left before and after.", run.0, sample_words(run.1)),
+                caption: format!("{}, {}: error before and after.", run.0, sample_words(run.1)),
                 x: Axis::of("time since the run's beginning", "s"),
                 panels,
                 marks: Vec::new(),
@@ -122,7 +122,7 @@ impl FitReport {
                 panel(of, measure, pair(before, after, Form::Dots))
             };
             page.chart(&Chart {
-                caption: format!("All runs {}: what is left before and after.", sample_words(outside)),
+                caption: format!("All runs {}: error before and after.", sample_words(outside)),
                 x: Axis::of("temperature", "°C"),
                 panels: names.into_iter().map(panel_of).collect(),
                 marks: Vec::new(),
@@ -282,8 +282,8 @@ fn spectrum(curves: &[Curve]) -> Option<Chart> {
     let panels: Vec<Panel> = names.into_iter().filter_map(panel_of).collect();
     (!panels.is_empty()).then(|| Chart {
         caption: format!(
-            "Square root of the power spectral density of the window means, {}: a slope to the left is what temperature still \
-             does, a level is noise.",
+            "Square root of the power spectral density of the window means, {}: a slope to the left is left by \
+             temperature, a level is noise.",
             sample_words(outside)
         ),
         x: Axis { label: "frequency".to_owned(), unit: "Hz".to_owned(), logarithmic: true },

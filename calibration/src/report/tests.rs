@@ -19,8 +19,8 @@ fn verdict() -> Verdict {
 fn a_verdict_says_what_came_of_it() {
     let words = verdict().words();
     assert_eq!(words, "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted");
-    let words = verdict().refused("nothing beats its mean").words();
-    assert!(words.ends_with("out of sample; refused: nothing beats its mean"), "{words}");
+    let words = verdict().refused("no model beats its mean").words();
+    assert!(words.ends_with("out of sample; refused: no model beats its mean"), "{words}");
     let words =
         Verdict::new("accelerometer z", "m/s²", [size(4.0), size(2.0)]).stated_as(Figure::Rms).words();
     assert_eq!(words, "accelerometer z: 1.00 → 0.500 m/s² rms in sample; accepted");
@@ -75,7 +75,7 @@ fn a_report_says_the_same_in_every_form() {
     assert_eq!(json["coefficients"][1]["sigma"], serde_json::Value::Null);
     let html = report.to_html();
     for part in
-        ["class=\"headline\">\n<li>gyro x", "plateau &lt; 3", "Over temperature", "Spectrum of what is left"]
+        ["class=\"headline\">\n<li>gyro x", "plateau &lt; 3", "Over temperature", "Spectrum of the residual"]
     {
         assert!(html.contains(part), "{part}");
     }
@@ -129,7 +129,7 @@ fn a_batch_keeps_its_order_and_ends_with_one_table() {
     batch.add("B", Err("no raw ticks".into()));
     assert_eq!(batch.counts(), [1, 1, 1]);
     let text = batch.to_text();
-    let first = "2 units: 1 of 2 sensors accepted, 1 of the units came to nothing.";
+    let first = "2 units: 1 of 2 sensors accepted, 1 of the units failed.";
     assert!(text.starts_with(first) && text.contains("failed: no raw ticks"), "{text}");
     assert_eq!(batch.to_json()["units"][1]["failed"], "no raw ticks");
     assert_eq!(of_unit(Path::new("out/fit.html"), "B"), Path::new("out/fit-B.html"));

@@ -99,8 +99,8 @@ impl Verdict {
             return self;
         }
         self.refused(format!(
-            "{count} of {all} windows are whole, at least {:.0} % must be: look for gaps and flags with isotherm-replay correct, and choose \
-             another --window where the log has gaps",
+            "{count} of {all} windows are complete, at least {:.0} % must be: look for gaps and flags with \
+             isotherm-replay correct, and choose another --window if the log has gaps",
             100.0 * LEAST_SHARE
         ))
     }

@@ -17,7 +17,7 @@ impl Cut {
             LogReport::Recording(RecordingReport { cut_short: Some(words), .. }) => self.recording(words),
             LogReport::Text(ReadReport { cut_short: true, .. }) => {
                 let words = format!(
-                    "the log is cut short, and is taken to where it is whole: {name}: a compressed file ends in the middle; copy it \
+                    "the log is cut short, and used up to there: {name}: a compressed file is incomplete; copy it \
                      again"
                 );
                 self.0.get_or_init(|| words);
@@ -30,7 +30,7 @@ impl Cut {
     pub fn recording(&self, words: &str) {
         self.0.get_or_init(|| {
             format!(
-                "the recording is cut short, and is taken to where it is whole: {words}; isotherm-replay recover may save more"
+                "the recording is cut short, and used up to there: {words}; isotherm-replay recover may save more"
             )
         });
     }

@@ -47,7 +47,7 @@ pub(super) fn notes(document: &Document, terms: &[Term]) -> Vec<String> {
     }
     if let Some(filter) = &document.temperature.filter {
         notes.push(format!(
-            "Temperatures are taken every {} s, averaged over {} s, differentiated over {} s, and stale after {} s.",
+            "Temperatures: every {} s, averaged over {} s, differentiated over {} s, stale after {} s.",
             filter.grid_step_s, filter.smoothing_s, filter.derivative_step_s, filter.stale_after_s
         ));
     }
@@ -103,7 +103,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
     let head = ["input axis", "x", "y", "z", "off its case axis, ″", "turns, ″/°C"];
     sheet.table("Input axes in case axes", &head, rows);
     let residuals = document.origin.iter().flat_map(|origin| &origin.residual);
-    sheet.table("Residuals by its own account", &parts::HEAD, residuals.map(parts::of_residual).collect());
+    sheet.table("Residuals as stated", &parts::HEAD, residuals.map(parts::of_residual).collect());
     parts::tables(sheet, document);
 }
 

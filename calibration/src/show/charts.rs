@@ -49,7 +49,7 @@ pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range
     add(
         sheet,
         "Input axes",
-        "By how much each input axis turns from where it is in the middle.",
+        "Turn of each input axis from the middle of the range.",
         "°C",
         axes(written, range),
     );

@@ -56,7 +56,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
             rows.push(row);
         }
     }
-    sheet.table("Residuals of the parts, each by its own account", &HEAD, rows);
+    sheet.table("Residuals as stated by each part", &HEAD, rows);
 }
 
 fn named<'a>(names: impl Iterator<Item = &'a str>) -> String {

@@ -78,21 +78,20 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
         if !ticks.is_empty() && ticks.readings.len() != 3 {
             let count = ticks.readings.len();
             reasons.push(format!(
-                "the log has {count} {kind}s: without a document (--calibration) their axes are known of three only"
+                "the log has {count} {kind}s: without a document (--calibration) only three have known axes"
             ));
         }
     }
     if series.gyros.is_empty() {
-        reasons.push(
-            "the log has no gyro ticks: the correction runs at their pace, so that a log of a unit must have them".to_owned(),
-        );
+        reasons
+            .push("the log has no gyro ticks: the correction runs at their pace and needs them".to_owned());
     }
     for (name, channel) in &series.temperatures {
         let away = channel.raw.iter().filter(|raw| raw.is_finite() && !(DEG_C[0]..=DEG_C[1]).contains(*raw));
         if 2 * away.count() > channel.raw.len() {
             reasons.push(format!(
-                "temperature channel {name:?} has readings outside {} to {} °C: it is no temperature in °C; name the right column in \
-                 the mapping, or give a document with the channel's conversion (--calibration)",
+                "temperature channel {name:?} has readings outside {} to {} °C: it is not a temperature in °C: name \
+                 the right column in the mapping, or give a document with the channel's conversion (--calibration)",
                 DEG_C[0], DEG_C[1]
             ));
         }
@@ -115,9 +114,8 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
                 .to_owned()
         } else {
             format!(
-                "which temperature channel each gyro follows cannot be told from their names ({list}): name them gyro0, gyro1, gyro2 (and accel0 …) in \
-                 the mapping, or give a document that says so \
-                 (--calibration)"
+                "the names of the temperature channels ({list}) do not tell which gyro follows which: name them \
+                 gyro0, gyro1, gyro2 (and accel0 …) in the mapping, or give a document (--calibration)"
             )
         }]));
     }

@@ -106,7 +106,7 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
     let share = bad as f64 / readings.len().max(1) as f64;
     if share > 0.5 {
         let why = format!(
-            "{name}: {of}: {:.0} % of its readings are no numbers: check the sensor, and the column in the mapping",
+            "{name}: {of}: {:.0} % of its readings are not numbers: check the sensor, and the column in the mapping",
             100.0 * share
         );
         found.refusals.push(why);
@@ -114,7 +114,7 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
     }
     if bad > 0 {
         found.warnings.push(format!(
-            "{name}: {of}: {bad} readings are no numbers ({:.3} %); the windows with them are left out",
+            "{name}: {of}: {bad} readings are not numbers ({:.3} %); the windows with them are left out",
             100.0 * share
         ));
     }
@@ -149,8 +149,8 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let whole = ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first) as f64 * 1e-9;
     if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
         found.warnings.push(format!(
-            "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags and \
-             derivatives are poor behind a gap; leave it out with --start and --duration where it matters",
+            "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags \
+             and derivatives are poor after a gap; if it matters, leave it out with --start and --duration",
             counted(count, "gap", "gaps")
         ));
     }
@@ -182,14 +182,15 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
     let bad = readings.raw.len() - good.len();
     if 2 * good.len() < readings.raw.len() || good.len() < 10 {
         found.refusals.push(format!(
-            "{name}: temperature channel {channel:?} has {} readings of which {bad} are no numbers: check the thermometer and its column",
+            "{name}: temperature channel {channel:?} has {} readings of which {bad} are not numbers: check the \
+             thermometer and its column",
             readings.raw.len()
         ));
         return;
     }
     if bad > 0 {
         found.warnings.push(format!(
-            "{name}: temperature channel {channel:?}: {bad} readings are no numbers and are passed over"
+            "{name}: temperature channel {channel:?}: {bad} readings are not numbers and are skipped"
         ));
     }
     // A temperature moves slowly: from reading to reading it changes by a small share of what it does over the run.
@@ -199,8 +200,8 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
     let usual = median(&steps);
     if usual > 0.5 && usual > 0.05 * (high - low) {
         found.refusals.push(format!(
-            "{name}: temperature channel {channel:?} jumps by {usual:.3} from reading to reading, over a range of {:.3}: that is no \
-             temperature; are columns swapped in the mapping?",
+            "{name}: temperature channel {channel:?} jumps by {usual:.3} from reading to reading, over a range of \
+             {:.3}: this is not a temperature; are columns swapped in the mapping?",
             high - low
         ));
     }
@@ -219,8 +220,8 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
             (0..shown.len()).filter(|&window| (shown[window] - along).abs() > allowed).collect();
         if 2 * away.len() > shown.len() {
             return Some(format!(
-                "{}: gyro {} shows {:.3} °/s in the median, {:.3} °/s are stated along it: is --rate or --axis that of another log, \
-                 or its sign the other one?",
+                "{}: gyro {} shows {:.3} °/s in the median, {:.3} °/s are stated along it: check --rate and --axis \
+                 of this log, and the sign",
                 samples.name,
                 sensor_name(index, samples.gyros.len()),
                 median_if_any(shown).unwrap_or(f64::NAN) / 3600.0,
@@ -232,7 +233,8 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
     let (first, last) = (off.iter().min()?, off.iter().max()?);
     let time = |window: &usize| samples.time_s.get(*window).copied().unwrap_or_default();
     Some(format!(
-        "{}: the table is not at its stated {} °/s between {:.0} and {:.0} s: cut the log to where it is with --start and --duration",
+        "{}: the table is not at its stated {} °/s between {:.0} and {:.0} s: cut the log to the steady part with \
+         --start and --duration",
         samples.name,
         turning.rate_deg_per_s,
         time(first) - 0.5 * samples.window_s,
@@ -289,8 +291,9 @@ fn turned(samples: &Samples) -> Option<String> {
     let (at, angle) =
         turns.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, angle)| *angle > LARGEST_TURN_DEG)?;
     Some(format!(
-        "{}: the unit was turned {:.0} s after the beginning: the specific force turns by {angle:.1} ° there, at most \
-         {LARGEST_TURN_DEG} ° are drift. Give what is before and what is after as two runs, with --start and --duration",
+        "{}: the unit was turned {:.0} s after the beginning: the specific force turns by {angle:.1} ° there, at \
+         most {LARGEST_TURN_DEG} ° are drift. Give the parts before and after as two runs, with --start and \
+         --duration",
         samples.name,
         samples.time_s.get(at).copied().unwrap_or_default()
     ))

@@ -104,8 +104,8 @@ pub fn fit(
     if let Some(grids_s) = carry(&mut plain, &all, step_s) {
         let [stated_s, carried_s] = grids_s.map(six);
         warnings.push(format!(
-            "temperature readings come every {} s: the document's grid of {stated_s} s would hold what they do not say, and is replaced by \
-             one of {carried_s} s",
+            "temperature readings come every {} s: the document's grid of {stated_s} s is too fine, and is replaced \
+             by one of {carried_s} s",
             six(step_s)
         ));
     }

@@ -68,7 +68,7 @@ impl Found {
             return Self { terms, words, ..Self::default() };
         }
         Self::refused(&format!(
-            "nothing beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"
+            "no model beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"
         ))
     }
 
@@ -77,7 +77,7 @@ impl Found {
         // A few are the fit's own business; more are somebody's.
         if 10 * solution.outliers > solution.residual.len() {
             remarks.push(format!(
-                "{} of {} windows were left out as spikes: look at the log, something disturbs the sensor",
+                "{} of {} windows were left out as spikes: something disturbs the sensor, check the log",
                 solution.outliers,
                 solution.residual.len()
             ));

@@ -82,7 +82,7 @@ impl<'a> Joint<'a> {
         let choice = trials.choose(tried, plan, history, terms == Terms::All);
         let Some(best) = choice.best().cloned() else {
             return Ok(Found::refused(
-                "cross-validation has nothing to judge by: the log has one stretch of temperature only; run the chamber both ways",
+                "cross-validation is not possible: the log has only one temperature ramp; run the chamber both ways",
             ));
         };
         if terms == Terms::Auto && (choice.mean.is_nan() || best.score > WORTH_IT * choice.mean) {
@@ -90,8 +90,8 @@ impl<'a> Joint<'a> {
                 return Ok(Found { choice: Some(choice), ..Found::flat(&level, target.level) });
             }
             let why = format!(
-                "nothing beats its mean: the best model, {}, leaves {:.3e} on stretches that it did not see, the mean {:.3e}; the axis \
-                 follows something else than temperature",
+                "no model beats its mean: the best one, {}, leaves {:.3e} on unseen parts, the mean {:.3e}; the axis \
+                 does not follow temperature",
                 best.spec.words(),
                 best.score,
                 choice.mean

@@ -82,8 +82,8 @@ pub(super) fn histories(
         }
         if high > HOTTEST_DEG_C || low < COLDEST_DEG_C {
             warnings.push(format!(
-                "channel {name:?} goes from {low:.1} to {high:.1} °C, which few units see: is it in °F, or its conversion in the document or \
-                 the mapping another one's?"
+                "channel {name:?} goes from {low:.1} to {high:.1} °C, an unusual range: is it in °F, or its \
+                 conversion in the document or the mapping wrong?"
             ));
         }
         warnings.extend(doubts(name, &history));
@@ -103,9 +103,9 @@ fn stays(name: &str, [low, high]: [f64; 2], plain: bool) -> String {
         );
     }
     format!(
-        "temperature channel {name:?} stays between {} and {}, which are taken as °C, because nothing converts them: {needed}. Where the \
-         channel is not in °C, as with volts or counts of a thermometer, give a document with its conversion (--calibration); where it is no \
-         thermometer, name the right column in the mapping; else run the chamber",
+        "temperature channel {name:?} stays between {} and {}, taken as °C, because there is no conversion: \
+         {needed}. If the channel is in volts or counts, give a document with its conversion (--calibration); if it \
+         is not a thermometer, name the right column in the mapping; otherwise run the chamber",
         short(low),
         short(high)
     )
@@ -117,15 +117,15 @@ fn doubts(name: &str, history: &History) -> Vec<String> {
     let levels = history.levels();
     if levels < 2 {
         doubts.push(format!(
-            "channel {name:?}: {} of different temperature, 2 or more are needed to tell the static bias from what follows the change: \
-             hold the chamber at its ends until nothing drifts any more (an hour for a fibre coil)",
+            "channel {name:?}: {} of different temperature, 2 or more are needed to separate the static bias from \
+             rate terms: hold the chamber at its ends until the output settles (an hour for a fibre coil)",
             counted(levels, "plateau", "plateaus")
         ));
     }
     if !history.both_directions() {
         doubts.push(format!(
-            "channel {name:?}: the temperature goes one way only, so that what follows its change cannot be told from the static bias, \
-             and the other way is unknown: only a static bias is fitted; run the chamber both ways"
+            "channel {name:?}: the temperature goes one way only, so rate terms cannot be separated from the static \
+             bias: only a static bias is fitted; run the chamber both ways"
         ));
     }
     doubts

@@ -119,8 +119,8 @@ impl Outcome {
             troubles.extend(constant(&curves));
             let verdicts = Curve::verdicts(&curves);
             if verdicts.is_empty() {
-                let nothing = "no window of any axis is whole: the log has gaps, or its ticks are flagged throughout; look with \
-                               isotherm-replay correct";
+                let nothing = "no window of any axis is complete: the log has gaps, or all its ticks are flagged; \
+                               check with isotherm-replay correct";
                 return Err(Error::Refused([vec![nothing.to_owned()], troubles].concat()));
             }
             // Every time round there is a sensor less.
@@ -178,8 +178,8 @@ impl Outcome {
         }
         document.created = self.settings.created.or(self.base.created);
         if self.settings.removes_mean() {
-            let level = "The attitude of the unit was not stated: every fitted bias is zero in the middle of its range, and the level of \
-                         each output stays what it was.";
+            let level = "The attitude of the unit was not stated: every fitted bias is zero in the middle of its \
+                         range, and the level of each output does not change.";
             document.note = Some(match &self.base.note {
                 Some(note) if note.contains(level) => note.clone(),
                 Some(note) => format!("{note}\n{level}"),
@@ -228,9 +228,9 @@ impl Outcome {
             refused.filter(|(sensor, ..)| follows(sensor)).map(|(sensor, ..)| sensor.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             format!(
-                "{}: refused, with terms from before that follow the change of temperature; they were made with a smoothing of {} s and a \
-                 derivative step of {} s, and the document now has {} s and {} s for all sensors: what they take off is another thing. \
-                 --smoothing {} keeps the old filter",
+                "{}: refused, and keeps rate terms made with a smoothing of {} s and a derivative step of {} s, but \
+                 the document now has {} s and {} s for all sensors: they are wrong with these. Keep the old filter \
+                 with --smoothing {}",
                 names.join(", "),
                 old.smoothing_s,
                 old.derivative_step_s,
@@ -268,7 +268,7 @@ impl Outcome {
             } else {
                 verdict.accepted = true;
                 let words = match (found.flat, found.terms.is_empty()) {
-                    (true, true) if self.had_terms(sensor) => format!("{FLAT}; it has no terms any more"),
+                    (true, true) if self.had_terms(sensor) => format!("{FLAT}; its terms are removed"),
                     (true, true) => format!("{FLAT}; left unchanged"),
                     (true, false) => format!("{FLAT}; constant bias"),
                     (false, _) => found.words.clone(),
@@ -287,8 +287,8 @@ fn constant(curves: &[Curve]) -> Vec<String> {
         if !curve.temperature_deg_c.is_empty() && range < SMALLEST_RANGE_DEG_C {
             let run = &curve.run;
             let of = format!(
-                "{run}: its temperature moves by {range:.1} °C, at least {SMALLEST_RANGE_DEG_C} °C are needed to judge what follows \
-                 temperature: judge on a run through the chamber"
+                "{run}: its temperature moves by {range:.1} °C, at least {SMALLEST_RANGE_DEG_C} °C are needed for \
+                 judging: use a run through the chamber"
             );
             if words.iter().all(|other| !other.starts_with(&format!("{run}: "))) {
                 words.push(of);

@@ -38,8 +38,9 @@ pub fn share(
 pub fn doubt(share: Option<f64>) -> Option<String> {
     let share = share.filter(|share| *share > DISAGREE)?;
     Some(format!(
-        "its passes through the same temperatures disagree: a static bias of the one leaves {:.0} % of what its mean leaves on the other. A \
-         lag explains any such difference, right or wrong: judge it on another run (--judge), or make the run with a third pass",
+        "its passes through the same temperatures disagree: a static bias of one leaves {:.0} % of what its mean \
+         leaves on the other. A lag can explain any such difference, right or wrong: judge on another run \
+         (--judge), or add a third pass",
         100.0 * share
     ))
 }

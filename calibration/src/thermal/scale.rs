@@ -82,8 +82,8 @@ pub fn told(gyro: bool, inputs: &[f64], temperature: &[f64], [low, high]: [f64; 
     let enough = parts.iter().filter(|ends| spread(ends) >= limit).count();
     if enough < ENOUGH_PARTS {
         return Err(Kept::Short(format!(
-            "its runs spread its input by {} and more in {enough} of {PARTS} parts of the range of temperature only, at least \
-             {ENOUGH_PARTS} are needed: take every run through the same temperatures",
+            "its runs spread its input by {} and more in only {enough} of {PARTS} parts of the range of temperature, \
+             at least {ENOUGH_PARTS} are needed: take every run through the same temperatures",
             in_words(limit)
         )));
     }

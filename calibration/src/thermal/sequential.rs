@@ -46,8 +46,8 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
     let levels = history.levels();
     if levels < 2 {
         return Err(format!(
-            "the log has {} of different temperature, the sequential method needs 2 at which the unit has come to \
-             rest: hold the chamber until nothing drifts any more, or use --method joint",
+            "the log has {} of different temperature, the sequential method needs 2 with a settled output: hold the \
+             chamber longer, or use --method joint",
             counted(levels, "plateau", "plateaus")
         ));
     }

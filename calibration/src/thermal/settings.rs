@@ -4,7 +4,7 @@ use isotherm_protocol::document::Created;
 
 use super::stand::{Site, Stand};
 
-/// How the coefficients are found.
+/// Method of the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// 000: the static bias from the plateaus, then the rate's share, then the acceleration's, one after the other.
@@ -45,7 +45,7 @@ pub enum Terms {
 /// All of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// How the coefficients are found.
+    /// Method of the fit.
     pub method: Method,
     /// Who chooses the terms.
     pub terms: Terms,

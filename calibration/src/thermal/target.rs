@@ -39,13 +39,13 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
     };
     let rate = place.earth_rate_in_case(mean_force).ok_or_else(|| {
         Error::Refused(vec![format!(
-            "{}: the unit cannot be levelled{}. State --roll and --pitch, or have the mean taken off with --remove-mean",
+            "{}: the unit cannot be levelled{}. State --roll and --pitch, or remove the mean with --remove-mean",
             run.name,
             mean_force.map_or_else(
                 || ": it has no accelerometers".to_owned(),
                 |[x, y, z]| format!(
-                    " from its accelerometers, which feel ({x:.3}, {y:.3}, {z:.3}) m/s² in the mean: that takes one g within 2 % and an x \
-                     axis off the vertical"
+                    " from its accelerometers, with a mean of ({x:.3}, {y:.3}, {z:.3}) m/s²: it must be one g within \
+                     2 %, with x not vertical"
                 )
             )
         )])

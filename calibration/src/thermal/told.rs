@@ -36,7 +36,7 @@ impl Outcome {
         .collect();
         if !kinds.is_empty() {
             self.notes.push(format!(
-                "The scale factors stay for which there are no runs: of {}, each log with its own.",
+                "Scale factors without runs are kept: of {}, each log with its own.",
                 kinds.join(" and of ")
             ));
         }
@@ -107,7 +107,10 @@ impl Outcome {
             self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
         ));
         if self.settings.removes_mean() {
-            report.notes.push("The mean of each run is taken off: nothing is known of Earth rate and gravity along the axes.".into());
+            report.notes.push(
+                "The mean of each run is removed: Earth's rate and gravity along the axes are unknown."
+                    .into(),
+            );
         }
         for (sensor, _, found) in &self.found {
             for (term, value, sigma) in &found.terms {
@@ -136,7 +139,7 @@ const SHOWN: usize = 8;
 
 /// The best model of each kind of dynamics, by sensor: of many kinds the best ones.
 fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
-    let head = ["sensor", "model", "coefficients", "left where it was not fitted", "of the mean's", ""];
+    let head = ["sensor", "model", "coefficients", "remaining on unseen parts", "of the mean's", ""];
     let mut rows = Vec::new();
     for (sensor, _, found) in found {
         let Some(choice) = &found.choice else { continue };

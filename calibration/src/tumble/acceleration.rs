@@ -73,7 +73,8 @@ pub fn judged(
     let all: Vec<usize> = (0..poses.len()).collect();
     [0, 1, 2].map(|gyro| {
         let reading = |pose: usize| poses[pose].gyro(gyro);
-        let response = fit(poses, force, gyro, &all).ok_or("the poses do not span the directions of gravity")?;
+        let response =
+            fit(poses, force, gyro, &all).ok_or("the poses do not span the directions of gravity")?;
         let mean = Size::of(&all.iter().map(|pose| reading(*pose)).collect::<Vec<_>>()).mean;
         let about_mean: Vec<f64> = all.iter().map(|pose| reading(*pose) - mean).collect();
         let left = all.iter().filter_map(|pose| {
@@ -86,7 +87,7 @@ pub fn judged(
         // Also where it is no number.
         if share.is_nan() || share > LARGEST_SHARE {
             return Err(format!(
-                "in poses that the fit has not seen {} % of the readings' scatter are left, at most {} % is a result",
+                "in unseen poses {} % of the readings' scatter remain, at most {} % is accepted",
                 short(100.0 * share),
                 100.0 * LARGEST_SHARE
             ));

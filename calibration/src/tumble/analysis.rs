@@ -107,7 +107,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     let (after, outside) = (Size::of(&accel.residual).rms, Size::of(&held_out).rms);
     if outside > 2.0 * after {
         warnings.push(format!(
-            "|f| − g is {} m/s² rms in poses that the fit has not seen, {} in those that it has: more poses would help",
+            "|f| − g is {} m/s² rms in unseen poses, {} in fitted ones: use more poses",
             short(outside),
             short(after)
         ));
@@ -142,7 +142,7 @@ fn faults(track: &Track) -> Result<(), Vec<String>> {
     for (kind, columns) in kinds {
         if columns.len() != SENSORS {
             reasons.push(format!(
-                "the unit has {} {kind}s: |f| = g is for three; a unit with more needs `isotherm-calibrate positions` on a stand",
+                "the unit has {} {kind}s: |f| = g needs three; for more use `isotherm-calibrate positions` on a stand",
                 columns.len()
             ));
         }
@@ -164,8 +164,8 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
             "no still interval was found at all".to_owned()
         };
         reasons.push(format!(
-            "the unit must stand still for the first {} s, which say how noisy stillness is; {at}: leave it alone before the first \
-             turn, or state less with --still-start",
+            "the unit must be still for the first {} s, to measure the noise; {at}: leave it alone before the first \
+             turn, or reduce --still-start",
             settings.start_s
         ));
         reasons.extend(track.gaps());
@@ -258,10 +258,7 @@ fn at_rest(poses: &[Pose]) -> [f64; 3] {
 /// Fits the gyros to what lies between the poses.
 fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Result<GyroFit, String> {
     if track.gyro_counts {
-        return Err(
-            "the gyros put out counts: the angle of one is wanted as a start, convert them in the mapping"
-                .into(),
-        );
+        return Err("the gyro readings are counts: convert them in the mapping".into());
     }
     let transitions = transitions(poses, |pose| accel.force(&pose.outputs));
     if transitions.len() < 6 {

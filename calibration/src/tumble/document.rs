@@ -35,7 +35,7 @@ pub fn complete(document: &Document, tumble: &Tumble) -> Result<(Document, Vec<S
         accel.orientation.rows = tumble.accel.rows.iter().map(|row| row.map(tidy)).collect();
         if accel.orientation.thermal.take().is_some() {
             warnings.push(
-                "the old document's slopes of the accelerometers' axes are gone: the case axes are new ones"
+                "the old slopes of the accelerometers' axes are removed, because the case axes are new"
                     .to_owned(),
             );
         }
@@ -88,12 +88,12 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'sta
     let mean = |values: [f64; 3]| tidy(values.iter().sum::<f64>() / 3.0);
     let raw = |accel: &&mut Accel| accel.output == AccelOutput::MetresPerSecondSquared;
     let words = if given {
-        "Before is the document at hand."
+        "Before is the given document."
     } else if document.accel.as_mut().is_some_and(|accel| raw(&accel)) {
-        "Before is raw: the accelerometers' readings as they are, and the gyros' less their mean over all poses."
+        "Before is raw: the accelerometers' readings unchanged, and the gyros' less their mean over all poses."
     } else {
-        "Before is one scale factor and one zero for all accelerometers, the means of those that were found, and the gyros' readings less \
-         their mean over all poses."
+        "Before is one scale factor and one zero for all accelerometers, the means of the fitted ones, and the \
+         gyros' readings less their mean over all poses."
     };
     if let Some(accel) = document.accel.as_mut().filter(|accel| !given && !raw(accel)) {
         let (scale_unit, bias_unit) = units(accel.output);

@@ -79,8 +79,9 @@ pub fn report(
     report.verdicts.extend([accel, gyro]);
     report.warnings.clone_from(&tumble.warnings);
     report.notes.push(format!(
-        "{}, found with {} times the variance of the still start; g = {} m/s². z is the input axis of the third accelerometer, \
-         y lies in the plane of the second and third. Out of sample: each pose by a fit of all that are more than 15° away from it.",
+        "{}, detected with {} times the variance of the still start; g = {} m/s². z is the input axis of the third \
+         accelerometer, y lies in the plane of the second and third. Out of sample: each pose by a fit of all that \
+         are more than 15° away from it.",
         counted(tumble.poses.len(), "pose", "poses"),
         tumble.factor,
         six(settings.gravity)
@@ -113,8 +114,8 @@ fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64
     let left = outside.rms;
     if left.is_nan() || outside.count == 0 || left > LARGEST_LEFT_SHARE * gravity {
         return verdict.refused(format!(
-            "{} % of g are left in poses that the fit has not seen, at most {} % is a result: is one unit of measure, and one \
-             temperature, held throughout, and was the unit left alone in each pose?",
+            "{} % of g remain in unseen poses, at most {} % is accepted: were unit of measure and temperature the \
+             same throughout, and was the unit left alone in each pose?",
             short(100.0 * left / gravity),
             100.0 * LARGEST_LEFT_SHARE
         ));
@@ -125,10 +126,9 @@ fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64
     }
     // Nine coefficients cost something in poses that they were not found from; these may be what the document at hand was found from.
     match left / sizes[0].rms {
-        grown if grown > LARGEST_GROWTH => verdict.refused(
-            "the document at hand fits these poses better than what is found of them: more poses are needed",
-        ),
-        grown if grown > 1.0 + SAME_SHARE => verdict.remark("no better than the document at hand"),
+        grown if grown > LARGEST_GROWTH => verdict
+            .refused("the given document fits these poses better than the new fit: more poses are needed"),
+        grown if grown > 1.0 + SAME_SHARE => verdict.remark("no better than the given document"),
         _ => verdict,
     }
 }
@@ -200,7 +200,7 @@ fn at_rest(tumble: &Tumble) -> Option<String> {
         Err(why) => format!("{} has no acceleration-sensitive drift stated: {why}", AXES[axis]),
     };
     let gyros = tumble.acceleration.iter().enumerate().map(of).collect::<Vec<_>>();
-    Some(format!("Gyros at rest, in poses that the fit has not seen: {}.", gyros.join("; ")))
+    Some(format!("Gyros at rest, in unseen poses: {}.", gyros.join("; ")))
 }
 
 fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {

@@ -99,23 +99,20 @@ impl Coverage {
         let mut warnings = Vec::new();
         if !silent.is_empty() {
             warnings.push(format!(
-                "no readings of temperature channel {}: what follows it stood at the assumed temperature throughout; is it in the log, \
-                 under this name?",
+                "no readings of temperature channel {}: its sensors were at the assumed temperature throughout; is \
+                 it in the log, under this name?",
                 silent.join(", ")
             ));
         }
         let little: Vec<String> = self.channels.iter().filter_map(ChannelRange::covers_little).collect();
         if !little.is_empty() {
             warnings.push(format!(
-                "of the fitted range of temperature the logs cover {}: nothing is said of the rest",
+                "of the fitted range of temperature the logs cover {}: the rest is not judged",
                 little.join(", ")
             ));
         }
         let shares: [(Count, &str); 3] = [
-            (
-                |sensor| sensor.clamped,
-                "are outside the fitted range of temperature, where terms are held at its end",
-            ),
+            (|sensor| sensor.clamped, "are outside the fitted range of temperature, where terms are clamped"),
             (|sensor| sensor.stale, "are without a fresh temperature"),
             (|sensor| sensor.invalid, "are without a valid reading"),
         ];

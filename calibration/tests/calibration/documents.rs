@@ -81,7 +81,7 @@ fn diff_tells_what_has_changed() {
     assert!(verdict.contains("50.0 ± 7.1 ″ (accelerometer z); beyond 3 σ: accelerometer z"), "{verdict}");
     assert!(std::fs::read_to_string(&html).unwrap().contains("gyro x bias"));
     let same = calibrate(&["diff", &before, &before]);
-    assert!(String::from_utf8_lossy(&same.stdout).contains("state the same."));
+    assert!(String::from_utf8_lossy(&same.stdout).contains("are the same."));
     assert_eq!(calibrate(&["diff", &before, &after, "--axis-sigma", "-1"]).status.code(), Some(2));
 }
 

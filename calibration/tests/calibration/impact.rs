@@ -159,14 +159,14 @@ fn the_command_sails_stated_drifts_and_documents() {
     assert_eq!(bound["rows"][0]["median"]["radial_largest_m"], 0.0, "{said}");
     for words in [
         "of position with the estimator",
-        "Known exactly at departure",
+        "known exactly at departure",
         "the row is a bound",
         "a constant part only",
     ] {
         assert!(said.contains(words), "{said}");
     }
     for (arguments, code, words) in [
-        (vec!["impact"], 2, "say which drift"),
+        (vec!["impact"], 2, "give a drift"),
         (vec!["impact", "--trend", "nan"], 2, "--trend is NaN"),
         (vec!["impact", "--trend", "1", "--latitude", "90"], 2, "--latitude is 90, must be from -85 to 85"),
     ] {

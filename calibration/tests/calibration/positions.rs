@@ -162,10 +162,10 @@ fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
             "one repeated",
             vec![0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 2],
             13,
-            "more than once, all of them used: Z down a",
+            "repeated positions, all of them used: Z down a",
         ),
         ("another order", vec![0, 4, 2, 3, 1, 7, 5, 6, 11, 9, 10, 8], 12, ""),
-        ("six", vec![0, 2, 3, 4, 5, 6], 6, "do not tell the stand's level from the axes"),
+        ("six", vec![0, 2, 3, 4, 5, 6], 6, "do not separate the stand's level from the axes"),
     ];
     for (name, order, count, words) in cases {
         let (events, held) = stand::log(&instrument, 20.0, &plan, &order, &driven(5));
@@ -266,13 +266,13 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let few = refused(&[0, 2, 3], &driven(3), &none);
     assert!(few.contains("do not determine") || few.contains("no position has"), "{few}");
     let short = refused(&all, &Stand { hold_s: 3.0, ..driven(3) }, &none);
-    assert!(short.contains("stands still nowhere") && short.contains("--least"), "{short}");
+    assert!(short.contains("is never still") && short.contains("--least"), "{short}");
     let dead = refused(&all, &driven(3), &|track| track.outputs[1].fill(0.0));
     assert!(dead.contains("accelerometer y: one value in every tick, 0: dead"), "{dead}");
     let gaps = refused(&all, &driven(3), &|track| {
         track.outputs[2].iter_mut().step_by(20).for_each(|x| *x = f64::NAN);
     });
-    assert!(gaps.contains("are no numbers"), "{gaps}");
+    assert!(gaps.contains("are not numbers"), "{gaps}");
     let clipped = refused(&all, &driven(3), &|track| {
         track.outputs[0].iter_mut().for_each(|x| *x = x.min(3e5));
     });

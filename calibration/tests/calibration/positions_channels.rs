@@ -133,5 +133,5 @@ fn what_makes_a_judging_run_worse_leaves_the_old_document() {
     assert!(!Path::new(&out).exists());
     assert!(errors.contains("accelerometer y: rms grows from "), "{errors}");
     assert!(errors.contains("|f|−g: rms grows from "), "{errors}");
-    assert!(errors.contains("accelerometer x: ") && errors.contains("are taken as a whole"), "{errors}");
+    assert!(errors.contains("accelerometer x: ") && errors.contains("accepted as a whole"), "{errors}");
 }

@@ -44,7 +44,7 @@ fn steps_that_are_not_those_of_the_log_write_nothing() {
     )
     .unwrap();
     let turning = refused(&["--steps", &steps]);
-    assert!(turning.contains("% of the largest rate, at most 1 % are a result (χ² "), "{turning}");
+    assert!(turning.contains("% of the largest rate, at most 1 % are accepted (χ² "), "{turning}");
     // What fits is written.
     let call = ["rates", &log, "--calibration", &document, "--out", &out, "--axis", "x", "--rates", all];
     succeeds(&[&call[..], &ATTITUDE].concat());

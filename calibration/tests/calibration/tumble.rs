@@ -251,7 +251,7 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let (_, few, _) = tumbled(8, &how(5));
     assert!(refused(&few).contains("8 still poses were found, 12 are needed"), "{}", refused(&few));
     let (_, restless, _) = tumbled(20, &Stand { start_s: 0.0, ..how(6) });
-    assert!(refused(&restless).contains("must stand still for the first 30 s"), "{}", refused(&restless));
+    assert!(refused(&restless).contains("must be still for the first 30 s"), "{}", refused(&restless));
     // Turned about one level axis only.
     let instrument = mems_chamber(0).instrument;
     let wheel: Vec<Matrix3<f64>> = (0..24)
@@ -272,7 +272,7 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let clipped = changed(&|track| track.outputs[1].iter_mut().for_each(|x| *x = x.min(5.0)));
     assert!(clipped.contains("accelerometer y reads exactly 5"), "{clipped}");
     let holes = changed(&|track| track.outputs[0].iter_mut().step_by(30).for_each(|x| *x = f64::NAN));
-    assert!(holes.contains("are no numbers"), "{holes}");
+    assert!(holes.contains("are not numbers"), "{holes}");
     let four = changed(&|track| track.outputs.push(track.outputs[0].clone()));
     assert!(four.contains("isotherm-calibrate positions"), "{four}");
 }
@@ -290,7 +290,7 @@ fn gyros_that_do_not_follow_the_turns_are_refused_and_the_accelerometers_stand()
     };
     let left = |words: &str| -> f64 {
         let (_, rest) = words.split_once("miss the direction of gravity by ").unwrap();
-        rest.split_once("° rms, at most 3° is a result").unwrap().0.parse().unwrap()
+        rest.split_once("° rms, at most 3° is accepted").unwrap().0.parse().unwrap()
     };
     // At their limit in the turns: the fit is far better than before, and still none.
     let clipped =
@@ -330,7 +330,7 @@ fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
     assert!(
         one.starts_with("gyro ")
             && one.contains(" and gyro y: ")
-            && one.contains("is the unit of measure of each column"),
+            && one.contains("check the unit of measure of each column"),
         "{one}"
     );
     // A document that states it is believed.
@@ -369,9 +369,9 @@ fn a_unit_on_its_six_faces_only_does_not_state_angles() {
         track(&instrument, &(0..18).map(put).collect::<Vec<_>>(), &how(11)).0
     };
     let refused = analyse(&on_faces(0.0), &settings()).unwrap_err().join("\n");
-    assert!(refused.contains("the angle between accelerometers x and y is known to "), "{refused}");
+    assert!(refused.contains("the angle between accelerometers x and y is known only to "), "{refused}");
     assert!(
-        refused.contains("at most 0.5° is a result") && refused.contains("edges and corners too"),
+        refused.contains("at most 0.5° is accepted") && refused.contains("edges and corners too"),
         "{refused}"
     );
     let slanting = analyse(&on_faces(0.6), &settings()).unwrap();

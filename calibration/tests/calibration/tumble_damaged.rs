@@ -52,7 +52,7 @@ fn gyros_in_another_order_and_unit_are_found_and_named() {
     let said = complete(&plain, &tumble).unwrap().1;
     let [order, unit] = &said[..] else { panic!("{said:?}") };
     assert!(order.starts_with("gyros x and z look swapped, or accelerometers, and a sign"), "{order}");
-    assert!(unit.contains("as of °/s that are taken for rad/s"), "{unit}");
+    assert!(unit.contains("as for °/s taken as rad/s"), "{unit}");
     let swapped = self::said(22, &|track| track.gyros.swap(0, 1));
     assert!(
         swapped.starts_with("gyros x and y look swapped: check the columns in the mapping."),
@@ -71,10 +71,7 @@ fn accelerometers_in_another_order_or_unit_are_named() {
     let refused = complete(&plain, &flipped).unwrap_err().join("\n");
     assert!(refused.contains("is the sign of accelerometer z missing in the mapping"), "{refused}");
     let grams = said(23, &|track| times(&mut track.outputs, 1.0 / 9.81));
-    assert!(
-        grams.contains("as of readings in g that are taken for m/s²: correct the unit of measure"),
-        "{grams}"
-    );
+    assert!(grams.contains("as for readings in g taken as m/s²: correct the unit of measure"), "{grams}");
 }
 
 #[test]
@@ -138,6 +135,6 @@ fn poses_that_the_fit_has_not_seen_decide() {
         words(&worse)
     );
     let far = of(0.9, 0.1, 0.3);
-    assert!(!far[0].accepted && far[0].reason.starts_with("3.06 % of g are left"), "{}", words(&far));
+    assert!(!far[0].accepted && far[0].reason.starts_with("3.06 % of g remain"), "{}", words(&far));
     assert!(!of(0.9, 0.1, f64::NAN)[0].accepted, "no held-out fit at all");
 }

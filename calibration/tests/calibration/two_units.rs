@@ -54,7 +54,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     let of = |name: &str| Written::read(&folder.path().join(name)).unwrap().document;
     let (one, alone) = (format!("{documents}/FOG-0002.toml"), path("alone.toml"));
     let said = succeeds(&["drift", &log, "--calibration", &one, "--out", &alone]);
-    assert!(said.contains("the logs have unit FOG-0001 too, which is left alone"), "{said}");
+    assert!(said.contains("the logs also have unit FOG-0001, which is left out"), "{said}");
     assert_eq!(of("new-FOG-0002.toml").gyro, of("alone.toml").gyro);
     assert!(
         of("new-FOG-0001.toml").gyro.sensor[0].drift.is_some()
@@ -65,8 +65,8 @@ fn noise_and_drift_of_both_end_with_one_table() {
     std::fs::remove_file(&one).unwrap();
     let (code, said, errors) = words(&calibrate(&["drift", &log, "--calibration", &documents]));
     assert!(code == Some(1) && errors.contains("FOG-0002.toml is not there"), "{errors}");
-    assert!(said.contains("2 units: 3 of 3 sensors analysed, 1 of the units came to nothing."), "{said}");
-    assert!(fails(&["drift", &log, "--out", &out], 2).contains("give it with --calibration"));
+    assert!(said.contains("2 units: 3 of 3 sensors analysed, 1 of the units failed."), "{said}");
+    assert!(fails(&["drift", &log, "--out", &out], 2).contains("add --calibration"));
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn both_put_down_by_hand_end_with_one_table() {
     let accel = |name: &str| Written::read(&folder.path().join(name)).unwrap().document.accel;
     assert_eq!(accel("alone.toml"), accel("new-FOG-0002.toml"));
     let said = succeeds(&[&fit[..], &["--calibration", &alone]].concat());
-    assert!(said.contains("warning: the logs have unit FOG-0001 too, which is left alone"), "{said}");
+    assert!(said.contains("warning: the logs also have unit FOG-0001, which is left out"), "{said}");
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn both_on_a_table_are_fitted_and_one_document_takes_one() {
     assert_eq!(units(&json(&[&fit[..], &["--out", &path("new.toml")]].concat())), UNITS);
     let alone = json(&[&fit[..], &["--calibration", &path("new-FOG-0001.toml")]].concat());
     assert_eq!(alone["unit"], "FOG-0001");
-    assert!(alone["warnings"].to_string().contains("unit FOG-0002 too, which is left alone"), "{alone}");
+    assert!(alone["warnings"].to_string().contains("also have unit FOG-0002, which is left out"), "{alone}");
 }
 
 #[test]

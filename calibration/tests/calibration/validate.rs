@@ -44,7 +44,7 @@ fn a_good_document_is_accepted_and_a_bad_one_is_not() {
         assert!(verdict["words"].as_str().unwrap().ends_with("out of sample; accepted"), "{verdict}");
     }
     let html = std::fs::read_to_string(path("judge.html")).unwrap();
-    assert!(html.contains("Spectrum of what is left") && html.contains("Over temperature"));
+    assert!(html.contains("Spectrum of the residual") && html.contains("Over temperature"));
     assert_eq!(calibrate(&arguments).stdout, calibrate(&arguments).stdout, "the same bytes");
     // With the place known, the bias itself is judged.
     let place = ["--latitude", "55.75", "--heading", "30"];
@@ -84,7 +84,7 @@ fn a_log_that_the_document_was_made_from_is_in_sample() {
     assert!(report["verdict"].as_str().unwrap().contains("rms in sample; accepted"));
     assert_eq!(report["verdicts"][0]["out_of_sample"], Value::Null);
     let warnings = report["warnings"].to_string();
-    assert!(warnings.contains("known.mcap is among the logs that the document was made from"), "{warnings}");
+    assert!(warnings.contains("known.mcap is one of the logs that the document was made from"), "{warnings}");
 }
 
 #[test]
@@ -112,10 +112,7 @@ fn several_units_end_with_one_table() {
     std::fs::remove_file(path("documents/FOG-0002.toml")).unwrap();
     let (code, stdout, stderr) = words(&calibrate(&arguments));
     assert_eq!(code, Some(1));
-    assert!(
-        stdout.contains("3 units: 12 of 12 sensors accepted, 1 of the units came to nothing."),
-        "{stdout}"
-    );
+    assert!(stdout.contains("3 units: 12 of 12 sensors accepted, 1 of the units failed."), "{stdout}");
     assert!(stderr.contains("FOG-0002: no document of the folder is for unit FOG-0002"), "{stderr}");
 }
 
@@ -195,7 +192,11 @@ fn what_cannot_be_judged_is_refused_in_words() {
     let mut dead = fibre_optic(5, "FOG-0001", 600.0);
     dead.failures.push(Failure { sensor: FailingSensor::Gyro(1), at_s: 0.0, fault: Fault::Stuck });
     record(Path::new(&path("dead.mcap")), &dead);
-    refused(&["validate", &good, &path("dead.mcap")], 1, "gyro y: it does not change: the sensor is dead");
+    refused(
+        &["validate", &good, &path("dead.mcap")],
+        1,
+        "gyro y: its reading is constant: the sensor is dead",
+    );
     refused(&["validate", &good, &path("none.mcap")], 1, "none.mcap");
     refused(&["validate", &good, &path("none.csv")], 1, "none.csv");
 }
@@ -211,7 +212,7 @@ fn a_folder_that_was_fitted_is_known_whatever_is_given_of_it() {
     let known = |document: &str, log: &str| {
         let report = json(&["validate", &path(document), &path(log), "--json"]);
         let said =
-            report["warnings"].to_string().contains("is among the logs that the document was made from");
+            report["warnings"].to_string().contains("is one of the logs that the document was made from");
         assert_eq!(said, report["verdicts"][0]["out_of_sample"].is_null());
         said
     };
@@ -248,7 +249,7 @@ fn faults_of_the_log_that_judges_are_told() {
     };
     let clean = warnings("clean.mcap", &|_, event| Some(event));
     assert!(
-        !clean.contains("no numbers") && !clean.contains("gap in") && !clean.contains("reads zero"),
+        !clean.contains("not numbers") && !clean.contains("gap in") && !clean.contains("reads zero"),
         "{clean}"
     );
     let zero = warnings("zero.mcap", &|_, event| Some(gyro(event, &|tick| tick.readings[1] = 0.0)));
@@ -260,7 +261,7 @@ fn faults_of_the_log_that_judges_are_told() {
             }
         }))
     });
-    assert!(nan.contains("gyro x: 5 readings are no numbers"), "{nan}");
+    assert!(nan.contains("gyro x: 5 readings are not numbers"), "{nan}");
     let gap = warnings("gap.mcap", &|_, event| {
         let inside = matches!(&event, LogEvent::Gyro { tick, .. } if (400..480).contains(&tick.sequence));
         (!inside).then_some(event)
@@ -281,5 +282,5 @@ fn faults_of_the_log_that_judges_are_told() {
             other => other,
         })
     });
-    assert!(jumping.contains("that is no temperature; are columns swapped"), "{jumping}");
+    assert!(jumping.contains("this is not a temperature; are columns swapped"), "{jumping}");
 }

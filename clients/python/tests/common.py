@@ -48,6 +48,15 @@ def vectors() -> list[Vector]:
     ]
 
 
+def frozen(name: str) -> bytes:
+    """The frame of this name."""
+    return next(vector.frame for vector in vectors() if vector.name == name)
+
+
+#: The corrected batches that are broken, each in a way of its own.
+BROKEN = ["corrected-half", "corrected-bit", "corrected-truncated", "corrected-kind", "corrected-version-9", "corrected-claim"]
+
+
 def with_checksum(covered: bytes) -> bytes:
     """A frame of these bytes."""
     return covered + zlib.crc32(covered).to_bytes(4, "little")

@@ -11,7 +11,7 @@ import unittest
 
 import isotherm
 import numpy as np
-from common import LIMIT_S, REPLAY, ROOT, vectors, with_checksum
+from common import BROKEN, LIMIT_S, REPLAY, ROOT, frozen, vectors
 
 UNIT = "MEMS-0001"
 DOCUMENT = ROOT / f"config/calibration/{UNIT}.toml"
@@ -181,22 +181,56 @@ class Files(unittest.TestCase):
         self.assertRegex(done.stderr, "broken.wire: 3 of .* frames cannot be read")
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
+    def test_octave_reads_every_column_of_parquet_to_the_bit(self) -> None:
+        import pyarrow.parquet
+
+        path = self.folder / f"tables/{UNIT}/corrected.parquet"
+        done = self.octave(
+            f"""
+            u = isotherm('{path}');
+            for name = fieldnames(u)'
+              v = u.(name{{1}});
+              file = fopen(['column-' name{{1}}], 'w');
+              if iscell(v), fprintf(file, '%s\\n', v{{:}}); else, fwrite(file, v, class(v)); end
+              fclose(file);
+              printf('%s %s\\n', name{{1}}, class(v));
+            end
+            """
+        )
+        table = pyarrow.parquet.read_table(path)
+        classes = dict(line.split() for line in done.stdout.splitlines())
+        self.assertEqual(list(classes), table.column_names, done.stderr)
+        for name, of in classes.items():
+            expected, found = table[name], self.folder / f"column-{name}"
+            if of == "cell":
+                self.assertEqual(found.read_text(encoding="utf-8").splitlines(), [text or "" for text in expected.to_pylist()], name)
+                continue
+            numbers = np.fromfile(found, dtype={"logical": "uint8", "double": "float64"}.get(of, of))
+            self.assertEqual(len(numbers), len(table), name)
+            whole = expected.null_count == 0
+            np.testing.assert_array_equal(numbers, expected.to_numpy() if whole else expected.cast("float64").to_numpy(), name)
+
+    @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
     def test_octave_says_what_is_wrong_with_a_frame_and_a_file(self) -> None:
-        frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
-        covered = frame[:-4]
-        cases = [
-            (with_checksum(covered[:-5]), "the body ends too early"),
-            (with_checksum(b"\1" + covered[1:]), "kind 1, not 4"),
-            (with_checksum(b"\4\t" + covered[2:]), "version 9 is not known here"),
-            (frame[:-1] + bytes([frame[-1] ^ 1]), "the checksum does not fit"),
-            (with_checksum(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]), "the body ends too early"),
-        ]
+        frame = frozen("corrected")
+        reasons = {
+            "corrected-half": "the checksum does not fit",
+            "corrected-bit": "the checksum does not fit",
+            "corrected-truncated": "the body ends too early",
+            "corrected-kind": "kind 1, not 4",
+            "corrected-version-9": "version 9 is not known here",
+            "corrected-claim": "the body ends too early",
+        }
+        cases = [(frozen(name), reasons[name]) for name in BROKEN]
         for number, (broken, _) in enumerate(cases):
             entries = b"".join(len(entry).to_bytes(4, "little") + entry for entry in (frame, broken, frame))
             (self.folder / f"one-{number}.wire").write_bytes(entries)
         (self.folder / "absurd.wire").write_bytes(b"\xff" * 8)
         (self.folder / "cut.wire").write_bytes(len(frame).to_bytes(4, "little") + frame[:-3])
+        whole = (self.folder / f"tables/{UNIT}/corrected.parquet").read_bytes()
         (self.folder / "table.parquet").write_bytes(b"PAR1")
+        (self.folder / "cut.parquet").write_bytes(whole[: len(whole) // 2])
+        (self.folder / "lacking.parquet").write_bytes(whole[:4] + whole[104:])
         done = self.octave(
             """
             for k = 0:%d
@@ -204,7 +238,7 @@ class Files(unittest.TestCase):
               u = isotherm(sprintf('one-%%d.wire', k));
               printf('%%d %%s\\n', numel(u.sequence), lastwarn());
             end
-            for name = {'absurd.wire', 'cut.wire', 'table.parquet'}
+            for name = {'absurd.wire', 'cut.wire', 'table.parquet', 'cut.parquet', 'lacking.parquet'}
               try
                 isotherm(name{1});
               catch problem
@@ -215,17 +249,17 @@ class Files(unittest.TestCase):
             % (len(cases) - 1)
         )
         lines = done.stdout.splitlines()
-        self.assertEqual(len(lines), len(cases) + 3, done.stderr)
+        self.assertEqual(len(lines), len(cases) + 5, done.stderr)
         ticks = 2 * len(isotherm.CorrectedDecoder().decode(frame).ticks)
         for line, (_, words) in zip(lines, cases):
             self.assertRegex(line, f"^{ticks} .*1 of 3 frames cannot be read; the last: {words}")
-        for line, words in zip(lines[len(cases) :], ["4294967295 bytes, at most 1048576", "cut short at byte 0", "reads no Parquet"]):
+        for line, words in zip(lines[len(cases) :], ["4294967295 bytes, at most 1048576", "cut short at byte 0", *["no whole Parquet file"] * 3]):
             self.assertIn(words, line)
 
     @unittest.skipUnless(shutil.which("octave-cli"), "octave-cli not found (Debian: apt install octave)")
     def test_octave_takes_and_refuses_the_frozen_frames(self) -> None:
-        frozen = vectors()
-        for number, vector in enumerate(frozen):
+        published = vectors()
+        for number, vector in enumerate(published):
             frame = vector.frame
             (self.folder / f"frozen-{number}.wire").write_bytes(len(frame).to_bytes(4, "little") + frame)
         script = """
@@ -240,12 +274,12 @@ class Files(unittest.TestCase):
                 printf('\\n');
               end
             end
-        """ % (len(frozen) - 1)
+        """ % (len(published) - 1)
         done = self.octave(script)
         lines = done.stdout.splitlines()
-        self.assertEqual(len(lines), len(frozen), done.stderr)
+        self.assertEqual(len(lines), len(published), done.stderr)
         decoder = isotherm.CorrectedDecoder()
-        for vector, line in zip(frozen, lines):
+        for vector, line in zip(published, lines):
             with self.subTest(vector.name):
                 if vector.kind != isotherm.CORRECTED or vector.message is None:
                     self.assertRegex(line, "^refused: .* 1 of 1 frames cannot be read")

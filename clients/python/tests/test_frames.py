@@ -10,7 +10,7 @@ from typing import Any
 
 import isotherm
 import numpy as np
-from common import vectors, with_checksum
+from common import frozen, vectors, with_checksum
 
 
 def without_nan(value: Any) -> Any:
@@ -45,14 +45,15 @@ class Frames(unittest.TestCase):
             self.assertNotIn("\n", str(caught.exception))
 
     def test_refusals_say_what_is_wrong(self) -> None:
-        vector = next(vector for vector in vectors() if vector.name == "corrected")
-        frame = vector.frame
+        frame = frozen("corrected")
         cases = [
             (frame[:5], "5 bytes, must have 6"),
-            (bytes([1]) + frame[1:], "kind 1, its key promises 4"),
-            (with_checksum(bytes([4, 9]) + frame[2:-4]), "version 9, this package knows 1 to 2: update it"),
-            (frame[:-1] + bytes([frame[-1] ^ 1]), "the checksum is"),
-            (with_checksum(frame[:-5]), "ends too early"),
+            (frozen("corrected-kind"), "kind 1, its key promises 4"),
+            (frozen("corrected-version-9"), "version 9, this package knows 1 to 2: update it"),
+            (frozen("corrected-half"), "the checksum is"),
+            (frozen("corrected-bit"), "the checksum is"),
+            (frozen("corrected-truncated"), "ends too early"),
+            (frozen("corrected-claim"), "a text has 268435455 bytes"),
             (with_checksum(frame[:-4] + b"\0"), "1 bytes are left over"),
             (b"\4" * ((1 << 20) + 1), "1048577 bytes"),
         ]

@@ -15,7 +15,7 @@ from unittest import mock
 
 import isotherm
 import numpy as np
-from common import LIMIT_S, REPLAY, ROOT, Service, vectors
+from common import LIMIT_S, REPLAY, ROOT, Service, frozen
 
 CLIENTS = ROOT / "clients"
 C_PROGRAM = """
@@ -72,7 +72,7 @@ class FiveLines(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("cc"), "cc not found (Debian: apt install gcc)")
     def test_of_c_navigate_by_a_frozen_frame(self) -> None:
-        frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
+        frame = frozen("corrected")
         with tempfile.TemporaryDirectory() as folder:
             source, program = pathlib.Path(folder, "five.c"), pathlib.Path(folder, "five")
             source.write_text(C_PROGRAM % textwrap.indent(lines("c"), "    "), encoding="utf-8")

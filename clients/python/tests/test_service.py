@@ -9,7 +9,7 @@ from typing import Any
 import isotherm
 import numpy as np
 import zenoh
-from common import LIMIT_S, ROOT, Service, vectors, with_checksum
+from common import BROKEN, LIMIT_S, ROOT, Service, frozen
 
 UNIT = "PY-0001"
 PERIOD_NS = 5_000_000
@@ -76,20 +76,7 @@ class OneService(unittest.TestCase):
 
     def test_frames_that_cannot_be_read_are_counted_and_the_stream_goes_on(self) -> None:
         stream = self.bus.corrected(UNIT, timeout_s=LIMIT_S)
-        frame = next(vector.frame for vector in vectors() if vector.name == "corrected")
-        covered = frame[:-4]
-        broken = [
-            b"",
-            frame[: len(frame) // 2],
-            # The checksum does not fit.
-            frame[:20] + bytes([frame[20] ^ 1]) + frame[21:],
-            # A newer version.
-            with_checksum(b"\4\t" + covered[2:]),
-            # A unit's name of 2^28 - 1 bytes.
-            with_checksum(covered[:2] + b"\xff\xff\xff\x7f" + covered[3:]),
-            # Another kind.
-            with_checksum(b"\1" + covered[1:]),
-        ]
+        broken = [b"", *map(frozen, BROKEN)]
         # From another session: it takes the way of every frame.
         with isotherm.connect(self.service.endpoint, timeout_s=LIMIT_S) as other:
             for frame in broken:
@@ -104,7 +91,7 @@ class OneService(unittest.TestCase):
         produce(self.bus, 50)
         self.assertEqual(len(receive(stream, 50)), 50)
         self.assertEqual(stream.refused, len(broken))
-        self.assertRegex(stream.last_refusal or "", f"imu/{UNIT}/corrected: the frame is of kind 1")
+        self.assertRegex(stream.last_refusal or "", f"imu/{UNIT}/corrected: a text has 268435455 bytes")
 
     def test_a_callback_has_its_own_thread_and_a_slow_one_drops_the_oldest(self) -> None:
         seen: list[int] = []

@@ -91,7 +91,7 @@ pub enum DefectKind {
         channels: usize,
     },
     /// Two things of one name.
-    #[error("is the name of {of} {other} too: names must differ")]
+    #[error("is also the name of {of} {other}: names must differ")]
     DuplicateName {
         /// What the earlier one is.
         of: &'static str,
@@ -100,7 +100,8 @@ pub enum DefectKind {
     },
     /// Correlations that no numbers can have.
     #[error(
-        "is no correlation of as many σ: it must be symmetric, have 1 in its diagonal, and make no variance negative"
+        "is not a correlation matrix of these σ: it must be symmetric, with 1 in its diagonal and no negative \
+         variance"
     )]
     NoCovariance,
     /// A name without a letter.
@@ -113,7 +114,7 @@ pub enum DefectKind {
         at: f64,
     },
     /// A term that works on counts, for gyros with another output.
-    #[error("needs gyros whose output is counts")]
+    #[error("needs gyros with output = \"counts\"")]
     NeedsCounts,
     /// Needed because another part is there.
     #[error("is missing: {needed_by} needs it")]

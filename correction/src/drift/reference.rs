@@ -61,10 +61,10 @@ pub enum ReferenceRefusal {
         max_s: f64,
     },
     /// Too many wait already, and this one lies furthest in the future.
-    #[error("{MAX_WAITING_REFERENCES} references wait already, all of earlier time")]
+    #[error("{MAX_WAITING_REFERENCES} earlier references are already waiting")]
     TooMany,
     /// The span begins before the readings that are kept.
-    #[error("the readings at the start of the span are no longer kept, or never came")]
+    #[error("the readings at the start of the span are no longer kept, or were never received")]
     TooOld,
     /// The span begins before the end of the last one used.
     #[error("the span begins before the end of the last one used")]

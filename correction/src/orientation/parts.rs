@@ -157,7 +157,7 @@ pub enum OrientationError {
         got: f64,
     },
     /// A parity limit without ticks to confirm it.
-    #[error("parity is to be confirmed by 0 ticks; at least 1 is needed")]
+    #[error("parity is confirmed by 0 ticks; at least 1 is needed")]
     ParityConfirm,
 }
 

@@ -88,12 +88,10 @@ pub enum Refusal {
     #[error("{0}")]
     Moved(Moved),
     /// Whether the unit stood still could not be seen.
-    #[error("too little was seen to say that the unit stood still")]
+    #[error("too few ticks to judge whether the unit was still")]
     RestNotSeen,
     /// The temperature of a gyro, or of the gyros' axes, left the range that the calibration was fitted over.
-    #[error(
-        "gyro {gyro} at {temperature_deg_c:.2} °C is outside the temperatures that its calibration was fitted over"
-    )]
+    #[error("gyro {gyro} at {temperature_deg_c:.2} °C is outside the temperatures of its calibration")]
     TemperatureOutOfRange {
         /// Index of the gyro.
         gyro: usize,
@@ -101,7 +99,7 @@ pub enum Refusal {
         temperature_deg_c: f64,
     },
     /// The producer started anew.
-    #[error("the producer restarted: begin again")]
+    #[error("the producer restarted: start again")]
     Restarted,
     /// The stream ended before its time.
     #[error("it ended after {:.1} s, {:.1} s are needed", elapsed.as_s(), duration.as_s())]
@@ -188,8 +186,8 @@ fn of_mode(mode: Option<LasingMode>) -> &'static str {
 
 /// What a mean force lacks for levelling.
 fn not_levelled(mean_force: Option<[f64; 3]>) -> String {
-    let Some([x, y, z]) = mean_force else { return ": no accelerometer tick came".into() };
+    let Some([x, y, z]) = mean_force else { return ": no accelerometer ticks".into() };
     format!(
-        " from its mean force of {x:.3}, {y:.3}, {z:.3} m/s²: within 2 % of 9.807 is needed, and x not vertical"
+        " from its mean force of {x:.3}, {y:.3}, {z:.3} m/s²: it must be within 2 % of 9.807, with x not vertical"
     )
 }

@@ -356,7 +356,7 @@ fn happened(tick: &LogTick, before: &mut Option<Known>, event: &mut Option<Strin
         None => what.push(format!("the log's first tick, revision {}", now.revision)),
         Some(last) => {
             if last.revision != now.revision {
-                what.push(format!("revision {} came into force behind {}", now.revision, last.revision));
+                what.push(format!("revision {} came into force after {}", now.revision, last.revision));
             }
             if last.mode != now.mode {
                 what.push(format!("the mode went from {} to {}", mode(last.mode), mode(now.mode)));

@@ -234,7 +234,7 @@ fn read_frame(bytes: &mut impl BufRead, frame: &mut Vec<u8>) -> io::Result<Optio
     }
     frame.clear();
     if bytes.take(u64::from(length)).read_to_end(frame)? < length as usize {
-        return Err(other("it ends in the middle of a frame".to_owned()));
+        return Err(other("it ends within a frame".to_owned()));
     }
     codec::decode(frame).map(Some).map_err(|error| other(error.to_string()))
 }

@@ -69,7 +69,7 @@ fn the_first_tick_that_differs_by_one_bit_is_named_with_what_happened_before() {
     let Some(Equivalent::DegPerH(rate)) = field.equivalent else { panic!("{field:?}") };
     let expected = (5.684_341_886_080_802e-14_f64 / 0.005).to_degrees() * 3600.0;
     assert!((rate - expected).abs() < 1e-9 * expected, "{rate} {expected}");
-    assert_eq!(first.event_a.tick.as_deref(), Some("tick 6: revision 2 came into force behind 1"));
+    assert_eq!(first.event_a.tick.as_deref(), Some("tick 6: revision 2 came into force after 1"));
     assert_eq!((account.angle[1].sequence, account.velocity[2].sequence), (1200, 1500));
     assert!((account.velocity[2].equivalent - 1e-3 / 0.005 / 9.80665 * 1e3).abs() < 1e-9);
 }

@@ -9,8 +9,8 @@ use super::layout::{self, Found};
 use super::names::{Kind, Meaning, meaning};
 use super::written::{FileText, Sensors, Temperature, Time, name_line};
 use super::{Hints, Proposal, Question, refuse};
-use crate::convert::raw_text::RawColumns;
 use crate::error::Error;
+use crate::streams::raw_text::RawColumns;
 
 /// Standard gravity in the units that an accelerometer may have.
 const GRAVITY: [(&str, f64); 3] = [("m_per_s2", 9.80665), ("g", 1.0), ("mg", 1000.0)];
@@ -47,12 +47,12 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         let first = paths.first().map_or(Path::new("the log"), AsRef::as_ref);
         return Err(refuse(
             first,
-            "has no columns of three gyros that can be told by their names: say which they are with --columns",
+            "has no three gyro columns with known names: name the columns with --columns",
         ));
     }
     let notes: Vec<_> = proposal.notes.iter().map(|note| format!("#   {note}\n")).collect();
     proposal.mapping = format!(
-        "# Proposed by `isotherm-replay import` for {}; look it over.\n{}version = 1\n{}",
+        "# Proposed by `isotherm-replay import` for {}; please check.\n{}version = 1\n{}",
         names.join(", "),
         notes.concat(),
         proposal.mapping
@@ -182,9 +182,7 @@ impl<'a> File<'a> {
         }
         let headed = |name: &str| self.found.header.iter().flatten().any(|have| have == name);
         if headed("PacketCounter") && headed("Gyr_X") && !first.increment {
-            proposal.notes.push(format!(
-                "{kind}: the header is that of Xsens' MT Manager, which writes rad/s and m/s²"
-            ));
+            proposal.notes.push(format!("{kind}: header of Xsens' MT Manager, which writes rad/s and m/s²"));
             return if kind == "gyro" { "rad_per_s" } else { "m_per_s2" }.to_owned();
         }
         if kind == "accel"
@@ -193,7 +191,7 @@ impl<'a> File<'a> {
             && let Some(size) = usual_size(self.found, three)
             && let Some((unit, _)) = GRAVITY.iter().find(|(_, g)| (size / g - 1.0).abs() < 0.1)
         {
-            proposal.notes.push(format!("accel: the unit is told by its size at the beginning, {size:.4}"));
+            proposal.notes.push(format!("accel: unit from the size at the beginning, {size:.4}"));
             return (*unit).to_owned();
         }
         let largest = columns.iter().filter_map(|column| self.figures.columns.get(*column));
@@ -219,7 +217,7 @@ impl<'a> File<'a> {
             proposal.notes.push(match column.steps.back {
                 0 => format!("counter: {name} grows by {}, not by one: not used", column.steps.usual),
                 back => {
-                    format!("counter: {name} begins anew {back} times (up to {}): not used", column.maximum)
+                    format!("counter: {name} restarts {back} times (up to {}): not used", column.maximum)
                 }
             });
         }

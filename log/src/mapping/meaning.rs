@@ -36,7 +36,7 @@ fn mapping(r: &mut Reader<'_>, keys: MappingKeys) -> Mapping {
     if gyros != 1 {
         r.report(
             "file",
-            format!("{gyros} of the files have a [file.gyro], must be exactly one: gyro ticks lead the log"),
+            format!("{gyros} of the files have a [file.gyro], must be exactly one: gyro ticks set the pace of the log"),
         );
     }
     if files.iter().filter(|file| file.accel.is_some()).count() > 1 {
@@ -45,7 +45,7 @@ fn mapping(r: &mut Reader<'_>, keys: MappingKeys) -> Mapping {
     let channels: Vec<_> = files.iter().flat_map(|file| &file.temperatures).map(|t| t.channel).collect();
     for (index, channel) in channels.iter().enumerate() {
         if channels.iter().take(index).any(|earlier| earlier == channel) {
-            r.report("file", format!("temperature channel {channel:?} is there twice"));
+            r.report("file", format!("temperature channel {channel:?} is given twice"));
         }
     }
     Mapping { files }
@@ -55,7 +55,7 @@ fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
     let FileKeys { name, encoding, delimiter, comment, skip_lines, header, drop_rows, on_bad_row, .. } = keys;
     let decimal_mark = if keys.decimal_mark == DecimalMark::Comma { b',' } else { b'.' };
     if delimiter == Delimiter::Character(decimal_mark) {
-        let why = "is also the delimiter: cells could not be told apart";
+        let why = "is also the delimiter: choose another";
         r.report(&join(path, "decimal_mark"), why);
     }
     let layout =
@@ -82,10 +82,7 @@ fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
     let empties =
         ticks.map(|ticks| ticks.may_be_empty).chain(file.temperatures.iter().map(|t| t.may_be_empty));
     if delimiter == Delimiter::Whitespace && empties.into_iter().any(|may| may) {
-        r.report(
-            path,
-            "may_be_empty needs cells that can be empty: with whitespace between them, they cannot",
-        );
+        r.report(path, "may_be_empty needs a delimiter other than whitespace");
     }
     file
 }
@@ -104,7 +101,7 @@ fn time(r: &mut Reader<'_>, path: &str, keys: TimeKeys, own_durations: bool) -> 
     for key in ["unit", "marks", "duration", "gap_after_ticks"] {
         let at = join(path, key);
         if !stamped && r.has(&at) {
-            r.report(&at, "has a meaning only with a time column: add `column`, or remove this key");
+            r.report(&at, "needs a time column: add `column`, or remove this key");
         }
     }
     if tick.is_none() && !(stamped && own_durations && gap_after_ticks.is_none()) {
@@ -137,7 +134,7 @@ fn nominal(r: &mut Reader<'_>, path: &str, keys: &TimeKeys) -> Option<Span> {
         let Some(nanoseconds) = stated.map(|stated| stated * ns) else { continue };
         let at = join(path, key);
         if tick.is_some() {
-            r.report(&at, "states the tick a second time: keep one of tick_ns, tick_us, tick_ms, tick_s");
+            r.report(&at, "gives the tick again: keep one of tick_ns, tick_us, tick_ms, tick_s");
         }
         if !(1.0..=LONGEST_TICK_NS).contains(&nanoseconds) {
             r.report(&at, "must be 1 ns to 1 h");
@@ -160,7 +157,7 @@ fn gyro(r: &mut Reader<'_>, path: &str, keys: GyroKeys) -> GyroMapping {
     let [mode, meander] = [("mode", keys.mode), ("meander", keys.meander)].map(|(key, mode)| {
         let mode = mode.map(ModeMapping::trimmed);
         if mode.as_ref().is_some_and(|mode| mode.plus == mode.minus) {
-            let why = "is the same as `plus`: the two states could not be told apart";
+            let why = "is the same as `plus`: they must differ";
             r.report(&join(&join(path, key), "minus"), why);
         }
         mode
@@ -260,7 +257,11 @@ fn sensors<U: SensorUnit>(
             }
             for (key, stated) in [("scale", keys.scale), ("mid_scale", keys.mid_scale)] {
                 if stated.is_some() {
-                    r.report(&join(&at, key), "counts are passed on exactly as they stand: leave this key out, the scale is in the calibration document");
+                    r.report(
+                        &join(&at, key),
+                        "counts are passed on unchanged: remove this key, the scale is in the \
+                                               calibration document",
+                    );
                 }
             }
         } else if known && keys.unit.is_none() {
@@ -292,7 +293,7 @@ fn switch(r: &mut Reader<'_>, path: &str, keys: SwitchKeys, has_mode: bool) -> O
         (Some(column), None) => Some(SwitchMapping::Column(column)),
         (None, Some(_)) => {
             if !has_mode {
-                r.report(&join(path, "from"), "needs the `mode` column beside it");
+                r.report(&join(path, "from"), "needs the `mode` column too");
             }
             Some(SwitchMapping::ModeChange)
         }
@@ -305,7 +306,7 @@ fn switch(r: &mut Reader<'_>, path: &str, keys: SwitchKeys, has_mode: bool) -> O
 
 fn status(r: &mut Reader<'_>, path: &str, keys: StatusMapping) -> StatusMapping {
     if keys.good.is_empty() == keys.bad_bits.is_none() {
-        r.report(path, "must have either `good = [\"0\"]`, the cells of rows that hold, or `bad_bits = 3`");
+        r.report(path, "must have either `good = [\"0\"]`, the cells of valid rows, or `bad_bits = 3`");
     }
     StatusMapping { good: keys.good.iter().map(|cell| cell.trim().to_owned()).collect(), ..keys }
 }

@@ -89,7 +89,7 @@ impl Drawing {
             };
         each("rate", "about", "°/h", 150, parts.rates, &mut panels);
         series(&mut panels, "difference of rates".to_owned(), "°/h", 110, rates);
-        series(&mut panels, "difference of angles, added up".to_owned(), "″", 110, angles);
+        series(&mut panels, "accumulated difference of angles".to_owned(), "″", 110, angles);
         each("specific force", "along", "m/s²", 110, parts.forces, &mut panels);
         series(&mut panels, "difference of specific forces".to_owned(), "m/s²", 110, forces);
         for (title, unit, curves) in parts.unplaced {
@@ -101,8 +101,8 @@ impl Drawing {
         let of = if self.both { "A and B" } else { "the log" };
         Chart {
             caption: format!(
-                "Unit {unit} in {of}. Bands reach from the smallest to the largest value of what falls into a column, the line \
-                 is the mean. Raw is what the readings give with nominal scale factors alone, along the input axes."
+                "Unit {unit} in {of}. Bands reach from the smallest to the largest value in a column, the line is \
+                 the mean. Raw: readings with nominal scale factors, along the input axes."
             ),
             x: Axis::of("time", "s"),
             panels,

@@ -259,7 +259,7 @@ impl UnitPlot {
                 self.happen(at_ns, "command", words, Ink::Third);
             }
             JournalEvent::Began { .. } if self.clock.now().is_some() => {
-                self.happen(at_ns, "unit began anew", "the service's unit began anew".to_owned(), Ink::Alert);
+                self.happen(at_ns, "unit restarted", "the service restarted the unit".to_owned(), Ink::Alert);
             }
             JournalEvent::Ended => {
                 self.happen(at_ns, "service stopped", "the service stopped".to_owned(), Ink::Alert);

@@ -21,7 +21,7 @@ pub(super) fn create(path: &Path, overwrite: bool) -> Result<File, Error> {
         options.create_new(true)
     };
     let file = options.open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::AlreadyExists => failed(io::Error::other("it is there already")),
+        io::ErrorKind::AlreadyExists => failed(io::Error::other("it exists already")),
         _ => failed(source),
     })?;
     match file.try_lock() {

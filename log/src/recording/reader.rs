@@ -304,7 +304,7 @@ fn stop(error: McapError) -> Stop {
         McapError::Io(source) => Stop::Io(source),
         McapError::UnexpectedEof => Stop::Damaged("ends in the middle".to_owned()),
         other => Stop::Damaged(format!(
-            "is damaged from here on: {other}; `isotherm-replay recover` gets back what is whole behind it"
+            "is damaged from here on: {other}; `isotherm-replay recover` restores what is intact after it"
         )),
     }
 }

@@ -135,7 +135,7 @@ impl Recovery {
         if report.chunks + report.attachments + report.metadata == 0 && !self.begins_well {
             // What was written holds nothing.
             let _ = std::fs::remove_file(output);
-            let source = std::io::Error::other("nothing in it is whole, or it is no recording");
+            let source = std::io::Error::other("nothing in it is intact, or it is not a recording");
             return Err(Error::file(&self.input, "recover the recording", source));
         }
         Ok(report)

@@ -15,14 +15,14 @@ fn event_words(event: &JournalEvent) -> String {
     match event {
         JournalEvent::Began { highest_revision: 0, .. } => "the unit began".to_owned(),
         JournalEvent::Began { highest_revision, .. } => {
-            format!("the unit began, behind revision {highest_revision}")
+            format!("the unit began, after revision {highest_revision}")
         }
         JournalEvent::Memory { memory, .. } => format!("memory of the service, {} bytes", memory.len()),
         JournalEvent::Changed { revision, at, slew_ns, overlay, source, .. } => {
             let when = match at {
                 Schedule::NextTick => "from the next tick on".to_owned(),
                 Schedule::Sequence(sequence) => format!("from tick {sequence} on"),
-                Schedule::TimeNs(time_ns) => format!("from the tick on that ends at {time_ns} ns"),
+                Schedule::TimeNs(time_ns) => format!("from the tick that ends at {time_ns} ns on"),
             };
             let slewed = match slew_ns {
                 0 => String::new(),

@@ -44,7 +44,8 @@ pub enum Reason {
         cells: usize,
     },
     /// The row goes on behind the last column.
-    #[error("is too much, {} has only {columns} columns{}", if *.named { "the header" } else { "the first row" }, if *.commas { ": decimal commas between commas cannot be told apart" } else { "" })]
+    #[error("is one too many, {} has only {columns} columns{}", if *.named { "the header" } else { "the first row" }, if *.commas { ": \
+        decimal commas and comma delimiters cannot be combined" } else { "" })]
     TooManyCells {
         /// How many columns there are.
         columns: usize,
@@ -72,19 +73,19 @@ pub enum Reason {
     #[error("is not a time that fits 64 bits of nanoseconds")]
     NotATime,
     /// Neither date nor time.
-    #[error("is no date and time of ISO 8601, such as 2026-11-23T14:05:00.250Z")]
+    #[error("is not a date and time of ISO 8601, such as 2026-11-23T14:05:00.250Z")]
     NotADateTime,
     /// A status word that is none.
-    #[error("is no status word, a whole number from 0 (hexadecimal with 0x)")]
+    #[error("is not a status word, a whole number from 0 (hexadecimal with 0x)")]
     NotAWord,
     /// A row that does not hold by its status.
-    #[error("is not the status of a row that holds")]
+    #[error("is not the status of a valid row")]
     BadStatus,
     /// A duration below zero.
     #[error("is a duration below 0")]
     NegativeDuration,
     /// The time does not increase.
-    #[error("is not after the row before it, {previous_ns} ns: time stands still or goes back")]
+    #[error("is not after the row before it, {previous_ns} ns: time must increase")]
     TimeNotIncreasing {
         /// Time of the row before (ns).
         previous_ns: i64,
@@ -109,7 +110,7 @@ pub enum Reason {
         minus: String,
     },
     /// A quoted cell that does not end on its line.
-    #[error("opens a quote that does not end on this line")]
+    #[error("opens a quote that is not closed on this line")]
     OpenQuote,
     /// A line that no text log has.
     #[error("line is longer than {limit} bytes: is this a text log?")]
@@ -148,7 +149,7 @@ pub enum Reason {
     #[error("is UTF-16 text: save it as UTF-8")]
     Utf16,
     /// A compressed file ends in the middle.
-    #[error("the compressed file ends in the middle")]
+    #[error("the compressed file is cut short")]
     CutShort,
     /// The file cannot be read on.
     #[error("cannot read on: {0}")]
@@ -192,9 +193,9 @@ impl LogFault {
     /// What to do.
     fn advice(&self) -> &'static str {
         match self.reason {
-            Reason::CutShort => "; to use what there is, set on_bad_row = \"skip\" in the mapping",
+            Reason::CutShort => "; to use the rest, set on_bad_row = \"skip\" in the mapping",
             ref reason if reason.concerns_one_row() => {
-                "; correct the row, or set on_bad_row = \"skip\" in the mapping to pass over such rows and count them"
+                "; correct the row, or set on_bad_row = \"skip\" in the mapping to skip and count such rows"
             }
             _ => "",
         }

@@ -126,11 +126,18 @@ fn broken_rows_are_refused_with_line_column_cell_and_value() {
         ("not a number", "20,1.5.2,7,20\n", 2, 4, 2, "\"1.5.2\" is not a number"),
         ("a decimal comma", "20;1,5;7;20\n", 2, 4, 2, "decimal_mark"),
         ("not a time", "2o,1,7,20\n", 2, 1, 1, "\"2o\" is not a time"),
-        ("time stands still", "10,1,7,20\n", 2, 1, 1, "time stands still or goes back"),
+        ("time must increase", "10,1,7,20\n", 2, 1, 1, "time must increase"),
         ("time goes back", "9,1,7,20\n", 2, 1, 1, "10000000 ns"),
         ("bad temperature", "20,1,7,warm\n", 2, 8, 4, "\"warm\" is not a number"),
         ("an open quote", "20,\"1,7,20\n", 2, 4, 2, "opens a quote"),
-        ("decimal commas between commas", "20,1,5,7,20\n", 2, 10, 5, "decimal commas between commas"),
+        (
+            "decimal commas and comma delimiters",
+            "20,1,5,7,20\n",
+            2,
+            10,
+            5,
+            "decimal commas and comma delimiters",
+        ),
         ("a gap that nobody announced", "2010,1,7,20\n", 2, 1, 1, "2 s after the row before it, 200 nominal"),
         ("a step of eleven ticks", "120,1,7,20\n", 2, 1, 1, "11 nominal ticks"),
         ("line ends of Windows", "20,x,7,20\r\n", 2, 4, 2, "\"x\" is not a number"),
@@ -157,7 +164,7 @@ fn date_times_are_stamps_to_the_nanosecond() {
     assert_eq!(found[1].1 - found[0].1, 11);
     assert_eq!(found[1].2, 11, "measured");
     let fault = error(&mapping("delimiter = \"semicolon\"", time), b"23.11.2026 14:05;1;2;20\n");
-    assert!(fault.to_string().contains("is no date and time of ISO 8601"), "{fault}");
+    assert!(fault.to_string().contains("is not a date and time of ISO 8601"), "{fault}");
     let text = "version = 1\n[[file]]\ndelimiter = \"comma\"\n[file.time]\ntick_ms = 1\n[file.gyro]\noutput = \"counts\"\n\
                 sensors = [{ column = 2 }]\nduration_column = 1\nduration_unit = \"iso\"\n";
     let problems = Mapping::parse(text, "m.toml").unwrap_err();
@@ -182,7 +189,7 @@ fn rows_that_do_not_hold_by_their_status_are_passed_over() {
     let bits = with("bad_bits = 4").unwrap();
     let (events, _) = read(&bits, b"10,1,0\n20,x,6\n30,3,3\n40,4,0x1\n");
     assert_eq!(gyro(&events).iter().map(|tick| tick.0).collect::<Vec<_>>(), [0, 2, 3]);
-    assert!(error(&bits, b"10,1,fine\n").to_string().contains("is no status word"));
+    assert!(error(&bits, b"10,1,fine\n").to_string().contains("is not a status word"));
     for wrong in ["", "good = [\"0\"]\nbad_bits = 1", "bad_bits = 0"] {
         assert!(with(wrong).is_err(), "{wrong}");
     }
@@ -237,7 +244,7 @@ fn surplus_cells_are_refused_unless_they_are_empty() {
     let fault = error(&header, b"t,x,y,T\n10,1,7,20,\n20,2,7,20,,5\n");
     assert_eq!((fault.line, fault.column), (3, 12), "{fault}");
     assert!(
-        fault.to_string().contains("column 6: \"5\" is too much, the header has only 4 columns"),
+        fault.to_string().contains("column 6: \"5\" is one too many, the header has only 4 columns"),
         "{fault}"
     );
     let spaces = mapping("delimiter = \"whitespace\"", STAMPS);
@@ -291,9 +298,7 @@ fn a_compressed_log_that_ends_in_the_middle() {
     gzip.write_all(rows.as_bytes()).unwrap();
     let whole = gzip.finish().unwrap();
     let half = &whole[..whole.len() / 2];
-    assert!(
-        error(&mapping("delimiter = \"comma\"", STAMPS), half).to_string().contains("ends in the middle")
-    );
+    assert!(error(&mapping("delimiter = \"comma\"", STAMPS), half).to_string().contains("is cut short"));
     let skip = mapping("delimiter = \"comma\"\non_bad_row = \"skip\"", STAMPS);
     let (events, report) = read(&skip, half);
     assert!(report.cut_short && report.lost_data() && events.len() > 100);
@@ -371,7 +376,7 @@ fn a_last_row_that_is_cut_off_is_said_to_be() {
         );
     }
     let words = error(&mapping, b"10,1,7,20\n10,1,7,20\n").to_string();
-    assert!(words.contains("time stands still") && !words.contains("cut off"), "{words}");
+    assert!(words.contains("time must increase") && !words.contains("cut off"), "{words}");
 }
 
 /// A mapping of one file with modes, increments and half periods.

@@ -144,7 +144,7 @@ mod state {
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<State, D::Error> {
         let name = String::deserialize(deserializer)?;
-        State::from_name(&name).ok_or_else(|| D::Error::custom(format!("{name:?} is no state of a unit")))
+        State::from_name(&name).ok_or_else(|| D::Error::custom(format!("{name:?} is not a state of a unit")))
     }
 }
 

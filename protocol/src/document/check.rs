@@ -26,7 +26,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
         gyro(r, &element("gyro.sensor", i), sensor, channels);
         if sensor.acceleration_sensitive_drift.is_some() && document.accel.is_none() {
             let path = join(&element("gyro.sensor", i), "acceleration_sensitive_drift");
-            r.refuse(&path, "needs the specific force, but there is no [accel]: add it, or leave this out");
+            r.refuse(&path, "needs the specific force, but there is no [accel]: add it, or remove this");
         }
         terms(r, &element("gyro.sensor", i), &sensor.terms(), document.temperature.filter.as_ref());
         regressors(r, &element("gyro.sensor", i), &sensor.terms(), document, channels);
@@ -46,7 +46,7 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     if document.mode_reversal.as_ref().is_some_and(|reversal| reversal.transition_s.is_some()) {
         let key = "mode_reversal.transition_ticks";
         if r.has(key) {
-            r.refuse(key, "says the same as `transition_s`: give one of the two");
+            r.refuse(key, "duplicates `transition_s`: give one of the two");
         }
     }
     if let Some(section) = &document.self_test {
@@ -60,7 +60,7 @@ fn names<'n>(r: &mut Reader<'_>, sensors: &str, names: impl Iterator<Item = &'n 
     for (i, name) in names.enumerate() {
         if let Some(earlier) = seen.insert(name, i) {
             let path = join(&element(sensors, i), "name");
-            r.refuse(&path, format!("is {name:?}, the name of {sensors}[{earlier}] too: names must differ"));
+            r.refuse(&path, format!("is {name:?}, also the name of {sensors}[{earlier}]: names must differ"));
         }
     }
 }
@@ -75,7 +75,7 @@ fn self_test_names(r: &mut Reader<'_>, self_test: &SelfTest) {
         if let Some(earlier) = voltages.clone().position(|voltage| voltage == name) {
             let path = join(&element("self_test.counter", i), "name");
             let voltage = element("self_test.voltage", earlier);
-            r.refuse(&path, format!("is {name:?}, the name of {voltage} too: names must differ"));
+            r.refuse(&path, format!("is {name:?}, also the name of {voltage}: names must differ"));
         }
     }
 }
@@ -96,7 +96,7 @@ fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<
         && !channels.contains(&name)
     {
         let known = if channels.is_empty() { "none".into() } else { channels.join(", ") };
-        r.refuse(path, format!("is {name:?}, which is no temperature channel; the channels are: {known}"));
+        r.refuse(path, format!("is {name:?}, not a temperature channel; the channels are: {known}"));
     }
 }
 
@@ -157,7 +157,7 @@ fn regressors(
                 let known = all.collect::<Vec<_>>().join(", ");
                 let known = if known.is_empty() { "none" } else { &known };
                 let path = format!("{path}.{key}.{part}");
-                r.refuse(&path, format!("is {name:?}, which is no channel; the channels are: {known}"));
+                r.refuse(&path, format!("is {name:?}, not a channel; the channels are: {known}"));
             }
         }
         if let (Some(of), Some(other)) = (unit(stated.channel), stated.minus.and_then(unit))
@@ -208,7 +208,7 @@ fn one_argument(
         let (first, second) = (first.symbol(), second.symbol());
         r.refuse(
             braking_path,
-            format!("is over {second}, but run_up is over {first}: both must have one argument"),
+            format!("is over {second}, but run_up is over {first}: both must have the same argument"),
         );
     }
 }

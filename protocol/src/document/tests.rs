@@ -127,7 +127,7 @@ fn units_become_si() {
 fn doubts_are_warnings() {
     for (from, to, key, message) in [
         ("smoothing_s = 20.0", "smoothing_s = 20.4", "temperature.filter.smoothing_s", "20 s is used"),
-        ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", which no sensor"),
+        ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", followed by no sensor"),
         ("channel = \"coil\"\n", "", "gyro.sensor[3].lag", "has no effect"),
         (
             "range_deg_c = [-65.0, 110.0]",
@@ -157,7 +157,7 @@ fn bytes_that_are_no_text_are_placed() {
     let line = FULL[..at].matches('\n').count() + 1;
     assert_eq!(
         listed(&problems),
-        format!("{line}:9: is not UTF-8 at byte {}: save the document as UTF-8", at + 8)
+        format!("{line}:9: is not UTF-8 at byte {}: is it the right file, saved as UTF-8?", at + 8)
     );
 }
 
@@ -165,7 +165,7 @@ fn bytes_that_are_no_text_are_placed() {
 fn problems_are_serialised_field_by_field() {
     let problem = &refuse("schema = 2")[0];
     let json = serde_json::to_value(problem).unwrap();
-    let message = "is version 2; this release reads 1: nothing else was read";
+    let message = "is version 2; this release reads 1: the rest was not read";
     let expected = serde_json::json!({"file": "test.toml", "line": 1, "column": 10, "key": "schema", "message": message});
     assert_eq!(json, expected);
 }

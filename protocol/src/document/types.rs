@@ -52,7 +52,7 @@ pub struct Document {
     pub origin: Option<Origin>,
     /// Temperature channels and their filter.
     pub temperature: Temperature,
-    /// Channels that are no temperatures, for `regressor`. Source: models §2.
+    /// Channels other than temperatures, for `regressor`. Source: models §2.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 16))]
     pub auxiliary: Vec<Auxiliary>,
@@ -76,8 +76,7 @@ pub struct Temperature {
     /// Assumed before a channel's first reading, and without a channel.
     #[schemars(range(min = -273.15, max = 1000.0))]
     pub assumed_deg_c: f64,
-    /// Filter of all channels; required if there are any. It belongs to the fit: with another filter the coefficients are
-    /// wrong.
+    /// Filter of all channels; required with channels. Part of the fit: coefficients need the same filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub filter: Option<Filter>,
     /// Channels, which sensors follow by name.
@@ -238,8 +237,7 @@ pub struct ModeReversal {
     /// Degree of the two-sided fit, below its readings. Source: 003 step 3.
     #[schemars(range(min = 0, max = 3))]
     pub fit_degree: u8,
-    /// Readings of the two-sided fit: all that are stated, or as many as make the least error (`fit_readings_…` are then the
-    /// most, at least 12 together, default: 8).
+    /// Readings of the two-sided fit: as stated, or the best number up to `fit_readings_…` (then default: 8; at least 12 together).
     #[serde(skip_serializing_if = "is_fixed")]
     pub fit_window: FitWindow,
 }

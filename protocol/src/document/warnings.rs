@@ -49,7 +49,7 @@ fn grid(r: &Reader<'_>, filter: &Filter, found: &mut Vec<Problem>) {
         let steps = (length / filter.grid_step_s).round().max(1.0);
         let rounded = steps * filter.grid_step_s;
         if length > 0.0 && (rounded - length).abs() > 1e-6 * filter.grid_step_s {
-            let message = format!("is {length} s, no whole number of grid steps: {rounded} s is used");
+            let message = format!("is {length} s, not a whole number of grid steps: {rounded} s is used");
             found.push(r.warning(&join("temperature.filter", key), message));
         }
     }
@@ -71,7 +71,7 @@ fn unused_channels(r: &Reader<'_>, document: &Document, found: &mut Vec<Problem>
     let auxiliaries = document.auxiliary.iter().map(|channel| &channel.name).enumerate();
     let auxiliaries = auxiliaries.map(|(i, name)| (element("auxiliary", i), name));
     for (path, name) in temperatures.chain(auxiliaries).filter(|(_, name)| !used.contains(name)) {
-        let message = format!("is {name:?}, which no sensor and no orientation follows");
+        let message = format!("is {name:?}, followed by no sensor and no orientation");
         found.push(r.warning(&join(&path, "name"), message));
     }
 }

@@ -113,16 +113,15 @@ pub enum Fault {
         last: u64,
     },
     /// An entry with a higher number stands before it.
-    #[error(
-        "stands behind entry {last}: the lines were exchanged, or one of them was inserted; compare both with a backup"
-    )]
+    #[error("comes after entry {last}: lines were exchanged or inserted; compare both with a backup")]
     Behind {
         /// The highest number before it.
         last: u64,
     },
     /// The digest does not fit.
     #[error(
-        "its digest does not fit: the entry was changed, or the one before it, with its digest; compare both with a backup"
+        "its digest is wrong: the entry was changed, or the one before it, with its digest; compare both with a \
+         backup"
     )]
     Digest,
     /// It has no digest, though entries before it have.
@@ -136,13 +135,13 @@ pub enum Fault {
     },
     /// It is the first line of a file, and carries on from another entry than the last of the file before.
     #[error(
-        "carries on from another entry than the last one before it: the end of the file before was changed, or a file is \
+        "does not continue from the last entry before it: the end of the file before was changed, or a file is \
          missing; compare it with a backup"
     )]
     Elsewhere,
     /// It is the first of all, and does not say what it carries on from.
     #[error(
-        "carries on from an entry that is not here: the beginning of the file is missing; look for it in a backup"
+        "continues from an entry that is not here: the beginning of the file is missing; look for it in a backup"
     )]
     Headless,
     /// Entries are missing at the end.

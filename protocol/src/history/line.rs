@@ -43,7 +43,7 @@ pub enum LineError {
         need: u32,
     },
     /// Whole, yet not understood: written by a newer version.
-    #[error("is not understood, written by a newer version? {words}")]
+    #[error("cannot be read; was it written by a newer version? {words}")]
     Entry {
         /// What JSON says.
         words: String,

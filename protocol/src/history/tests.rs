@@ -244,7 +244,7 @@ fn entries_in_words_say_what_an_operator_asks() {
             "{start}revision 4 accepted from folder (cal/zlg-1.toml): {short}, from tick 4000 on, over 2000 ms (by ann)"
         )
     );
-    assert_eq!(words[3], format!("{start}revision 4 withdrawn: revision 5 took its place (by ann)"));
+    assert_eq!(words[3], format!("{start}revision 4 withdrawn: replaced by revision 5 (by ann)"));
     assert!(
         words[5].ends_with("from bus refused: 1:1: unit: is \"x\" (and 2 more) (by ann)"),
         "{}",

@@ -59,7 +59,7 @@ impl<'de> Deserialize<'de> for WallTime {
         let text = String::deserialize(deserializer)?;
         let time = humantime::parse_rfc3339(&text).map_err(|error| {
             D::Error::custom(format!(
-                "{text:?} is no RFC 3339 time in UTC, such as 2026-11-21T08:00:00.000Z: {error}"
+                "{text:?} is not an RFC 3339 time in UTC, such as 2026-11-21T08:00:00.000Z: {error}"
             ))
         })?;
         Ok(time.into())

@@ -116,7 +116,7 @@ impl fmt::Display for AuditEvent {
                 write!(f, "revision {} withdrawn: ", withdrawal.revision)?;
                 match withdrawal.why {
                     Withdrawn::Superseded { by_revision } => {
-                        write!(f, "revision {by_revision} took its place")
+                        write!(f, "replaced by revision {by_revision}")
                     }
                     Withdrawn::Cancelled => f.write_str("called off"),
                 }

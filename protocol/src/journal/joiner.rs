@@ -30,7 +30,7 @@ pub enum JoinError {
     },
     /// The part before it did not come.
     #[error(
-        "journal of unit {}, entry {number}: part {got} of {parts} has come, part {need} was to come: it is lost",
+        "journal of unit {}, entry {number}: received part {got} of {parts} instead of part {need}: the entry is lost",
         shown(.unit)
     )]
     Missing {
@@ -47,8 +47,8 @@ pub enum JoinError {
     },
     /// Too many entries are incomplete.
     #[error(
-        "journal of unit {}, entry {number}: the incomplete entries would be more than {MAX_OPEN_ENTRIES}, or longer \
-         than {MAX_OPEN_BYTES} bytes together",
+        "journal of unit {}, entry {number}: more than {MAX_OPEN_ENTRIES} incomplete entries, or {MAX_OPEN_BYTES} \
+         bytes of them",
         shown(.unit)
     )]
     TooMuch {
@@ -58,7 +58,7 @@ pub enum JoinError {
         number: u64,
     },
     /// The parts together are no entry.
-    #[error("journal of unit {}, entry {number}: the parts together are no entry", shown(.unit))]
+    #[error("journal of unit {}, entry {number}: the parts do not make an entry", shown(.unit))]
     Malformed {
         /// Serial of the unit.
         unit: String,
@@ -67,7 +67,7 @@ pub enum JoinError {
     },
     /// The entry is another one than its parts say.
     #[error(
-        "journal of unit {}, entry {number}: the parts hold entry {got_number} of unit {}",
+        "journal of unit {}, entry {number}: the parts are entry {got_number} of unit {}",
         shown(.unit),
         shown(.got_unit)
     )]

@@ -44,8 +44,8 @@ impl ParsedOverlay {
             refuse(
                 OVERLAY_OF,
                 format!(
-                    "is {of}, but the document in force has {base_digest}: put the document that the overlay was made \
-                     for in force first, or make the overlay anew"
+                    "is {of}, but the document in force has {base_digest}: first put the document of the overlay in \
+                     force, or make a new overlay"
                 ),
             );
         }
@@ -60,7 +60,7 @@ impl ParsedOverlay {
                 let known = names.join(", ");
                 refuse(
                     &join(&path, "name"),
-                    format!("is {name:?}, which is no gyro of the document; its gyros are: {known}"),
+                    format!("is {name:?}, not a gyro of the document; its gyros are: {known}"),
                 );
                 continue;
             };
@@ -68,7 +68,7 @@ impl ParsedOverlay {
             if change.magnetic_bias_change_deg_per_h.is_some() && !magnetic && base.mode_reversal.is_none() {
                 refuse(
                     &join(&path, "magnetic_bias_change_deg_per_h"),
-                    "changes a magnetic bias, but the document knows no lasing modes: remove it".to_owned(),
+                    "changes a magnetic bias, but the document has no lasing modes: remove it".to_owned(),
                 );
             }
         }

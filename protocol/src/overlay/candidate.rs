@@ -42,8 +42,8 @@ impl Candidate {
         }
         let overlay = Overlay::parse(text, file)?;
         let Some(base_text) = active_base else {
-            let message = "is an overlay, but the unit has no document in force: put the document that it is for in \
-                           force first";
+            let message = "is an overlay, but the unit has no document in force: first put the document of the \
+                           overlay in force";
             return Err(vec![overlay.problem(super::OVERLAY_OF, message.to_owned())]);
         };
         let base_digest = Digest::of(base_text.as_bytes()).0;

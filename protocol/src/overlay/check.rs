@@ -9,7 +9,7 @@ pub(super) fn check(r: &mut Reader<'_>, overlay: &Overlay) {
         let path = element("gyro", i);
         if let Some(earlier) = overlay.gyro.iter().take(i).position(|earlier| earlier.name == gyro.name) {
             let name = &gyro.name;
-            let message = format!("is {name:?}, the name of gyro[{earlier}] too: each gyro changes once");
+            let message = format!("is {name:?}, also the name of gyro[{earlier}]: each gyro changes once");
             r.report(&join(&path, "name"), message);
         }
         change_with_sigma(r, &path, gyro);

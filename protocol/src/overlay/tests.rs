@@ -162,7 +162,7 @@ fn a_wrong_base_is_refused_with_what_to_do() {
     let text = overlay_of(FULL);
     let problems = refuse(&text, None);
     assert_eq!((problems[0].line, problems[0].key.as_str()), (2, "overlay_of"));
-    assert!(problems[0].message.contains("the unit has no document in force: put"), "{}", problems[0]);
+    assert!(problems[0].message.contains("the unit has no document in force: first put"), "{}", problems[0]);
 
     let other = FULL.replacen("# Every key", "# every key", 1);
     let problems = refuse(&text, Some(&other));
@@ -170,7 +170,7 @@ fn a_wrong_base_is_refused_with_what_to_do() {
     let shown = problems[0].to_string();
     assert!(shown.starts_with("field.toml:2:14: overlay_of: is "), "{shown}");
     assert!(shown.contains(&hex(&digest(FULL))) && shown.contains(&hex(&digest(&other))), "{shown}");
-    assert!(shown.contains("put the document that the overlay was made for in force first"), "{shown}");
+    assert!(shown.contains("first put the document of the overlay in force"), "{shown}");
 
     let problems = refuse(&overlay_of("schema = 1"), Some("schema = 1"));
     assert!(problems.iter().all(|problem| problem.file.as_deref() == Some("document in force")));
@@ -204,7 +204,7 @@ fn what_does_not_fit_the_base_is_told_at_once_with_its_place() {
         "{}",
         listed(&problems)
     );
-    assert!(problems[2].message.contains("is no gyro of the document; its gyros are: x, y, z, s"));
+    assert!(problems[2].message.contains("not a gyro of the document; its gyros are: x, y, z, s"));
 }
 
 /// An overlay that is broken in one place: text to replace, replacement, text on the line of the problem, key, part
@@ -225,7 +225,7 @@ const BROKEN: [Case; 19] = [
         "name = \"x\"",
         "name = \"x\"\nstatic_bias_change_deg_per_h = -0.02",
         "gyro[1].name",
-        "the name of gyro[0] too",
+        "also the name of gyro[0]",
     ),
     (
         "= 0.031",

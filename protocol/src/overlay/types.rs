@@ -33,7 +33,7 @@ pub struct Overlay {
     /// Gyros that change.
     #[schemars(length(min = 1, max = 8))]
     pub gyro: Vec<GyroOverlay>,
-    /// The pre-launch calibration behind it; for readers. Source: models §7.
+    /// The pre-launch calibration that made it; for readers. Source: models §7.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pre_launch: Option<PreLaunchRecord>,
 }

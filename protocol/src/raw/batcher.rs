@@ -15,7 +15,7 @@ use crate::key::RawStream;
 #[derive(Debug, Error)]
 pub enum BatchError {
     /// A reading that is said to be a count and is none.
-    #[error("tick {sequence}: its readings are no counts of 32 bits")]
+    #[error("tick {sequence}: its readings are not counts of 32 bits")]
     NotCounts {
         /// Sequence number of the first tick of the batch.
         sequence: u64,
@@ -269,6 +269,6 @@ mod tests {
         let error = batcher
             .gyro(OutputKind::Counts, GyroTick { sequence: 7, readings, ..GyroTick::default() })
             .unwrap_err();
-        assert_eq!(error.to_string(), "tick 7: its readings are no counts of 32 bits");
+        assert_eq!(error.to_string(), "tick 7: its readings are not counts of 32 bits");
     }
 }

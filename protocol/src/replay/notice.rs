@@ -122,7 +122,7 @@ impl fmt::Display for Notice {
         match self {
             Self::NotRecorded { input, frames: count, entry } => write!(
                 f,
-                "{} {} that the service heard before entry {entry} of its journal are not in the recording",
+                "{} {} that the service received before entry {entry} of its journal are not in the recording",
                 frames(*count),
                 input_name(*input)
             ),
@@ -134,15 +134,15 @@ impl fmt::Display for Notice {
             ),
             Self::TooEarly { input, frames: count, entry } => write!(
                 f,
-                "{} {} came to the unit before entry {entry} of the journal and not behind it, as in the service: frames \
-                 before them are missing in the recording",
+                "{} {} reached the unit before entry {entry} of the journal, in the service after it: earlier frames \
+                 are missing in the recording",
                 frames(*count),
                 input_name(*input)
             ),
             Self::PlaceUnknown { input, entry } => write!(
                 f,
-                "the last {} frame that the service heard before entry {entry} of its journal is not in the recording: its \
-                 place is guessed from the times of reception",
+                "the last {} frame that the service received before entry {entry} of its journal is not in the \
+                 recording: its place is estimated from times of reception",
                 input_name(*input)
             ),
             Self::EntriesMissing { from, to } if from == to => {
@@ -153,20 +153,20 @@ impl fmt::Display for Notice {
             }
             Self::WithoutBeginning { entries } => write!(
                 f,
-                "the journal has {entries} entries before the first with which a stream can begin: what was corrected \
-                 under them is left out"
+                "the journal has {entries} entries before the first that a stream can begin with: ticks of that time \
+                 are left out"
             ),
             Self::Damaged { words } => f.write_str(words),
             Self::Beside { instance } => write!(
                 f,
-                "two services had the unit at once: the journal of instance {instance} is left out, and which of the two \
-                 published a corrected tick cannot be told"
+                "two services had the unit at once: the journal of instance {instance} is left out, and it is \
+                 unknown which of them published a corrected tick"
             ),
             Self::NotCarriedOut { entry, words } => write!(f, "entry {entry} of the journal: {words}"),
             Self::OtherMemory { entry, words } => write!(
                 f,
-                "behind entry {entry} of the journal the service's memory is another one than was made of the recording \
-                 ({words}); from there on it is the service's"
+                "after entry {entry} of the journal the service's memory differs from that of the recording \
+                 ({words}); from there on the service's is used"
             ),
         }
     }

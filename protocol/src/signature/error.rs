@@ -41,14 +41,14 @@ impl std::error::Error for SignatureError {}
 pub enum Wrong {
     /// The line is not in its form.
     #[error(
-        "the signature line {0}; it must be `# isotherm-signature: ed25519 KEY-ID SIGNATURE`: take the document as \
-         it was signed, or sign it again"
+        "the signature line {0}; it must be `# isotherm-signature: ed25519 KEY-ID SIGNATURE`: restore the signed \
+         text, or sign it again"
     )]
     Form(String),
     /// Something was put at the line's end.
     #[error(
-        "the signature line ends with {0}: the text was changed after signing; take the document as it was signed, or \
-         sign it again"
+        "the signature line ends with {0}: the text was changed after signing; restore the signed text, or sign it \
+         again"
     )]
     End(&'static str),
     /// A signature of another kind.
@@ -56,8 +56,8 @@ pub enum Wrong {
     Kind(String),
     /// Something stands behind the signature.
     #[error(
-        "{what} behind the signature of line {signature_line}: the text was changed after signing; take the document \
-         as it was signed, or sign it again"
+        "{what} after the signature of line {signature_line}: the text was changed after signing; restore the signed \
+         text, or sign it again"
     )]
     NotLast {
         /// What stands there, with a verb.
@@ -82,7 +82,7 @@ pub enum Wrong {
         trusted: Vec<(KeyId, String)>,
     },
     /// The signature does not hold for the text.
-    #[error("the signature of {name} ({key_id}) does not hold: the text was changed after signing{}", damage_words(*damage))]
+    #[error("the signature of {name} ({key_id}) is wrong: the text was changed after signing{}", damage_words(*damage))]
     Changed {
         /// The key that the signature names.
         key_id: KeyId,
@@ -92,9 +92,7 @@ pub enum Wrong {
         damage: Option<Damage>,
     },
     /// The text is to be signed, but has a signature.
-    #[error(
-        "is signed already, by key {key_id}: leave it so, or have it replaced (`isotherm sign --overwrite`)"
-    )]
+    #[error("is already signed, by key {key_id}: keep it, or replace it with `isotherm sign --overwrite`")]
     Signed {
         /// The key that the signature names.
         key_id: KeyId,
@@ -116,23 +114,23 @@ fn trusted_words(trusted: &[(KeyId, String)]) -> String {
     /// As many as fit in a message.
     const SHOWN: usize = 8;
     if trusted.is_empty() {
-        return "no key is: put the signer's .pub file into the folder of trusted keys".to_owned();
+        return "no key is trusted: put the signer's .pub file into the folder of trusted keys".to_owned();
     }
     let names: Vec<_> = trusted.iter().take(SHOWN).map(|(id, name)| format!("{name} ({id})")).collect();
     let more = trusted.len().saturating_sub(SHOWN);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let (names, verb) = (names.join(", "), if trusted.len() == 1 { "is" } else { "are" });
     format!(
-        "{names}{more} {verb}: put the signer's .pub file into the folder of trusted keys, or have the document signed \
-         by a trusted one"
+        "{names}{more} {verb}: put the signer's .pub file into the folder of trusted keys, or have the document \
+         signed with a trusted key"
     )
 }
 
 fn damage_words(damage: Option<Damage>) -> &'static str {
     match damage {
-        Some(Damage::ToCrlf) => ", its line ends were turned into CRLF; turn them back into LF",
-        Some(Damage::ToLf) => ", its line ends were turned from CRLF into LF; turn them back",
-        Some(Damage::ByteOrderMark) => ", a byte order mark was put in front of it; take it off",
-        None => "; take the document as it was signed, or sign it again",
+        Some(Damage::ToCrlf) => ", its line ends were converted to CRLF; convert them back to LF",
+        Some(Damage::ToLf) => ", its line ends were converted from CRLF to LF; convert them back",
+        Some(Damage::ByteOrderMark) => ", a byte order mark was put in front of it; remove it",
+        None => "; restore the signed text, or sign it again",
     }
 }

@@ -53,19 +53,19 @@ impl Serialize for KeyId {
 #[non_exhaustive]
 pub enum KeyError {
     /// There is no `-----BEGIN …-----` line.
-    #[error("is no PEM text: it has no line `-----BEGIN {expected}-----`")]
+    #[error("is not PEM text: it has no line `-----BEGIN {expected}-----`")]
     NoPem {
         /// The label that is expected.
         expected: &'static str,
     },
     /// There are several blocks.
-    #[error("holds {count} PEM blocks, must hold one: give each key a file of its own")]
+    #[error("has {count} PEM blocks, must have one: give each key its own file")]
     Several {
         /// How many.
         count: usize,
     },
     /// The block holds something else.
-    #[error("holds a block {label:?}, must be {expected:?}: {advice}")]
+    #[error("has a block {label:?}, must be {expected:?}: {advice}")]
     Label {
         /// What it says it is.
         label: String,
@@ -84,9 +84,7 @@ pub enum KeyError {
     #[error("is damaged: {0}")]
     Damaged(String),
     /// A public key for which signatures of anything can be made up.
-    #[error(
-        "is a weak public key, for which anybody can make signatures: it is no key that a tool would make"
-    )]
+    #[error("is a weak public key: anyone can forge its signatures; make a new key with `isotherm keygen`")]
     Weak,
 }
 
@@ -205,9 +203,9 @@ fn block<'t>(text: &'t str, expected: &'static str) -> Result<&'t str, KeyError>
     let label: String = label.lines().next().unwrap_or_default().chars().take(40).collect();
     if label != expected {
         let advice = match label.as_str() {
-            "PRIVATE KEY" => "this is the secret half, keep it away from here and give the .pub file",
-            "PUBLIC KEY" => "this is the public half, give the .key file",
-            "ENCRYPTED PRIVATE KEY" => "take the passphrase off with `openssl pkey -in … -out …`",
+            "PRIVATE KEY" => "this is the secret half: remove it from here and give the .pub file",
+            "PUBLIC KEY" => "this is the public half: give the .key file",
+            "ENCRYPTED PRIVATE KEY" => "remove the passphrase with `openssl pkey -in … -out …`",
             _ => "make a pair with `isotherm keygen`, or with `openssl genpkey -algorithm ed25519`",
         };
         return Err(KeyError::Label { label, expected, advice });

@@ -184,9 +184,5 @@ fn read(line: &Line<'_>) -> Result<(KeyId, [u8; 64]), SignatureError> {
         return Err(form(bytes_at, &words));
     }
     let (rest, rest_at) = next();
-    if rest.is_empty() {
-        Ok((key_id, signature))
-    } else {
-        Err(form(rest_at, "has more behind the signature"))
-    }
+    if rest.is_empty() { Ok((key_id, signature)) } else { Err(form(rest_at, "has more after the signature")) }
 }

@@ -148,7 +148,7 @@ fn a_key_that_is_not_trusted_is_named_beside_those_that_are() {
 fn a_signature_under_another_trusted_keys_name_does_not_hold() {
     let [one, two] = [1, 2].map(|number| key(number).public().id().to_string());
     let words = verify(&signed(TEXT).replace(&one, &two), &trusted(&[1, 2])).unwrap_err().to_string();
-    assert!(words.starts_with(&format!("3:1: the signature of signer-2 ({two}) does not hold")), "{words}");
+    assert!(words.starts_with(&format!("3:1: the signature of signer-2 ({two}) is wrong")), "{words}");
 }
 
 #[test]
@@ -170,11 +170,11 @@ fn nothing_may_be_put_behind_the_signature() {
     let text = signed(TEXT);
     assert!(
         refused(&format!("{text}drift = 1\n"))
-            .starts_with("4:1: something was put behind the signature of line 3")
+            .starts_with("4:1: something was put after the signature of line 3")
     );
     for blank in ["\n", "\n\n\n", " ", "\r\n"] {
         let words = refused(&format!("{text}{blank}"));
-        assert!(words.starts_with("4:1: a blank line was put behind the signature of line 3"), "{words}");
+        assert!(words.starts_with("4:1: a blank line was put after the signature of line 3"), "{words}");
     }
     assert!(refused(&format!("{text}# note")).contains("the text was changed after signing"));
 }
@@ -190,15 +190,15 @@ fn converted_line_ends_are_called_so() {
     // The last line's end is the first to get lost.
     let words = refused(text.replace('\n', "\r\n").trim_end());
     assert!(
-        words.contains("changed after signing, its line ends were turned into CRLF; turn them back"),
+        words.contains("changed after signing, its line ends were converted to CRLF; convert them back"),
         "{words}"
     );
 
     let crlf = signed(&TEXT.replace('\n', "\r\n"));
     assert!(is_by(&crlf, 1), "a text that has CRLF when it is signed");
-    assert!(refused(&crlf.replace("\r\n", "\n")).contains("its line ends were turned from CRLF into LF"));
+    assert!(refused(&crlf.replace("\r\n", "\n")).contains("its line ends were converted from CRLF to LF"));
     let mixed = signed(&TEXT.replacen('\n', "\r\n", 1));
-    assert!(refused(&mixed.replace("\r\n", "\n")).contains("; take the document as it was signed"));
+    assert!(refused(&mixed.replace("\r\n", "\n")).contains("; restore the signed text"));
 }
 
 #[test]
@@ -209,7 +209,7 @@ fn blanks_and_marks_that_programs_add_are_called_so() {
     assert!(refused(&format!("\u{feff}{text}")).contains("a byte order mark was put in front of it"));
     assert!(
         refused(&text.replace("= 1", "= 1 "))
-            .contains("does not hold: the text was changed after signing; take")
+            .contains("is wrong: the text was changed after signing; restore")
     );
 }
 
@@ -232,7 +232,7 @@ fn a_damaged_line_says_where_and_how() {
         ),
         (
             text.replace(bytes, &format!("{bytes} x")),
-            "3:137: the signature line has more behind the signature",
+            "3:137: the signature line has more after the signature",
         ),
         (text.replace(bytes, ""), "3:47: the signature line ends with blanks"),
     ] {
@@ -273,7 +273,7 @@ fn a_signed_text_is_signed_anew_only_when_told() {
 fn the_longest_document_is_verified() {
     let text = signed(&"#\n".repeat(MAX_DOCUMENT_BYTES / 2 - 100));
     assert!(is_by(&text, 1));
-    assert!(refused(&text.replacen('#', "\n", 1)).contains("does not hold"));
+    assert!(refused(&text.replacen('#', "\n", 1)).contains("is wrong: "));
 }
 
 #[test]

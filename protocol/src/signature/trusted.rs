@@ -17,7 +17,7 @@ pub struct TrustedKeys {
 #[non_exhaustive]
 pub enum RivalKey {
     /// The key is trusted already.
-    #[error("is the same key as {other} ({key_id}): remove one, so that the signer has one name")]
+    #[error("is the same key as {other} ({key_id}): remove one of them")]
     SameKey {
         /// The key.
         key_id: KeyId,

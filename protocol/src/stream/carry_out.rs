@@ -26,8 +26,8 @@ const LONGEST_SHOWN: usize = 200;
 pub enum JournalError {
     /// A calibration that never was a document.
     #[error(
-        "revision {revision} was no document, so that the journal does not have its coefficients: the log cannot be \
-         corrected from here on"
+        "revision {revision} was not a document, so the journal lacks its coefficients: the log cannot be corrected \
+         from here on"
     )]
     NoDocument {
         /// The revision counter.
@@ -50,7 +50,7 @@ pub enum JournalError {
         problems: Vec<Problem>,
     },
     /// The stream was given that revision before, or a later one.
-    #[error("revision {got} comes too late: the stream was given revision {given} already")]
+    #[error("revision {got} comes too late: the stream already has revision {given}")]
     OldRevision {
         /// The revision counter.
         got: u64,
@@ -68,7 +68,7 @@ pub enum JournalError {
         words: String,
     },
     /// The settings are none that a unit can have.
-    #[error("the unit began with settings that no unit can have: {what}")]
+    #[error("the unit began with impossible settings: {what}")]
     Settings {
         /// What is wrong with them.
         what: String,
@@ -77,7 +77,7 @@ pub enum JournalError {
     #[error(transparent)]
     Memory(#[from] MemoryError),
     /// The memory is that of another unit.
-    #[error("the memory is that of unit {got}, the stream is that of unit {need}")]
+    #[error("the memory is of unit {got}, the stream of unit {need}")]
     OtherUnit {
         /// The unit of the memory.
         got: String,

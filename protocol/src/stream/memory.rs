@@ -28,7 +28,7 @@ const LONGEST_VERSION: usize = 80;
 #[non_exhaustive]
 pub enum MemoryError {
     /// Too short to be one.
-    #[error("the memory has {length} bytes, which is too short for one: it was cut off")]
+    #[error("the memory has only {length} bytes: it was cut short")]
     Length {
         /// Its length in bytes.
         length: usize,
@@ -43,8 +43,8 @@ pub enum MemoryError {
     },
     /// Another version of the program wrote it.
     #[error(
-        "the memory was written by \"{got}\", this program is \"{need}\": only the version that wrote a memory can go on \
-         with it"
+        "the memory was written by \"{got}\", this program is \"{need}\": a memory can be read only by the version \
+         that wrote it"
     )]
     Version {
         /// The version that wrote it.
@@ -53,7 +53,7 @@ pub enum MemoryError {
         need: &'static str,
     },
     /// It does not decode as its version says.
-    #[error("the memory is malformed although its checksum fits: it was not written by this program")]
+    #[error("the memory is malformed although its checksum is right: it was not written by this program")]
     Malformed,
 }
 

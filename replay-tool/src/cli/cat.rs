@@ -3,6 +3,7 @@
 use std::io::{self, BufWriter, ErrorKind, Write};
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_log::message::{Message, Topic};
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::corrected::CorrectedBatch;
@@ -16,30 +17,30 @@ use serde_json::{Value, json};
 use zenoh::key_expr::OwnedKeyExpr;
 
 use super::play::key_expression;
-use super::{LogArgs, Outcome, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use crate::play::wanted;
 
-/// Print the messages of a log as JSON, one a line
+/// Print the messages of a log as JSON, one per line
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay cat mems.csv --unit MEMS-0001 --topic 'imu/*/raw/temp' --limit 2\n\n\
-    Each line has `topic`, `received_ns` and `message`, whose fields are those of docs/wire.md; or `error`, where a frame cannot\n\
+    Each line has `topic`, `received_ns` and `message`, with the fields of docs/wire.md; or `error`, if a frame cannot\n\
     be read (exit code 3).")]
 pub(super) struct CatArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Take only topics of these keys, e.g. 'imu/*/raw/gyro'; repeatable
+    /// Only these keys, e.g. 'imu/*/raw/gyro'; repeatable
     #[arg(long, value_name = "KEY", value_parser = key_expression)]
     topic: Vec<OwnedKeyExpr>,
-    /// Stop after so many messages
+    /// Stop after N messages
     #[arg(long, value_name = "N")]
     limit: Option<u64>,
 }
 
 /// Runs the command.
-pub(super) fn run(args: &CatArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
     let mut messages = args.log.messages(1, None)?;
     let mut out = BufWriter::new(io::stdout().lock());
     let (mut printed, mut unread) = (0, false);
@@ -65,12 +66,12 @@ pub(super) fn run(args: &CatArgs) -> Result<Outcome, Error> {
     if let Err(source) = out.flush() {
         return ended(source);
     }
-    Ok(if unread || messages.report().lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(unread || messages.report().lost_data()))
 }
 
 /// A reader that has gone away, as `head` does, has what it wanted.
-fn ended(source: io::Error) -> Result<Outcome, Error> {
-    if source.kind() == ErrorKind::BrokenPipe { Ok(Outcome::Complete) } else { Err(Error::Stdout { source }) }
+fn ended(source: io::Error) -> Result<Exit, Error> {
+    if source.kind() == ErrorKind::BrokenPipe { Ok(Exit::Ok) } else { Err(Error::Stdout { source }) }
 }
 
 /// What a message says; of a key that is none of the protocol's, its length.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_log::file::read_small;
 use isotherm_log::source::LogReport;
 use isotherm_protocol::document::Document;
@@ -10,9 +11,9 @@ use serde::Serialize;
 
 use super::log_args::LogArgs;
 use super::record::Compression;
-use super::{Outcome, print, show};
-use crate::convert::{self, Conversion, Place, Ros2Options, Target};
+use super::{print, show};
 use crate::error::Error;
+use isotherm_convert::{self as convert, Conversion, Place, Ros2Options, Target};
 
 /// Convert recordings to text, ROS 2 bags or Parquet, and text logs to recordings
 #[derive(Debug, Args)]
@@ -22,40 +23,40 @@ use crate::error::Error;
     isotherm-replay convert mems.mcap --to text --out text\n  \
     isotherm-replay convert mems.mcap --to ros2 --out bag --calibration config/calibration/MEMS-0001.toml\n  \
     isotherm-replay convert mems.mcap --to parquet --out tables\n\n\
-    Text goes to FOLDER/UNIT/raw.csv with raw.mapping.toml, which reads it back to the same ticks, corrected.csv and\n\
-    health.csv; or, for one unit, beside a file that ends in .csv or .csv.gz. A new run of the producer begins a new\n\
-    file (raw.2.csv). Parquet goes to FOLDER/UNIT/STREAM.parquet. A ROS 2 bag has /imu/UNIT/data and\n\
-    /imu/UNIT/temperature/CHANNEL; for units without corrected ticks, or with --raw, /imu/UNIT/data_raw.\n\
-    Exit code 3: something of the log could not be read or written, and the summary says what.")]
+    Text: FOLDER/UNIT/raw.csv with raw.mapping.toml, which reads it back to the same ticks, corrected.csv and health.csv;\n\
+    for one unit also a file that ends in .csv or .csv.gz, with the others next to it. A new run of the producer begins\n\
+    raw.2.csv. Parquet: FOLDER/UNIT/STREAM.parquet. ROS 2: /imu/UNIT/data and /imu/UNIT/temperature/CHANNEL; for units\n\
+    without corrected ticks, or with --raw, /imu/UNIT/data_raw.\n\
+    Exit code 3: part of the log could not be read or written; the summary says what.")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ConvertArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Where it goes: a file that ends in .mcap, .csv or .csv.gz, or a folder with --to
+    /// Output: a file that ends in .mcap, .csv or .csv.gz, or a folder with --to
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// What it is converted to (default: as the output's name ends)
+    /// Format (default: by the output's name)
     #[arg(long, value_enum, value_name = "TARGET")]
     to: Option<Target>,
-    /// Write over files that are there already
+    /// Replace existing files
     #[arg(long)]
     overwrite: bool,
-    /// Gyro ticks in one message of a recording
+    /// Gyro ticks per message of a recording (1…4096)
     #[arg(long, value_name = "TICKS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=4096))]
     batch: u16,
-    /// How chunks of a recording are compressed
+    /// Compression of a recording
     #[arg(long, value_enum, default_value_t)]
     compression: Compression,
-    /// Leave out of a recording the channels with ticks and readings as JSON, which viewers show: it is half as long
+    /// Leave out the JSON channels for viewers: recordings are half as long
     #[arg(long, hide_short_help = true)]
     no_json_channels: bool,
-    /// Raw readings into a ROS 2 bag too, at nominal scale, where there are corrected ticks
+    /// ROS 2: write raw readings, at nominal scale, also for units with corrected ticks
     #[arg(long)]
     raw: bool,
-    /// Calibration document (TOML) that says what raw readings in a ROS 2 bag are; those in recordings are known
+    /// ROS 2: calibration document (TOML) for the raw readings (default: from the recording)
     #[arg(long, short, value_name = "FILE")]
     calibration: Vec<PathBuf>,
-    /// Frame of the messages in a ROS 2 bag; without it, each unit's name in its topics
+    /// ROS 2: frame of the messages (default: the unit's name)
     #[arg(long, value_name = "FRAME")]
     frame: Option<String>,
     /// Print the summary as one JSON object
@@ -79,16 +80,15 @@ impl ConvertArgs {
         let out = out.display();
         let target = match (self.to, by_name) {
             (Some(to), Some(by_name)) if to != by_name => {
-                return Err(Error::Usage(format!(
-                    "{out} is the name of another kind of output than --to says"
-                )));
+                return Err(Error::Usage(format!("{out} has the name of another kind of output than --to")));
             }
             (to, by_name) => to.or(by_name),
         };
         match target {
             // A reader would take a folder of that name for one table.
             _ if parquet => Err(Error::Usage(format!(
-                "{out}: Parquet is one file per unit and stream: give a folder that does not end in .parquet, and --to parquet"
+                "{out}: Parquet has one file per unit and stream: give a folder that does not end in .parquet, and \
+                 --to parquet"
             ))),
             Some(Target::Mcap) if by_name.is_none() => {
                 Err(Error::Usage(format!("{out} does not end in .mcap, as a recording must")))
@@ -176,7 +176,7 @@ fn document(path: &Path) -> Result<Document, Error> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &ConvertArgs) -> Result<Exit, Error> {
     let conversion = args.conversion()?;
     let outcome = conversion.run()?;
     for note in &outcome.notes {
@@ -184,7 +184,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, Error> {
     }
     let report = Report { target: conversion.target, outcome: &outcome };
     print(if args.json { show::json(&report) } else { human(&outcome) }.as_bytes())?;
-    Ok(if outcome.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(outcome.lost_data()))
 }
 
 /// The summary as tables.
@@ -199,7 +199,7 @@ fn human(outcome: &convert::Outcome) -> String {
         outcome.topics.iter().map(|topic| (topic.name.clone(), topic.messages.to_string())).collect();
     let mut counts: Vec<_> = Vec::new();
     if converted.duplicates > 0 {
-        counts.push(("came more than once, written once".to_owned(), converted.duplicates.to_string()));
+        counts.push(("duplicates, written once".to_owned(), converted.duplicates.to_string()));
     }
     let left_out = converted.left_out.iter();
     counts.extend(left_out.map(|(what, count)| (format!("left out: {what}"), count.to_string())));
@@ -221,11 +221,11 @@ fn reading(report: &LogReport) -> String {
         LogReport::Recording(report) => {
             let mut text = String::new();
             if let Some(words) = &report.cut_short {
-                text = format!("{words}; what was whole before it has been used\n");
+                text = format!("{words}; everything before it has been used\n");
             }
             if report.foreign_messages > 0 {
                 text += &report.foreign_messages.to_string();
-                text += " messages of other programs were passed over\n";
+                text += " messages of other programs were skipped\n";
             }
             text
         }

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
 use isotherm_log::replica::scan;
@@ -18,9 +19,8 @@ use serde::Serialize;
 
 pub(super) use show_difference::first_difference;
 
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Compare two corrected logs tick by tick, and show the first difference
 #[derive(Debug, Args)]
@@ -29,8 +29,7 @@ use crate::progress::Bar;
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out a.csv\n  \
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out b.csv\n  \
     isotherm-replay diff a.csv b.csv\n\n\
-    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are known by \
-    their sequence number and end, and compared to the bit unless a tolerance is given.\n\n\
+    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are matched by sequence number and end, and compared to the bit unless a tolerance is given.\n\n\
     Exit codes: 0 identical, or within the tolerance; 1 different, or one cannot be read; 2 usage.")]
 pub(super) struct DiffArgs {
     /// The first log
@@ -42,13 +41,13 @@ pub(super) struct DiffArgs {
     /// Unit serial, repeatable (default: all). CSV: the serial to assign
     #[arg(long, short, value_name = "SERIAL")]
     unit: Vec<String>,
-    /// How much an angle increment may differ (rad)
+    /// Tolerance of angle increments (rad)
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_angle: f64,
-    /// How much a velocity increment may differ (m/s)
+    /// Tolerance of velocity increments (m/s)
     #[arg(long, value_name = "M/S", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_velocity: f64,
-    /// How much any number that is not whole may differ, as a share of the larger of the two
+    /// Tolerance of any number that is not an integer, as a share of the larger of the two
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_relative: f64,
     /// Ticks to show before and after the first difference
@@ -78,7 +77,7 @@ struct Report<'r> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
     let units = args.unit.iter().map(|serial| unit_id(serial)).collect::<Result<BTreeSet<_>, _>>()?;
     let unnamed = unnamed(args, &units)?;
     let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
@@ -89,11 +88,12 @@ pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
         relative: args.tolerance_relative,
     };
     let options = DiffOptions { tolerance, around: usize::from(args.around) };
-    let mut bar = Bar::over_log(a.progress());
-    let accounts = compare(&mut a, &mut b, options, |ticks| bar.step(|| format!("{ticks} ticks")))?;
+    let mut bar = Bar::over_log(a.progress().watch());
+    let accounts =
+        compare(&mut a, &mut b, options, |ticks| bar.step_saying(|| Some(format!("{ticks} ticks"))))?;
     bar.finish();
     if accounts.is_empty() {
-        return Err(Error::Usage("there are no corrected ticks in either log".to_owned()));
+        return Err(Error::Usage("neither log has corrected ticks".to_owned()));
     }
     for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
         show::warn(&words);
@@ -102,7 +102,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Outcome, Error> {
     let name = |path: &Path| path.display().to_string();
     let report = Report { a: name(&args.a), b: name(&args.b), identical, tolerance, units: &accounts };
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(if identical { Outcome::Complete } else { Outcome::Different })
+    Ok(if identical { Exit::Ok } else { Exit::Failed })
 }
 
 /// The unit that a CSV is of, where it is not said: the only one of the other log.
@@ -129,7 +129,7 @@ fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
     match of_other.as_slice() {
         [unit] => Ok(unit.clone()),
         _ => Err(Error::Usage(format!(
-            "{} is of {} units, and a CSV does not say which it is of: give --unit SERIAL",
+            "{} has {} units, and a CSV does not say which is its own: give --unit SERIAL",
             other.display(),
             of_other.len()
         ))),

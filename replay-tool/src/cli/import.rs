@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use isotherm_cli::Exit;
 use isotherm_correction::units::Span;
 use isotherm_log::file::{refuse_overwriting, write_whole};
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
@@ -13,17 +14,17 @@ use isotherm_log::mapping::{Encoding, Mapping};
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{Outcome, info, plot, print, show};
+use super::{info, plot, print, show};
 use crate::error::Error;
 
-/// Propose a column mapping for a text log of any maker, then show what the log holds
+/// Propose a column mapping for a text log of any maker, then show what the log contains
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     printf 't [s],gx [deg/s],gy,gz\\n0.00,1,2,3\\n0.01,1,2,3\\n0.02,1,2,3\\n' > own.csv\n  \
     isotherm-replay import own.csv\n\n\
     Counts without header: isotherm-replay import log.txt --columns 'gx [counts],gy,gz,ax [counts],ay,az' --rate-hz 100\n\n\
-    Delimiter, decimal mark, encoding, header, units, period, gaps and counters are found in the log. What cannot be told is\n\
-    asked on a terminal; elsewhere the command ends with code 2 and names the options. The mapping says what it rests on.")]
+    Finds delimiter, decimal mark, encoding, header, units, period, gaps and counters. Asks for the rest on a terminal;\n\
+    elsewhere it ends with code 2 and names the options. The mapping gives the reason of each guess.")]
 pub(super) struct ImportArgs {
     /// Files of one log, plain or gzip
     #[arg(required = true, value_name = "FILE")]
@@ -40,7 +41,7 @@ pub(super) struct ImportArgs {
     /// Replace existing files
     #[arg(long)]
     overwrite: bool,
-    /// Names of the columns, units in brackets, - for others: 'time [s],gx [deg/s],gy,gz,-,temp [degC]' (default: the header)
+    /// Column names with units, - for others: 'time [s],gx [deg/s],gy,gz,-,temp [degC]' (default: the header)
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Vec<String>,
     /// Unit of the gyros (default: from the header)
@@ -52,16 +53,16 @@ pub(super) struct ImportArgs {
     /// Unit of the time column (default: from the header, else from its steps)
     #[arg(long, value_name = "UNIT", value_parser = PossibleValuesParser::new(TIME_UNITS))]
     time_unit: Option<String>,
-    /// Ticks per second of a log without usable time
+    /// Ticks per second, for a log without usable time (Hz)
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
-    /// Delimiter (default: found)
+    /// Delimiter (default: detected)
     #[arg(long, value_name = "WORD", value_parser = PossibleValuesParser::new(["comma", "semicolon", "tab", "pipe", "whitespace"]))]
     delimiter: Option<String>,
-    /// Decimal mark (default: found)
+    /// Decimal mark (default: detected)
     #[arg(long, value_name = "MARK", value_parser = PossibleValuesParser::new([".", ","]))]
     decimal_mark: Option<String>,
-    /// Encoding (default: found)
+    /// Encoding (default: detected)
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Encoding::ALL.map(Encoding::word)))]
     encoding: Option<String>,
     /// Print one JSON object: mapping, notes, info
@@ -122,7 +123,7 @@ impl ImportArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &ImportArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
     let out = args.out.clone().unwrap_or_else(|| Mapping::path_beside(args.first()));
     let page = (!args.no_plot).then(|| args.plot.clone().unwrap_or_else(|| args.page()));
     let inputs: Vec<_> = args.log.iter().map(PathBuf::as_path).collect();

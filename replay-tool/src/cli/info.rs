@@ -4,21 +4,21 @@ mod readings;
 pub(super) mod tables;
 
 use clap::Args;
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
 use isotherm_log::text::LogReader;
 use isotherm_protocol::key::UnitId;
 
 use super::log_args::LogArgs;
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Ticks in one batch of a text log.
 const BATCH: usize = 256;
 /// What a text log's unit is called where nobody says.
 const UNNAMED: &str = "log";
 
-/// Say what a log holds: topics, rates, gaps, jitter, temperatures, mode switches, calibrations, commands
+/// Summarise a log: topics, rates, gaps, jitter, temperatures, mode switches, calibrations, commands
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
@@ -33,7 +33,7 @@ pub(super) struct InfoArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &InfoArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &InfoArgs) -> Result<Exit, Error> {
     let info = survey(&args.log)?;
     print(if args.json { show::json(&info) } else { tables::of(&info) }.as_bytes())?;
     Ok(outcome(&info))
@@ -47,7 +47,7 @@ pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
     let files = log.log_files()?;
     let files: Vec<_> = files.iter().map(|path| FileInfo::of(path)).collect::<Result<_, _>>()?;
     let mut survey = Survey::new(recording);
-    let mut bar = Bar::over_log(messages.progress());
+    let mut bar = Bar::over_log(messages.progress().watch());
     loop {
         let message = messages.next_message()?;
         if let Some(recordings) = messages.log().recording() {
@@ -55,16 +55,16 @@ pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
         }
         let Some(message) = message else { break };
         survey.take(&message);
-        bar.step(|| format!("{} ticks", survey.ticks()));
+        bar.step_saying(|| Some(format!("{} ticks", survey.ticks())));
     }
     bar.finish();
     Ok(survey.finish(files, messages.report()))
 }
 
 /// How it went.
-pub(super) fn outcome(info: &LogInfo) -> Outcome {
+pub(super) fn outcome(info: &LogInfo) -> Exit {
     let cut = |file: &FileInfo| file.recording.as_ref().is_some_and(|recording| !recording.complete);
-    if info.reading.lost_data() || info.files.iter().any(cut) { Outcome::DataLoss } else { Outcome::Complete }
+    Exit::of_loss(info.reading.lost_data() || info.files.iter().any(cut))
 }
 
 impl LogArgs {

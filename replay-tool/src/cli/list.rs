@@ -4,25 +4,25 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 use comfy_table::{CellAlignment, Table, presets};
+use isotherm_cli::{Bar, Exit};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
 use super::play::key_expression;
-use super::{LogArgs, Outcome, print, show};
+use super::{LogArgs, print, show};
 use crate::error::Error;
 use crate::play::wanted;
-use crate::progress::Bar;
 
 /// List the topics of a log: messages, bytes, times
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay list mems.csv --unit MEMS-0001\n\n\
-    Times are seconds from the log's first message. What they hold: `isotherm-replay info` and `isotherm-replay cat`.")]
+    Times are seconds from the log's first message. For contents use `isotherm-replay info` and `isotherm-replay cat`.")]
 pub(super) struct ListArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Take only topics of these keys, e.g. 'imu/*/raw/gyro'; repeatable
+    /// Only these keys, e.g. 'imu/*/raw/gyro'; repeatable
     #[arg(long, value_name = "KEY", value_parser = key_expression)]
     topic: Vec<OwnedKeyExpr>,
     /// Print one JSON object
@@ -40,9 +40,9 @@ struct Listed {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &ListArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &ListArgs) -> Result<Exit, Error> {
     let mut messages = args.log.messages(1, None)?;
-    let mut bar = Bar::over_log(messages.progress());
+    let mut bar = Bar::over_log(messages.progress().watch());
     let mut topics = BTreeMap::<String, Listed>::new();
     let mut begin_ns = None;
     while let Some(message) = messages.next_message()? {
@@ -57,7 +57,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Outcome, Error> {
         listed.messages += 1;
         listed.bytes += message.frame.len() as u64;
         listed.last_s = at_s;
-        bar.step(|| format!("{} topics", topics.len()));
+        bar.step_saying(|| Some(format!("{} topics", topics.len())));
     }
     bar.finish();
     let report = messages.report();
@@ -67,7 +67,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Outcome, Error> {
         human(&topics)
     };
     print(text.as_bytes())?;
-    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(report.lost_data()))
 }
 
 /// The distance of two moments (s), negative where the second is the earlier.

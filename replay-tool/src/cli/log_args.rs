@@ -26,10 +26,10 @@ pub(crate) struct LogArgs {
     /// Unit serial, repeatable (default: all). Text log: the serial to assign
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Vec<String>,
-    /// Begin this long after the log's beginning (s); recordings are cut between messages
+    /// Start this long after the log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
-    /// Take this much of the log (s) (default: all)
+    /// Length to take (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Span>,
     /// Stop this long after the log's beginning (s)
@@ -147,7 +147,8 @@ impl LogArgs {
         let (log, beside) = (first.display(), Mapping::path_beside(&first));
         let beside = beside.display();
         Err(Error::Usage(format!(
-            "{log} is no recording, and a text log needs --mapping FILE or {beside}: `isotherm-replay import {log}` makes one, ready ones are in config/mappings"
+            "{log} is not a recording, and a text log needs --mapping FILE or {beside}: make one with \
+             `isotherm-replay import {log}`, or use one of config/mappings"
         )))
     }
 

@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::ClientOptions;
 use isotherm_bus::outlet::least_in_flight;
+use isotherm_cli::Exit;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
 use isotherm_log::faults::FaultOptions;
@@ -20,7 +21,7 @@ use isotherm_protocol::raw::{HealthReading, MAX_HEALTH};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::{LogArgs, Outcome, print, seconds, show};
+use super::{LogArgs, print, seconds, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
@@ -37,65 +38,64 @@ const MAX_COPIES: u32 = 999;
     isotherm-replay play mems.csv --unit MEMS-0001 --speed max\n  \
     isotherm-replay play mems.csv -u MEMS --speed max --batch 10 \
     --copies 20 --seed 1 --loss 0.01 --duplicate 0.01 --reorder 0.01\n\n\
-    At any speed, ticks are sent no further ahead of what comes back corrected than --in-flight, so that none is lost.\n\
-    Keys, where input and standard error are a terminal: space pauses and goes on; n or → (paused) plays up to the next gyro\n\
-    batch; + and - double and halve the speed; ← and → or [ and ] go 10 s back and on; q ends in order, Ctrl-C at once.\n\
+    At any speed, ticks are sent at most --in-flight ahead of the corrected output, so none is lost.\n\
+    Keys on a terminal: space pauses and resumes; n or → (paused) plays up to the next gyro batch; + and - double and\n\
+    halve the speed; ← and → or [ and ] go 10 s back and forward; q ends in order, Ctrl-C at once.\n\
     Exit code 3: ticks were lost, or rows or chunks of the log could not be read.")]
 pub(super) struct PlayArgs {
     #[command(flatten)]
     log: LogArgs,
     #[command(flatten)]
     session: ClientOptions,
-    /// Times as fast as recorded, or max: as fast as the service keeps up without losing a tick
+    /// Speed as a multiple of the recorded one, or max: as fast as the service keeps up
     #[arg(long, value_name = "N|max", default_value = "1")]
     speed: Speed,
-    /// Whose clock sets the pace of a recording: of its producers, or of its reception [default: receive; text logs: event]
+    /// Clock that sets the pace: ends of ticks, or reception [default: receive; text logs: event]
     #[arg(long, value_enum, hide_short_help = true)]
     clock: Option<ClockArg>,
-    /// Play the log again and again, or so many times
+    /// Repeat the log for ever, or N times
     #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0", hide_short_help = true)]
     passes: Option<u64>,
-    /// Take only messages of these keys, e.g. 'imu/*/raw/gyro'; may be given several times
+    /// Play only these keys, e.g. 'imu/*/raw/gyro'; repeatable
     #[arg(long, value_name = "KEY", value_parser = key_expression, hide_short_help = true)]
     topic: Vec<OwnedKeyExpr>,
-    /// Play a unit of the log on the topics of another; may be given several times
+    /// Play a unit of the log as another one; repeatable
     #[arg(long, value_name = "UNIT=UNIT", value_parser = remapping)]
     remap: Vec<(UnitId, UnitId)>,
-    /// Play each unit as so many: SERIAL-001, SERIAL-002 and so on
+    /// Play each unit N times in parallel: SERIAL-001, SERIAL-002 …
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_COPIES)), hide_short_help = true)]
     copies: Option<u32>,
-    /// Delay messages by up to this (ms of the log's time), keeping their order
+    /// Delay messages by up to this, in order (ms of log time)
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3_600_000), hide_short_help = true)]
     jitter_ms: u32,
-    /// Leave out this share of the messages (0 to 1)
+    /// Share of messages to leave out (0…1)
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
     loss: f64,
-    /// Send this share of the messages twice (0 to 1)
+    /// Share of messages to send twice (0…1)
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
     duplicate: f64,
-    /// Send this share of the messages behind one to four later ones of their key (0 to 1)
+    /// Share of messages to send after one to four later ones of their key (0…1)
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
     reorder: f64,
-    /// Where the chance of the four comes from: the same for the same seed and serial
+    /// Seed of these four faults
     #[arg(long, value_name = "S", default_value_t = 1, hide_short_help = true)]
     seed: u64,
-    /// Number of the first series, in place of one that no player had before: for runs that are equal to the byte
+    /// Number of the first series, for runs that are equal to the byte (default: a new one)
     #[arg(long, value_name = "N", hide_short_help = true)]
     series: Option<u64>,
-    /// Gyro ticks in one message of a text log (1 to 4096) [default: 1]; recordings keep theirs
+    /// Gyro ticks per message of a text log (1…4096) [default: 1]
     #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(1..=4096), hide_short_help = true)]
     batch: Option<u16>,
-    /// Most gyro ticks of a unit sent and not come back; at least 2 × batch + 256 [default: 16384 shared among the units, at most
-    /// 4096 each]
+    /// Most unacknowledged gyro ticks per unit; at least 2 × batch + 256 [default: 16384 shared, at most 4096 each]
     #[arg(long, value_name = "TICKS", hide_short_help = true)]
     in_flight: Option<u64>,
-    /// Do not wait for anything to come back: for listeners other than the service
+    /// Do not wait for corrected ticks: for other listeners, or a unit in standby
     #[arg(long, conflicts_with = "in_flight", hide_short_help = true)]
     no_acknowledge: bool,
-    /// How long to wait for service and subscribers, and for what comes back (s)
+    /// Longest wait for service, subscribers and output (s)
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds, hide_short_help = true)]
     wait: Span,
-    /// What the instrument of a text log reports of itself, once a second: a voltage (V) or counter that the document tests
+    /// Health reading to add to a text log once a second: voltage (V) or counter; repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = health_reading)]
     health: Vec<HealthReading>,
     /// Print the summary as one JSON object
@@ -124,7 +124,7 @@ struct Report<'a> {
 fn health_reading(text: &str) -> Result<HealthReading, String> {
     let (name, value) = text.split_once('=').ok_or("must be NAME=VALUE")?;
     let name = ChannelName::from(name).map_err(|_| "the name may have at most 24 bytes")?;
-    let value = value.parse().map_err(|_| format!("{value:?} is no number"))?;
+    let value = value.parse().map_err(|_| format!("{value:?} is not a number"))?;
     Ok(HealthReading { name, value })
 }
 
@@ -242,7 +242,7 @@ fn check_names(options: &PlayOptions) -> Result<(), Error> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &PlayArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     let options = args.options()?;
     // A log that cannot be read is said before a session is opened.
     check_names(&options)?;
@@ -264,5 +264,5 @@ pub(super) fn run(args: &PlayArgs) -> Result<Outcome, Error> {
     if play.stopped {
         return Err(Error::Stopped);
     }
-    Ok(if play.lost_data() || log.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(play.lost_data() || log.lost_data()))
 }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::is_csv;
 use isotherm_log::file::{read_small_text, refuse_overwriting, write_whole};
 use isotherm_log::part::Messages;
@@ -13,9 +14,8 @@ use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Ticks in one batch of a text log.
 const BATCH: usize = 256;
@@ -24,32 +24,31 @@ const DETAIL: u32 = 32_768;
 /// What a text log's unit is called where nobody says.
 const UNNAMED: &str = "log";
 
-/// Draw a log, or two over one time axis, as one HTML file that one can zoom into
+/// Plot a log, or two over one time axis, as one HTML file with zoom
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay plot mems.csv --calibration config/calibration/MEMS-0001.toml --out mems.html\n\n\
-    The file needs no network and nothing beside it. Two logs: isotherm-replay plot a.mcap --beside b.mcap --out both.html")]
+    The file needs no network and no other file. Two logs: isotherm-replay plot a.mcap --beside b.mcap --out both.html")]
 pub(super) struct PlotArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Another log, drawn over the same time axis with its difference; repeatable for the files of one log. Also a CSV of
-    /// `isotherm-replay correct`
+    /// Second log, or a CSV of `isotherm-replay correct`, plotted with the difference; repeatable for files of one log
     #[arg(long, value_name = "LOG")]
     beside: Vec<PathBuf>,
-    /// Column mapping of the other log (default: that of the first)
+    /// Column mapping of the second log (default: that of the first)
     #[arg(long, value_name = "FILE", requires = "beside")]
     beside_mapping: Option<PathBuf>,
-    /// Unit of the other log (default: as for the first)
+    /// Unit of the second log (default: that of the first)
     #[arg(long, value_name = "SERIAL", requires = "beside")]
     beside_unit: Vec<String>,
-    /// Calibration document (TOML): text logs are corrected with it and raw counts scaled; recordings know their own
+    /// Calibration document (TOML) that corrects a text log and scales counts (recordings: as recorded)
     #[arg(long, short, value_name = "FILE")]
     calibration: Option<PathBuf>,
-    /// The page
+    /// HTML file to write
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// Most bins of each quantity; logs of up to three times as many ticks are drawn tick by tick
+    /// Most bins per curve; up to three times as many ticks are drawn one by one
     #[arg(long, value_name = "BINS", default_value_t = DETAIL, value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
     detail: u32,
     /// Print the summary as one JSON object
@@ -85,12 +84,12 @@ impl PlotArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &PlotArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     let lost = summary.reading.iter().any(LogReport::lost_data);
-    Ok(if lost { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(lost))
 }
 
 /// Draws a text log that a mapping reads.
@@ -138,7 +137,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
             Some(messages) => messages,
             None => log.messages(BATCH, unnamed.as_ref())?,
         };
-        bar.get_or_insert_with(|| Bar::over_log(messages.progress()));
+        bar.get_or_insert_with(|| Bar::over_log(messages.progress().watch()));
         let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();
         let name = names.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(", ");
         // Units of different serials are compared where each log has one that was asked for.

@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use isotherm_bus::ClientOptions;
+use isotherm_cli::Exit;
 use isotherm_correction::units::Span;
 use isotherm_log::offline::unit_id;
 
-use super::{Outcome, print, seconds, show};
+use super::{print, seconds, show};
 use crate::error::Error;
 use crate::record::{Bounds, RecordOptions, ServiceWait, TopicFilter, record};
 
@@ -23,19 +24,17 @@ const SMALLEST_QUEUE: u64 = 1 << 20;
 
 /// Record what is on the bus to MCAP files
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Example, of whatever is published on this address for five seconds, with no service to ask:\n  \
+#[command(after_help = "Example, five seconds of what is published on this address, without a service:\n  \
     isotherm-replay record --out run.mcap --listen tcp/127.0.0.1:0 --no-service --duration 5\n\n\
-    With `isotherm serve` running, the recording alone is enough to correct again what the service\n\
-    corrected, to the bit: it holds raw and corrected messages, status, the journal of every unit, the calibration documents,\n\
-    the service's configuration and the units' histories. Ctrl-C ends it in order:\n  \
+    With `isotherm serve` running, the recording alone reproduces the service's output to the bit: it contains raw and\n\
+    corrected messages, status, the journal of every unit, calibration documents, the service's configuration and the\n\
+    units' histories. Ctrl-C ends it in order:\n  \
     isotherm-replay record --out run.mcap\n\n\
-    Foxglove and PlotJuggler open the files: beside each topic of ticks is a channel …/json.\n\
-    Exit code 3: messages were lost, or the disk was full; the files hold everything up to there."
-)]
+    Foxglove and PlotJuggler open the files: each topic of ticks has a channel …/json too.\n\
+    Exit code 3: messages were lost, or the disk was full; everything before that is in the files.")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct RecordArgs {
-    /// File to write to; .mcap is added where it is missing; with --max-size or --max-duration RUN-0001.mcap and so on
+    /// File to write, with or without .mcap; with --max-size or --max-duration RUN-0001.mcap …
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
@@ -46,43 +45,43 @@ pub(super) struct RecordArgs {
     /// raw, reference, corrected, status, service, journal, or a key expression; repeatable (default: all of these)
     #[arg(long, short, value_name = "TOPIC")]
     topic: Vec<TopicFilter>,
-    /// Stop after this long (s)
+    /// Stop after this time (s)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Span>,
     /// Stop when the last service has stopped
     #[arg(long, conflicts_with = "no_service")]
     until_service_stops: bool,
-    /// How long to wait for a service, and for its answers (s)
+    /// Longest wait for a service and its answers (s)
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds, hide_short_help = true)]
     timeout: Span,
-    /// Wait for a service however long it takes
+    /// Wait for a service without a limit
     #[arg(long, conflicts_with = "no_service")]
     wait: bool,
-    /// Record without a service, or without asking it: the log cannot be corrected again to the bit
+    /// Record without querying a service: its output cannot be reproduced to the bit
     #[arg(long, hide_short_help = true)]
     no_service: bool,
-    /// How chunks are compressed
+    /// Compression
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     compression: Compression,
-    /// Leave out the channels with ticks and readings as JSON, which viewers show: files are half as long
+    /// Leave out the JSON channels for viewers: files are half as long
     #[arg(long, hide_short_help = true)]
     no_json_channels: bool,
-    /// End a chunk after this long at the latest (s): what a kill can cost
+    /// Longest chunk (s), the most that a crash of the recorder loses
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds, hide_short_help = true)]
     chunk_seconds: Span,
-    /// Begin a new file when one is this long (bytes, or with K, M, G: 1024, 1024², 1024³)
+    /// Start a new file at this size (bytes, or with K, M, G: 1024, 1024², 1024³)
     #[arg(long, value_name = "BYTES", value_parser = bytes, hide_short_help = true)]
     max_size: Option<u64>,
-    /// Begin a new file after this long (s)
+    /// Start a new file after this time (s)
     #[arg(long, value_name = "SECONDS", value_parser = seconds, hide_short_help = true)]
     max_duration: Option<Span>,
-    /// Keep so many of the newest files and delete older ones of this recording
+    /// Keep the newest N files of this recording, delete older ones
     #[arg(long, value_name = "FILES", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     keep: Option<u32>,
-    /// Write over files of this name
+    /// Replace files of this name
     #[arg(long)]
     overwrite: bool,
-    /// What may wait in memory to be written (bytes, or with K, M, G); messages beyond it are counted as lost
+    /// Memory for messages waiting for the disk (bytes, or with K, M, G); more are counted as lost
     #[arg(long, value_name = "BYTES", default_value = "256M", value_parser = bytes, hide_short_help = true)]
     queue: u64,
     /// Print the summary as one JSON object
@@ -117,7 +116,7 @@ fn bytes(text: &str) -> Result<u64, String> {
     };
     let number: Option<u64> = number.and_then(|number| number.parse().ok());
     let bytes = number.and_then(|number| number.checked_mul(factor));
-    bytes.ok_or_else(|| "must be a whole number of bytes, or one with K, M or G behind it".to_owned())
+    bytes.ok_or_else(|| "must be a whole number of bytes, or one followed by K, M or G".to_owned())
 }
 
 impl RecordArgs {
@@ -179,7 +178,7 @@ fn time(span: Span) -> Duration {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &RecordArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
     let options = args.options()?;
     let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
     let mut live = Live::new();
@@ -190,7 +189,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<Outcome, Error> {
     let report = recorded.map_err(|error| table::advise(error, &options))?;
     live.warn(&report);
     if let Some(failure) = &report.failure {
-        show::warn(&format!("recording has stopped: {failure}; everything up to there is in the file"));
+        show::warn(&format!("recording has stopped: {failure}; everything before that is in the file"));
     }
     if report.lost > 0 {
         show::warn(&format!("{} of {} messages are lost", report.lost, report.received));
@@ -198,16 +197,16 @@ pub(super) fn run(args: &RecordArgs) -> Result<Outcome, Error> {
     if !report.units_without_memory.is_empty() {
         let units = report.units_without_memory.join(", ");
         show::warn(&format!(
-            "nothing says what was known of {units} before: not to be corrected again to the bit"
+            "no memory or journal of {units} from before the recording: its output cannot be reproduced to the bit"
         ));
     }
     if args.topic.is_empty() && !report.units_without_raw.is_empty() {
         let units = report.units_without_raw.join(", ");
         show::warn(&format!(
-            "nothing raw has come of {units}: producers do not reach this recorder; give one --connect, to the service or to \
-             a router, and no --listen"
+            "no raw messages of {units} were received: producers do not reach this recorder; give one --connect, to \
+             the service or a router, and no --listen"
         ));
     }
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(report.lost_data()))
 }

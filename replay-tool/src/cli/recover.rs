@@ -3,25 +3,25 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::recording::recover::{Recovery, RecoveryReport};
 use isotherm_log::recording::{RecordingOptions, is_being_written};
 
-use super::{Outcome, print, show};
+use super::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Damaged places that the table names.
 const SHOWN: usize = 5;
 
-/// Get back what is whole of a recording that is cut short or damaged
+/// Copy the intact part of a damaged recording
 #[derive(Debug, Args)]
-#[command(after_help = "Example, of a recording that is cut in the middle:\n  \
+#[command(after_help = "Example, a recording that was cut short:\n  \
     isotherm-replay record --out cut.mcap --no-service --duration 1\n  \
     truncate --size=-50 cut.mcap\n  \
     isotherm-replay recover cut.mcap --out whole.mcap\n\n\
-    Chunks are taken or left as a whole, by their checksum; behind a damaged one reading goes on. The new file has a summary;\n\
-    calibration documents that the journal holds are attached anew. The old file stays as it is.\n\
-    Exit code 3: something that was in the file is lost; the summary says what.")]
+    Copies chunks with a right checksum; reading goes on after a damaged one. The new file has a summary; calibration\n\
+    documents are restored from the journal. The old file does not change.\n\
+    Exit code 3: part of the file is lost; the summary says what.")]
 pub(super) struct RecoverArgs {
     /// The recording
     #[arg(value_name = "FILE")]
@@ -29,10 +29,10 @@ pub(super) struct RecoverArgs {
     /// The new file
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// How chunks of the new file are compressed
+    /// Compression of the new file
     #[arg(long, value_enum, default_value_t)]
     compression: super::record::Compression,
-    /// Write over the new file where it is there already
+    /// Replace an existing file
     #[arg(long)]
     overwrite: bool,
     /// Print the summary as one JSON object
@@ -41,24 +41,27 @@ pub(super) struct RecoverArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &RecoverArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &RecoverArgs) -> Result<Exit, Error> {
     let recovery = Recovery::open(&args.input)?;
     if is_being_written(&args.input) {
-        show::warn(&format!("{} is being written: what comes now is not recovered", args.input.display()));
+        show::warn(&format!(
+            "{} is still being written: later messages are not recovered",
+            args.input.display()
+        ));
     }
     let options = RecordingOptions {
         compress: args.compression.compresses(),
         overwrite: args.overwrite,
         ..RecordingOptions::default()
     };
-    let mut bar = Bar::over_log(recovery.progress());
+    let mut bar = Bar::over_log(recovery.progress().watch());
     let recovered = recovery.run(&args.out, options, |report| {
-        bar.step(|| format!("{} messages", report.messages));
+        bar.step_saying(|| Some(format!("{} messages", report.messages)));
     });
     bar.finish();
     let report = recovered?;
     print(if args.json { show::json(&report) } else { human(&report, &args.out) }.as_bytes())?;
-    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(report.lost_data()))
 }
 
 /// The summary as a table.
@@ -69,18 +72,18 @@ fn human(report: &RecoveryReport, output: &Path) -> String {
         ("of topics", report.topics.len().to_string()),
         ("in chunks", report.chunks.to_string()),
         ("attachments", report.attachments.to_string()),
-        ("documents attached anew", report.documents_rebuilt.to_string()),
+        ("documents restored", report.documents_rebuilt.to_string()),
         ("messages known to be lost", report.missing.to_string()),
         ("messages of unknown topics", report.nameless.to_string()),
-        ("places passed over", report.damaged_places.to_string()),
+        ("damaged places skipped", report.damaged_places.to_string()),
         ("of bytes", format!("{} of {}", report.damaged_bytes, report.bytes)),
     ];
-    let ended = if report.ended { "yes" } else { "no: what its recorder had in memory is lost too" };
+    let ended = if report.ended { "yes" } else { "no: what the recorder had in memory is lost too" };
     rows.push(("the file had its end", ended.to_owned()));
     let mut lines = Vec::new();
     for damage in report.damage.iter().take(SHOWN) {
         let (offset, length) = (damage.offset, damage.length);
-        lines.push(format!("byte {offset}, {length} bytes passed over: {}\n", damage.words));
+        lines.push(format!("byte {offset}, {length} bytes skipped: {}\n", damage.words));
     }
     if report.damaged_places > SHOWN as u64 {
         lines.push(format!("and {} further places: see --json\n", report.damaged_places - SHOWN as u64));

@@ -55,16 +55,16 @@ pub(super) fn reading(report: &ReadReport) -> String {
         let first = report.first_skipped.as_deref().unwrap_or_default();
         let rows = report.skipped_rows;
         text.push_str(
-            &[&rows.to_string(), " rows could not be read and were passed over; the first:\n  ", first, "\n"]
+            &[&rows.to_string(), " rows could not be read and were skipped; the first:\n  ", first, "\n"]
                 .concat(),
         );
     }
     if report.bad_status_rows > 0 {
         let rows = report.bad_status_rows.to_string();
-        text.push_str(&[&rows, " rows were passed over because of their status\n"].concat());
+        text.push_str(&[&rows, " rows were skipped because of their status\n"].concat());
     }
     if report.cut_short {
-        text += "the compressed log ends in the middle; what there was has been used\n";
+        text += "the compressed log is cut short; everything before the end has been used\n";
     }
     if report.unterminated_last_line {
         text += "the log's last line has no line end: its last cell may be cut\n";

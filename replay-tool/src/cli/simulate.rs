@@ -6,49 +6,49 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
 use flate2::{Compression, write::GzEncoder};
+use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
 use serde::Serialize;
 
-use super::{Outcome, print, seconds, show};
+use super::{print, seconds, show};
 use crate::error::Error;
-use crate::progress::Bar;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{read_small_text, refuse_overwriting};
 use isotherm_log::mapping::Mapping;
 
-/// Simulate a log, with the mapping that reads it back beside it
+/// Simulate a log, with the mapping that reads it back
 #[derive(Debug, Args)]
 #[command(
     group = ArgGroup::new("what").required(true).args(["scenario", "preset", "list_presets", "print_preset"]),
     after_help = "Example:\n  isotherm-replay simulate --preset zeeman-sine --duration 60 --out zeeman.csv --truth truth.csv\n\n\
         Writes zeeman.csv and zeeman.mapping.toml; a name that ends in .gz is compressed.\n\n\
-        A scenario of one's own begins with a ready-made one:\n  \
+        To write your own scenario, start from a preset:\n  \
         isotherm-replay simulate --print-preset mems-chamber > mine.toml"
 )]
 pub(super) struct SimulateArgs {
     /// Scenario (TOML)
     #[arg(value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
-    /// A ready-made scenario
+    /// Preset scenario
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// List the ready-made scenarios
+    /// List the presets
     #[arg(long)]
     list_presets: bool,
-    /// Print a ready-made scenario as TOML, with --seed and --duration in it
+    /// Print a preset as TOML, with --seed and --duration applied
     #[arg(long, value_name = "NAME", conflicts_with_all = ["out", "truth", "json"])]
     print_preset: Option<String>,
-    /// Where the log goes
+    /// Log to write
     #[arg(long, short, value_name = "FILE", required_unless_present_any = ["list_presets", "print_preset"])]
     out: Option<PathBuf>,
-    /// Where the truth goes: true increments, temperatures and drifts
+    /// Truth to write: increments, temperatures and drifts
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Seed of all noise, in place of the scenario's
+    /// Seed of all noise (default: the scenario's)
     #[arg(long)]
     seed: Option<u64>,
-    /// Duration (s), in place of the scenario's
+    /// Duration (s) (default: the scenario's)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     duration: Option<Span>,
     /// Print the summary as one JSON object
@@ -117,7 +117,7 @@ impl SimulateArgs {
             (None, Some(name)) => {
                 let preset = PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
                     let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
-                    Error::Usage(format!("there is no preset {name:?}, there are {}", names.join(", ")))
+                    Error::Usage(format!("there is no preset {name:?}; presets are {}", names.join(", ")))
                 })?;
                 (preset.make)(1)
             }
@@ -147,18 +147,18 @@ fn load(path: &Path) -> Result<Scenario, Error> {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     if args.list_presets {
         let rows: Vec<_> =
             PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
         print(rows.concat().as_bytes())?;
-        return Ok(Outcome::Complete);
+        return Ok(Exit::Ok);
     }
     if args.print_preset.is_some() {
         let text =
             toml::to_string(&args.scenario()?).map_err(|error| Error::Scenario(vec![error.to_string()]))?;
         print(text.as_bytes())?;
-        return Ok(Outcome::Complete);
+        return Ok(Exit::Ok);
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
     let scenario = args.scenario()?;
@@ -198,7 +198,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
         }
         report.ticks += 1;
         report.temperature_readings += step.temperatures.len() as u64;
-        bar.step(String::new);
+        bar.step();
     }
     bar.finish();
     log.finish().map_err(failed)?;
@@ -206,7 +206,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Outcome, Error> {
         writer.finish().map_err(|source| Error::file(path, "write", source))?;
     }
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(Outcome::Complete)
+    Ok(Exit::Ok)
 }
 
 /// The summary as a table.

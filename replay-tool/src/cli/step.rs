@@ -6,6 +6,7 @@ use std::io::{self, BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use isotherm_cli::Exit;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::{Loaded, load_calibration};
 use isotherm_log::part::Part;
@@ -13,20 +14,19 @@ use isotherm_log::replica::stepper::{Step, Stepper};
 use isotherm_log::replica::{Changes, Replica, scan};
 use isotherm_protocol::key::UnitId;
 
-use super::{LogArgs, Outcome, print, show};
+use super::{LogArgs, print, show};
 use crate::error::Error;
 
 /// What can be typed between two events.
-const HELP: &str = "Enter: next event · number, Enter: so many · s SEQ: to gyro tick SEQ · q: end";
+const HELP: &str = "Enter: next event · number, Enter: that many · s SEQ: to gyro tick SEQ · q: end";
 
 /// Walk through the events of a unit's state machine one by one
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 10 --out mems.csv\n  \
     isotherm-replay step mems.csv --calibration config/calibration/MEMS-0001.toml --from 100 --count 3\n\n\
-    Without --from, --count and --json, on a terminal, it stops behind each event: Enter for the next, a number and Enter for so \
-    many, s SEQ to go to gyro tick SEQ, q to end.\n\n\
-    A recording is gone through by its own journal, as `isotherm-replay correct` does.")]
+    Without --from, --count and --json, on a terminal, it stops after each event: Enter for the next, a number and Enter for that many, s SEQ to go to gyro tick SEQ, q to end.\n\n\
+    A recording is followed by its own journal, as in `isotherm-replay correct`.")]
 pub(super) struct StepArgs {
     #[command(flatten)]
     log: LogArgs,
@@ -45,7 +45,7 @@ pub(super) struct StepArgs {
 }
 
 /// Runs the command.
-pub(super) fn run(args: &StepArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &StepArgs) -> Result<Exit, Error> {
     let loaded = args.calibration.as_deref().map(load_calibration).transpose()?;
     let mut stepper = open(args, loaded.as_ref())?;
     let terminal = io::stdin().is_terminal() && io::stdout().is_terminal();
@@ -55,7 +55,7 @@ pub(super) fn run(args: &StepArgs) -> Result<Outcome, Error> {
     } else {
         list(&mut stepper, args)?;
     }
-    Ok(if stepper.replica().report().is_exact() { Outcome::Complete } else { Outcome::DataLoss })
+    Ok(Exit::of_loss(!stepper.replica().report().is_exact()))
 }
 
 /// Opens the log of one unit.
@@ -84,8 +84,8 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
     let [unit] = units.as_slice() else {
         let names: Vec<_> = units.iter().map(UnitId::as_str).collect();
         return Err(Error::Usage(match names.len() {
-            0 => "there are no raw messages in the log, or none of that unit".to_owned(),
-            _ => format!("the log is of {}: name one with --unit", names.join(", ")),
+            0 => "the log has no raw messages, or none of that unit".to_owned(),
+            _ => format!("the log has {}: choose one with --unit", names.join(", ")),
         }));
     };
     let journal = outlines.units.remove(unit).unwrap_or_default().journal;
@@ -104,7 +104,7 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
         }
         Some(loaded) => Replica::without_journal(unit.clone(), settings, Some(loaded)),
         None => {
-            let words = format!("there is no journal to go through unit {unit} by: give --calibration FILE");
+            let words = format!("unit {unit} has no journal to follow: give --calibration FILE");
             return Err(Error::Usage(words));
         }
     };
@@ -185,7 +185,7 @@ fn converse(stepper: &mut Stepper, input: &mut dyn BufRead) -> Result<(), Error>
 
 /// Says that there is no further event.
 fn over() -> Result<(), Error> {
-    print("the log is over\n".as_bytes())
+    print("end of the log\n".as_bytes())
 }
 
 fn tell(step: &Step) -> Result<(), Error> {

@@ -65,17 +65,17 @@ pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch
 /// Why nothing comes back, as far as the unit's status tells.
 fn words(unit: &UnitId, ticks: u64, status: Option<&Status>) -> String {
     let quiet =
-        format!("{unit}: nothing has come back for {} s, {ticks} ticks are under way", QUIET.as_secs());
+        format!("{unit}: nothing has come back for {} s, {ticks} ticks are in flight", QUIET.as_secs());
     match status {
-        None => format!("{quiet}; the service says nothing of the unit"),
+        None => format!("{quiet}; the service has no status of the unit"),
         Some(status) if !operation::State::from(status.state).is_running() => format!(
-            "{quiet}: the unit is in {}, where nothing goes out; `isotherm command {unit} run` puts it to work, \
-             --no-acknowledge plays without waiting for it",
+            "{quiet}: the unit is in {}, where nothing is published; run it with `isotherm command {unit} run`, or \
+             play with --no-acknowledge",
             operation::State::from(status.state)
         ),
         Some(status) if status.output == Output::Held => format!(
-            "{quiet}: the unit has no calibration, and the service holds such units back (uncalibrated = \"hold\"); give it \
-             one, or play with --no-acknowledge"
+            "{quiet}: the unit has no calibration, and the service publishes nothing then (uncalibrated = \"hold\"); \
+             give it one, or play with --no-acknowledge"
         ),
         Some(_) => {
             format!("{quiet}; see the service's log and the unit's status, or play with --no-acknowledge")
@@ -95,7 +95,7 @@ mod tests {
         let status = |state, output| Status { state, output, ..Status::default() };
         let running = State::RunningWithReversal;
         let table = [
-            (None, "says nothing of the unit"),
+            (None, "has no status of the unit"),
             (Some(status(State::Standby, Output::Calibrated)), "is in standby"),
             (Some(status(State::SelfTest, Output::Calibrated)), "is in self-test"),
             (Some(status(running, Output::Held)), "uncalibrated = \"hold\""),

@@ -68,8 +68,8 @@ impl<'a> Units<'a> {
         for unit in serials {
             if !self.serials.insert(unit.clone()) {
                 return Err(Error::Usage(format!(
-                    "{of} of the log would be played as {unit}, and so is another of its units: give one of them another \
-                     by --remap"
+                    "{of} and another unit of the log would both be played as {unit}: give one of them another \
+                     serial with --remap"
                 )));
             }
             let faults = (!self.options.faults.is_none())

@@ -51,10 +51,9 @@ impl Files {
             return Err(Error::Usage(format!("{} is being written by another recorder", path.display())));
         }
         match found.first() {
-            Some(path) if !overwrite => Err(Error::Usage(format!(
-                "{} is there already: choose another name, or --overwrite",
-                path.display()
-            ))),
+            Some(path) if !overwrite => {
+                Err(Error::Usage(format!("{} exists: give another name, or --overwrite", path.display())))
+            }
             _ => Ok(files),
         }
     }

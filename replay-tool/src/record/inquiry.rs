@@ -62,7 +62,7 @@ pub(super) async fn ask(
                 samples.extend(reply.into_result().ok());
             }
             if !in_time {
-                unanswered.push(format!("{expression}: no answer, or only a part of it, within {limit:?}"));
+                unanswered.push(format!("{expression}: no complete answer within {limit:?}"));
             }
             if keys == key::ALL_JOURNALS {
                 for (key, frames) in memories(&samples) {

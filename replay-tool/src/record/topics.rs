@@ -37,7 +37,8 @@ impl FromStr for TopicFilter {
             return Err(format!("must be one of {names}, or a key expression such as imu/*/corrected"));
         }
         let keys = OwnedKeyExpr::autocanonize(text.to_owned());
-        keys.map(Self::Keys).map_err(|error| format!("is no key expression: {}", isotherm_bus::words(&error)))
+        keys.map(Self::Keys)
+            .map_err(|error| format!("is not a key expression: {}", isotherm_bus::words(&error)))
     }
 }
 

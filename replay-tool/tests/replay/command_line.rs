@@ -109,7 +109,7 @@ fn every_end_has_its_exit_code() {
         2,
         "must be max",
     );
-    check(&replay(path, &["simulate", "--preset", "none", "--out", "x.csv"]), 2, "there are zeeman-rest");
+    check(&replay(path, &["simulate", "--preset", "none", "--out", "x.csv"]), 2, "presets are zeeman-rest");
     check(
         &replay(path, &["play", "mems.csv", "mems.csv", "-m", "mems.mapping.toml", "-u", "a"]),
         2,
@@ -203,11 +203,11 @@ fn no_output_is_written_over_an_input() {
     let folder = simulated();
     let path = folder.path();
     let before = fs::read(path.join("mems.csv")).unwrap();
-    check(&correct(path, &["--out", "mems.csv"]), 2, "mems.csv would be written over");
-    check(&correct(path, &["--out", "./mems.mapping.toml"]), 2, "would be written over");
+    check(&correct(path, &["--out", "mems.csv"]), 2, "mems.csv would be overwritten");
+    check(&correct(path, &["--out", "./mems.mapping.toml"]), 2, "would be overwritten");
     let simulate = ["simulate", "--preset", "mems-chamber", "--duration", "1", "--out", "x.csv", "--truth"];
-    check(&replay(path, &[&simulate[..], &["x.csv"]].concat()), 2, "x.csv would be written over");
-    check(&replay(path, &[&simulate[..], &["x.mapping.toml"]].concat()), 2, "would be written over");
+    check(&replay(path, &[&simulate[..], &["x.csv"]].concat()), 2, "x.csv would be overwritten");
+    check(&replay(path, &[&simulate[..], &["x.mapping.toml"]].concat()), 2, "would be overwritten");
     assert_eq!(fs::read(path.join("mems.csv")).unwrap(), before);
     assert!(!path.join("x.csv").exists());
 }

@@ -200,7 +200,7 @@ fn a_stream_that_is_empty_is_read_back_as_empty() {
         assert_eq!(files(&summary), []);
     }
     let output = replay(folder.path(), &["convert", "none.mcap", "--out", "bag", "--to", "ros2"]);
-    check(&output, 2, "nothing in the log can go into a ROS 2 bag: it has no units");
+    check(&output, 2, "the log has nothing for a ROS 2 bag: it has no units");
 }
 
 #[test]
@@ -216,7 +216,7 @@ fn doubled_and_late_ticks_and_new_runs_are_told() {
     record(&path("x.mcap"), &all);
     let summary = convert(folder.path(), &["x.mcap", "--out", "x.csv"], 3);
     assert_eq!(summary["duplicates"], 1);
-    let lost = serde_json::json!({ "frames that cannot be read": 1, "too late to be put in order": 1 });
+    let lost = serde_json::json!({ "frames that cannot be read": 1, "too late to be sorted": 1 });
     assert_eq!(summary["lost"], lost);
     assert_eq!(files(&summary), pairs(&[("x.2.csv", 5), ("x.csv", 700), ("x.mapping.toml", 1)]));
     for (name, ticks) in [("x.csv", 700), ("x.2.csv", 5)] {
@@ -272,7 +272,7 @@ fn the_part_that_is_asked_for_is_converted() {
     check(
         &output,
         2,
-        "y.csv holds one unit, the log has 2 (A-1, B-2): give --unit, or a folder with --to text",
+        "y.csv is for one unit, the log has 2 (A-1, B-2): give --unit, or a folder with --to text",
     );
 }
 
@@ -292,9 +292,9 @@ fn nothing_is_written_over_and_nothing_half_is_left() {
     fs::create_dir_all(path("full/other")).unwrap();
     let before = names();
     let run = |args: &[&str]| replay(folder.path(), &[&["convert"], args].concat());
-    check(&run(&["x.mcap", "--out", "x.csv"]), 2, "x.csv is there already");
-    check(&run(&["x.mcap", "--out", "y.csv"]), 2, "y.mapping.toml is there already");
-    check(&run(&["x.mcap", "--out", "full", "--to", "parquet"]), 2, "the folder full has something in it");
+    check(&run(&["x.mcap", "--out", "x.csv"]), 2, "x.csv exists");
+    check(&run(&["x.mcap", "--out", "y.csv"]), 2, "y.mapping.toml exists");
+    check(&run(&["x.mcap", "--out", "full", "--to", "parquet"]), 2, "the folder full is not empty");
     check(&run(&["x.mcap", "--out", "x.csv", "--to", "ros2"]), 2, "another kind of output");
     check(&run(&["x.mcap", "--out", "x.mcap"]), 2, "a recording already");
     check(&run(&["x.mcap", "--out", "other"]), 2, "does not say what to convert to");

@@ -224,10 +224,10 @@ fn what_does_not_go_together_is_refused() {
         (vec!["correct", "raw.mcap", "--mapping", "mems.mapping.toml"], "is for text logs"),
         (
             vec!["correct", "raw.mcap", "--calibration", "mems.toml", "--out", "raw.mcap"],
-            "would be written over",
+            "would be overwritten",
         ),
-        (vec!["diff", "raw.mcap", "raw.mcap"], "no corrected ticks in either log"),
-        (vec!["step", "raw.mcap"], "no journal to go through unit MEMS-0001 by"),
+        (vec!["diff", "raw.mcap", "raw.mcap"], "neither log has corrected ticks"),
+        (vec!["step", "raw.mcap"], "unit MEMS-0001 has no journal to follow"),
         (vec!["step", "raw.mcap", "--calibration", "other.toml"], "--calibration is for unit MEMS-0002"),
     ] {
         let errors = ended(&replay(folder.path(), &args), 2);

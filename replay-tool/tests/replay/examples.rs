@@ -53,7 +53,7 @@ fn every_command_has_an_example_that_works_as_printed() {
     for known in ["play", "correct", "convert", "simulate", "list", "cat", "completions", "man"] {
         assert!(commands.iter().any(|name| name == known), "{commands:?}");
     }
-    // The last two are those of every program (`isotherm_document::program`), whose name they do not know.
+    // The last two are those of every program (`isotherm_cli::program`), whose name they do not know.
     for command in commands.into_iter().filter(|name| !["completions", "man"].contains(&name.as_str())) {
         let help = stdout(&replay(place.path(), &[&command, "--help"]));
         let lines = examples(&help);

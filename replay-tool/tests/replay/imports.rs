@@ -95,7 +95,7 @@ fn xsens_a_rate_in_the_comments_and_a_counter_that_begins_anew() {
         "comment = \"//\"",
         "column = \"Gyr_X\", unit = \"rad_per_s\"",
         "column = \"Acc_Z\", unit = \"m_per_s2\"",
-        "PacketCounter begins anew 1 times",
+        "PacketCounter restarts 1 times",
     ];
     let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
     let (text, mapping) = import("MT_00B421AF.txt", text.as_bytes(), &[], &expected);
@@ -192,11 +192,7 @@ fn analog_devices_registers_are_raw_readings_and_the_rate_is_asked() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("adis16495.csv"), &text).unwrap();
     let silent = replay(folder.path(), &["import", "adis16495.csv"]);
-    check(
-        &silent,
-        2,
-        "adis16495.csv has no usable time: how many rows are there in a second?: give --rate-hz HZ",
-    );
+    check(&silent, 2, "adis16495.csv has no usable time: how many rows per second?: give --rate-hz HZ");
     assert!(!folder.path().join("adis16495.mapping.toml").exists());
     let parts = [
         "sequence_column = \"DATA_CNTR\"",
@@ -379,7 +375,7 @@ fn what_no_log_says_is_asked_for_with_its_option() {
     check(
         &output,
         2,
-        "in which unit are the gyros gx, gy, gz? The largest reading is 2.5: give --gyro-unit deg_per_s|rad_per_s",
+        "what is the unit of the gyros gx, gy, gz? The largest reading is 2.5: give --gyro-unit deg_per_s|rad_per_s",
     );
     write(
         "steps.csv",
@@ -390,7 +386,7 @@ fn what_no_log_says_is_asked_for_with_its_option() {
     check(
         &replay(folder.path(), &["import", "steps.csv"]),
         2,
-        "in which unit is the time time? It usually grows by 1000: give --time-unit s|ms|us|ns",
+        "what is the unit of the time time? It usually grows by 1000: give --time-unit s|ms|us|ns",
     );
     write("prose.txt", "no figures\nin here at all\n");
     check(&replay(folder.path(), &["import", "prose.txt"]), 2, "no rows of numbers in the first 2 lines");

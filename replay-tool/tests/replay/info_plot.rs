@@ -121,7 +121,7 @@ fn a_page_is_not_written_over_its_log() {
     std::fs::write(folder.path().join("log.csv"), "1\n").unwrap();
     let output = replay(folder.path(), &["plot", "log.csv", "--mapping", "m.toml", "--out", "log.csv"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("would be written over"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("would be overwritten"));
 }
 
 #[test]

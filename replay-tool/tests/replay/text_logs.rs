@@ -87,9 +87,14 @@ fn what_cannot_be_read_right_is_refused_with_line_and_column() {
             1,
             "log.csv:4:1: column 1 \"t\": \"5\" is not after",
         ),
-        ("time standing still", ROWS.replace("\n30;", "\n20;"), 1, "time stands still or goes back"),
+        ("time standing still", ROWS.replace("\n30;", "\n20;"), 1, "time must increase"),
         ("a decimal comma", ROWS.replacen("-1.25", "-1,25", 1), 1, "log.csv:2:8: column 3 \"y\": \"-1,25\""),
-        ("a cell too many", ROWS.replacen("20.5", "20;5", 1), 1, "log.csv:2:19: column 6: \"5\" is too much"),
+        (
+            "a cell too many",
+            ROWS.replacen("20.5", "20;5", 1),
+            1,
+            "log.csv:2:19: column 6: \"5\" is one too many",
+        ),
     ];
     let semicolons = mapping("delimiter = \"semicolon\"", "");
     for (name, log, expected, words) in &table {
@@ -145,8 +150,8 @@ fn play_refuses_a_log_before_it_opens_a_session() {
         (&["log.csv", "-m", "m.toml", "-u", "A"], 1, "log.csv:1:1: the header has no column \"x\""),
         (&["log.csv", "-m", "m.toml"], 2, "give --unit SERIAL"),
         (&["log.csv", "-m", "m.toml", "-u", "A", "-u", "B"], 2, "give --unit once"),
-        (&["log.csv", "-u", "A"], 2, "log.csv is no recording, and a text log needs --mapping"),
-        (&["log.mcap", "log.csv"], 2, "log.mcap is a recording and log.csv is none"),
+        (&["log.csv", "-u", "A"], 2, "log.csv is not a recording, and a text log needs --mapping"),
+        (&["log.mcap", "log.csv"], 2, "log.mcap is a recording, but log.csv is not"),
         (&["log.mcap", "-m", "m.toml"], 2, "--mapping m.toml is for text logs"),
         (&["log.mcap", "--batch", "4"], 2, "--batch is for text logs"),
         (

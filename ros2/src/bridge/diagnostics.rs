@@ -78,10 +78,7 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
     if totals.imu_in == before.imu_in {
         found.push((Level::Stale, format!("no raw messages on {}", mapping.raw)));
     } else if status.is_none() {
-        found.push((
-            Level::Error,
-            "no service has the unit: is one running, and where the bridge looks for it?".to_owned(),
-        ));
+        found.push((Level::Error, "no service has the unit: check that one runs, and --service".to_owned()));
     }
     if refused > 0 {
         let last = last_refusal.as_ref().map_or_else(String::new, |last| format!(", the last on {last}"));

@@ -121,7 +121,7 @@ async fn command(bus: &Session, unit: &UnitId, does: Does, request: &Attachment)
     };
     match answers.first().map(|answer| serde_json::from_slice::<CommandReply>(answer)) {
         Some(Ok(reply)) => TriggerResponse { success: reply.accepted, message: in_words(&reply) },
-        Some(Err(error)) => failed(format!("the service's answer is none: {error}")),
+        Some(Err(error)) => failed(format!("the service's answer is invalid: {error}")),
         None => failed("the service went away before it answered".to_owned()),
     }
 }

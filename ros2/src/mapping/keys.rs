@@ -20,7 +20,7 @@ pub(super) struct Keys {
     #[serde(default = "node")]
     #[schemars(
         regex(pattern = r"^_?[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$"),
-        extend("x-must-be" = "letters, digits and single underscores, the first no digit")
+        extend("x-must-be" = "letters, digits and single underscores, not beginning with a digit")
     )]
     pub(super) node: String,
     /// Its namespace.

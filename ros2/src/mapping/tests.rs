@@ -66,9 +66,7 @@ fn what_contradicts_itself_is_refused() {
     let loops = GOOD.replace("\"/imu\"", "\"/raw\"");
     assert_eq!(
         problems(&loops),
-        [
-            "m.toml:5:13: unit[0].corrected: is \"/raw\", which is the topic of unit[0].raw already: take another"
-        ]
+        ["m.toml:5:13: unit[0].corrected: is \"/raw\", already the topic of unit[0].raw: use another"]
     );
     let twice = format!(
         "{GOOD}{}",

@@ -13,13 +13,14 @@ use super::signer::{Signer, signer};
 use super::{FileKind, Finding, Summary};
 use crate::config::Settings;
 use crate::signing::read_trusted_keys;
-use crate::text::{read_bounded, text, whole};
+use isotherm_document::file::{read_bounded, text};
+use isotherm_document::unplaced;
 
 /// Top-level keys that only a calibration document has.
 const CALIBRATION_KEYS: [&str; 6] = ["schema", "unit", "gyro", "accel", "temperature", "mode_reversal"];
 
 /// What is said of a file that may be anything.
-const NO_KEYS: &str = "holds no keys: say with --kind what it is meant to be";
+const NO_KEYS: &str = "has no keys: state its kind with --kind";
 
 /// Longest message of the JSON5 parser that is passed on; long enough for Zenoh's lists of known keys.
 const MAX_MESSAGE_CHARS: usize = 1000;
@@ -47,7 +48,7 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
         Some(FileKind::Overlay) => check_overlay(text, &file, trusted),
         Some(FileKind::Service) => check_service(text, path),
         Some(FileKind::Zenoh) => check_zenoh(text, &file),
-        None => Err(vec![whole(&file, NO_KEYS.to_owned())]),
+        None => Err(vec![unplaced(Some(&file), NO_KEYS.to_owned())]),
     });
     let (problems, warnings, summary) = match checked {
         Ok((summary, warnings)) => (Vec::new(), warnings, Some(summary)),
@@ -180,7 +181,7 @@ fn check_zenoh(text: &str, file: &str) -> Checked {
             let (line, column) = place.unwrap_or((1, 1));
             let message: String =
                 message.chars().filter(|c| !c.is_control()).take(MAX_MESSAGE_CHARS).collect();
-            Err(vec![Problem { line, column, ..whole(file, message) }])
+            Err(vec![Problem { line, column, ..unplaced(Some(file), message) }])
         }
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn refuse(findings: &mut [Finding]) {
             let others = files.keys().filter(|other| *other != file).filter_map(|other| other.file_name());
             let others: Vec<_> = others.map(|name| name.to_string_lossy()).collect();
             let message = format!(
-                "unit {unit} is named by {} too: the service takes none of them, remove all but one",
+                "unit {unit} is also named by {}: the service uses neither; remove all but one",
                 others.join(", ")
             );
             for index in indices {

@@ -30,7 +30,7 @@ impl fmt::Display for Signer {
         match self {
             Self::Unsigned => f.write_str("unsigned"),
             Self::Unverified { key_id } => {
-                write!(f, "signed by key {key_id}, not verified (--trusted-keys says with what)")
+                write!(f, "signed by key {key_id}, not verified (needs --trusted-keys)")
             }
             Self::Signed { key_id, name } => write!(f, "signed by {name} ({key_id})"),
         }

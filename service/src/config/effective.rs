@@ -17,9 +17,8 @@ use super::keys::{
 
 /// What is said before the text.
 const NOTE: &str = "\
-# The configuration that holds, defaults included.
-# Left out, because it may hold passwords and keys: what stands in the Zenoh configuration file, and what follows a `#` or `?`
-# in an endpoint.
+# The effective configuration, defaults included.
+# Left out, because they may contain secrets: the Zenoh configuration file, and what follows a `#` or `?` in an endpoint.
 ";
 
 impl Settings {

@@ -102,7 +102,7 @@ fn existing(
 fn units(r: &mut Reader<'_>, patterns: Vec<String>) -> Vec<String> {
     for (index, pattern) in patterns.iter().enumerate() {
         if chunk(pattern).is_none() {
-            let must_be = "a serial, such as \"ZLG-0042\", in which * stands for any characters: \"ZLG-*\"";
+            let must_be = "a serial, such as \"ZLG-0042\"; * matches any characters: \"ZLG-*\"";
             r.report(&element("units", index), format!("is {pattern:?}, must be {must_be}"));
         }
     }

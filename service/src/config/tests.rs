@@ -150,7 +150,7 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         ("\n max_units = 16385", "2:14: max_units: is 16385, must be a whole number from 1 to 16384"),
         (
             "units = [\"a/b\"]",
-            "1:10: units[0]: is \"a/b\", must be a serial, such as \"ZLG-0042\", in which * stands for any characters: \"ZLG-*\"",
+            "1:10: units[0]: is \"a/b\", must be a serial, such as \"ZLG-0042\"; * matches any characters: \"ZLG-*\"",
         ),
         (
             "[pair]\nname = \"a b\"",

@@ -210,7 +210,7 @@ impl Drop for Watcher {
         self.signals.stop();
         if !self.signals.wait_for_end(STOP_LIMIT) {
             tracing::warn!(
-                "the calibration folder's watcher did not end within {STOP_LIMIT:?} and is left behind"
+                "the watcher of the calibration folder did not end within {STOP_LIMIT:?} and is abandoned"
             );
         }
     }

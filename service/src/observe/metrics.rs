@@ -97,7 +97,7 @@ impl Endpoint {
         let refused = |source| ServiceError::Metrics { address, source };
         if !settings.admits(address) {
             let words =
-                "other machines could reach it; take 127.0.0.1, or set allow_remote = true in [metrics]";
+                "other machines could reach it; use 127.0.0.1, or set allow_remote = true in [metrics]";
             return Err(refused(io::Error::other(words)));
         }
         let listener = TcpListener::bind(address).await.map_err(refused)?;

@@ -17,6 +17,7 @@ use zenoh::query::Query;
 
 use crate::config::Settings;
 use crate::control::swap_manager::ControlStatus;
+use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
 use crate::receive::unit::UnitActor;
@@ -92,13 +93,13 @@ impl StatusPublisher {
     pub(crate) fn start(
         session: &Session,
         intake: Arc<Intake>,
-        control_status: Arc<ControlStatus>,
+        (control_status, subscribers): (Arc<ControlStatus>, Arc<Subscribers>),
         pair: &Arc<Pair>,
         settings: &Settings,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(WAITING_REQUESTS);
         let rung = Arc::new(AtomicBool::new(false));
-        let instance = Instance::new(session, settings.digest, control_status);
+        let instance = Instance::new(session, settings.digest, control_status, subscribers);
         let mut work = Work {
             outlets: Outlets::new(session.clone()),
             instance,

@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
+use isotherm_cli::Exit;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
-
-use crate::exit::Exit;
 
 /// Account of one unit since the service started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

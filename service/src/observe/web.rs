@@ -32,14 +32,14 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::operator::client::Client;
-use crate::operator::status::unix_ms;
-use crate::operator::{Feed, Fleet};
 use crate::receive::intake::Intake;
 use guard::Guard;
+use isotherm_operator::client::Client;
+use isotherm_operator::status::unix_ms;
+use isotherm_operator::{Feed, Fleet};
 
 pub use token::WebArgs;
-pub(crate) use token::show;
+pub use token::show;
 
 /// How long an answer on the bus is waited for: shorter than a connection may last.
 const ANSWER_LIMIT: Duration = Duration::from_secs(10);
@@ -79,8 +79,8 @@ impl Web {
         }
         if settings.metrics.listen.is_some_and(|address| !address.ip().to_canonical().is_loopback()) {
             tracing::warn!(
-                "the console in the browser can be reached from other machines, and its token is not encrypted on the way: let it \
-                 listen on 127.0.0.1 behind a proxy with TLS"
+                "other machines can reach the console in the browser, and its token is sent unencrypted: listen on \
+                 127.0.0.1 behind a proxy with TLS"
             );
         }
         let token = token::of_service(settings)?;
@@ -123,7 +123,7 @@ async fn feed(client: Arc<Client>, fleet: Arc<Mutex<Fleet>>) {
                     fleet.forget(now);
                 }
             }
-            Err(error) => tracing::debug!("console in the browser: {error}; tried again"),
+            Err(error) => tracing::debug!("console in the browser: {error}; will retry"),
         }
         tokio::time::sleep(PAUSE).await;
     }

@@ -193,7 +193,9 @@ impl Work {
         });
         if still.is_some() {
             self.pair.told();
-            tracing::warn!("this process stood still: it listens whether another instance speaks");
+            tracing::warn!(
+                "this process was stopped for a while: it checks whether another instance publishes"
+            );
         }
         let mut spoken = Vec::new();
         for (unit, memory, spoke, alarm) in looked.into_iter().flatten() {
@@ -210,7 +212,10 @@ impl Work {
             }
         }
         if !spoken.is_empty() {
-            tracing::warn!(units = spoken.join(" "), "this instance speaks from here on, in another's place");
+            tracing::warn!(
+                units = spoken.join(" "),
+                "this instance publishes from now on, instead of another"
+            );
         }
     }
 }

@@ -102,7 +102,7 @@ impl Telling {
 impl fmt::Display for Telling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::First(words) => write!(f, "{words}; further ones are counted only"),
+            Self::First(words) => write!(f, "{words}; further ones are only counted"),
             Self::Again { count, since } => write!(f, "{count} more in the last {} s", since.as_secs()),
         }
     }

@@ -92,7 +92,7 @@ impl Intake {
         let made = units.iter().filter(|unit| match self.outlets.prepare(unit) {
             Ok(()) => true,
             Err(error) => {
-                tracing::warn!(%unit, "no publisher yet, tried again when it appears: {error}");
+                tracing::warn!(%unit, "no publisher yet, tried again when the unit appears: {error}");
                 false
             }
         });
@@ -104,11 +104,13 @@ impl Intake {
     /// Whatever goes wrong is counted; nothing gets out of here but the answer.
     pub fn receive(&self, key: &str, payload: Option<&[u8]>, arrival: Instant) -> bool {
         let Some((serial, stream)) = key::parse_raw(key) else {
-            self.fault(FaultKind::UnknownStream, || format!("{key} is no raw stream: gyro, accel or temp"));
+            self.fault(FaultKind::UnknownStream, || {
+                format!("{key} is not a raw stream: gyro, accel or temp")
+            });
             return false;
         };
         let Some(frame) = payload else {
-            self.fault(FaultKind::Deletion, || format!("{key}: a deletion means nothing here"));
+            self.fault(FaultKind::Deletion, || format!("{key}: a deletion has no effect"));
             return false;
         };
         let known = self.unit(serial);
@@ -131,7 +133,7 @@ impl Intake {
             return false;
         };
         let Some(frame) = payload else {
-            self.fault(FaultKind::Deletion, || format!("{key}: a deletion means nothing here"));
+            self.fault(FaultKind::Deletion, || format!("{key}: a deletion has no effect"));
             return false;
         };
         let mut actor = lock(&unit);
@@ -183,7 +185,7 @@ impl Intake {
                 Ok(state) => {
                     tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name());
                 }
-                Err(refusal) => tracing::warn!(unit = %id, "as before the restart it cannot be: {refusal}"),
+                Err(refusal) => tracing::warn!(unit = %id, "cannot be as before the restart: {refusal}"),
             }
         }
         if let Some(current) = &plan.current {
@@ -268,7 +270,7 @@ impl Intake {
     fn refuse<T>(&self, id: &UnitId) -> Option<T> {
         let limit = self.settings.max_units;
         self.fault(FaultKind::TooManyUnits, || {
-            format!("unit {id} is refused: all {limit} places (max_units) are taken or kept")
+            format!("unit {id} is refused: all {limit} places (max_units) are taken")
         });
         None
     }

@@ -32,10 +32,14 @@ impl fmt::Display for Stuck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Message(since) => {
-                write!(f, "the receive path hangs: at one message for {:.1} s", since.as_secs_f64())
+                write!(f, "the receive path hangs: one message has taken {:.1} s", since.as_secs_f64())
             }
             Self::Threads(since) => {
-                write!(f, "the receive path hangs: no sign of its threads for {:.1} s", since.as_secs_f64())
+                write!(
+                    f,
+                    "the receive path hangs: its threads have not answered for {:.1} s",
+                    since.as_secs_f64()
+                )
             }
         }
     }

@@ -283,7 +283,7 @@ impl UnitActor {
     /// Calibration, revision and state stay; a self-test or pre-launch calibration is given up.
     pub fn reset(&mut self, cause: &str) {
         let id = self.stream.id().clone();
-        tracing::error!(unit = %id, "alarm: {cause}; the unit starts anew");
+        tracing::error!(unit = %id, "alarm: {cause}; the unit is restarted");
         self.before_reset = self.counters();
         let state = self.stream.unit().state();
         self.stream.begin_anew(*self.stream.unit().settings(), 0);
@@ -305,7 +305,7 @@ impl UnitActor {
             done
         });
         if let Some(Err(refusal)) = given {
-            tracing::error!(unit = %self.stream.id(), "the state is not {state} any more: {refusal}");
+            tracing::error!(unit = %self.stream.id(), "the state is no longer {state}: {refusal}");
         }
         let words = format!("alarm: {cause}");
         self.faults.note(FaultKind::Alarm, 1, || words);

@@ -3,13 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, failed, print};
 use isotherm_protocol::signature::{KeyError, PrivateKey};
 use serde::Serialize;
 use thiserror::Error;
 
 use super::files;
-use crate::exit::Exit;
-use crate::words::{print, say};
 
 /// Arguments of `keygen`.
 #[derive(Debug, Clone, Args)]
@@ -18,15 +17,15 @@ Examples:
   isotherm keygen bench-2
   isotherm keygen bench-2 --folder ~/keys --json
 
-NAME.key signs: it stays with the signer, readable by nobody else. NAME.pub verifies: it goes into the folder of trusted
-keys of every service that is to take documents signed with NAME.key, and the signer is shown there as NAME. Both are
-PEM, and a key made with `openssl genpkey -algorithm ed25519` will do as well.
+NAME.key signs: the signer keeps it secret. NAME.pub verifies: put it into the folder of trusted keys of every service
+that accepts documents signed with NAME.key; the signer is shown there as NAME. Both are PEM; a key made with
+`openssl genpkey -algorithm ed25519` works too.
 Exit codes: 0 done, 1 a file exists or cannot be written.")]
 pub struct KeygenArgs {
-    /// What the signer is called: 1 to 64 letters, digits, `-`, `_` and `.`
+    /// Name of the signer: 1 to 64 letters, digits, `-`, `_` and `.`
     #[arg(value_parser = name)]
     pub name: String,
-    /// Where the two files are written
+    /// Folder for the two files
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     pub folder: PathBuf,
     /// Print one JSON object on stdout instead
@@ -47,27 +46,25 @@ struct Made {
 /// Why no pair was made.
 #[derive(Debug, Error)]
 enum KeygenError {
-    #[error("{} exists and is left as it is: choose another name, or move it away", .0.display())]
+    #[error("{} exists and is left unchanged: choose another name, or move the file", .0.display())]
     Exists(PathBuf),
     #[error("cannot write {}: {source}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
-    #[error("the system gives no random numbers: {0}")]
+    #[error("the system provides no random numbers: {0}")]
     Random(getrandom::Error),
     #[error("the new key {0}")]
     Encode(#[from] KeyError),
 }
 
 /// Makes a pair of keys and says what they are called.
-pub(crate) fn run(args: &KeygenArgs) -> Exit {
+#[must_use]
+pub fn run(args: &KeygenArgs) -> Exit {
     match make(&args.name, &args.folder) {
         Ok(made) if args.json => {
             print(&(serde_json::to_string_pretty(&made).unwrap_or_default() + "\n"), Exit::Ok)
         }
         Ok(made) => print(&in_words(&made), Exit::Ok),
-        Err(error) => {
-            say(format_args!("isotherm: {error}"));
-            Exit::Failed
-        }
+        Err(error) => failed(error, Exit::Failed),
     }
 }
 
@@ -107,8 +104,8 @@ fn write(path: &Path, pem: &str, mode: u32) -> Result<(), KeygenError> {
 
 fn in_words(made: &Made) -> String {
     format!(
-        "private key  {}  (keep it: it signs, and nobody else may read it)\n\
-         public key   {}  (goes into the folder of trusted keys)\n\
+        "private key  {}  (it signs: keep it secret)\n\
+         public key   {}  (for the folder of trusted keys)\n\
          key id       {}\n\
          fingerprint  sha256 {}\n",
         made.private_key, made.public_key, made.key_id, made.fingerprint

@@ -3,11 +3,12 @@
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
+use isotherm_cli::Exit;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::signature::PrivateKey;
 
-use crate::exit::Exit;
-use crate::text::{read_bounded, text, whole};
+use isotherm_document::file::{read_bounded, text};
+use isotherm_document::unplaced;
 
 /// Permissions of group and others, of which a private key must have none.
 const OTHERS: u32 = 0o077;
@@ -19,9 +20,9 @@ const OTHERS: u32 = 0o077;
 pub(super) fn read(path: &Path) -> Result<(PrivateKey, Option<Problem>), (Problem, Exit)> {
     let file = path.display().to_string();
     let bytes = read_bounded(path)
-        .map_err(|error| (whole(&file, format!("cannot be read: {error}")), Exit::Failed))?;
-    let bad = |message: String| (whole(&file, message), Exit::BadConfiguration);
-    let text = text(&bytes, &file).map_err(|_| bad("is no text, so it is no PEM key".to_owned()))?;
+        .map_err(|error| (unplaced(Some(&file), format!("cannot be read: {error}")), Exit::Failed))?;
+    let bad = |message: String| (unplaced(Some(&file), message), Exit::BadConfiguration);
+    let text = text(&bytes, &file).map_err(|_| bad("is not text, so not a PEM key".to_owned()))?;
     let key = PrivateKey::from_pem(text).map_err(|error| bad(error.to_string()))?;
     Ok((key, exposed(path, &file)))
 }
@@ -30,6 +31,9 @@ pub(super) fn read(path: &Path) -> Result<(PrivateKey, Option<Problem>), (Proble
 fn exposed(path: &Path, file: &str) -> Option<Problem> {
     let mode = std::fs::metadata(path).ok()?.permissions().mode() & 0o777;
     (mode & OTHERS != 0).then(|| {
-        whole(file, format!("is a private key that others can get at (mode {mode:o}): `chmod 600 {file}`"))
+        unplaced(
+            Some(file),
+            format!("is a private key that others can read (mode {mode:o}): `chmod 600 {file}`"),
+        )
     })
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, print, say};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Document, Problem};
 use isotherm_protocol::overlay::{Overlay, is_overlay};
@@ -10,9 +11,7 @@ use isotherm_protocol::signature::{self, Existing, KeyId, PrivateKey, Wrong};
 use serde::Serialize;
 
 use super::{files, private_key};
-use crate::exit::Exit;
-use crate::text::{read_bounded, text};
-use crate::words::{print, say};
+use isotherm_document::file::{read_bounded, text};
 
 /// Arguments of `sign`.
 #[derive(Debug, Clone, Args)]
@@ -22,20 +21,20 @@ Examples:
   isotherm sign ZLG-0001.toml --key bench-2.key --out signed/ZLG-0001.toml
   isotherm sign --overwrite units/*.toml --key bench-2.key
 
-A document is validated first. If one of several is bad, none is signed. The signature is one more line of the file, so
-the document's digest, and with it the revision that outputs name, is another one than before.
+Documents are validated first; if one is bad, none is signed. The signature is one more line of the file, so the
+document's digest, which outputs name, changes.
 Exit codes: 0 all signed, 78 a document or the key is bad, 1 a file is signed already, or cannot be read or written.")]
 pub struct SignArgs {
     /// Calibration documents and overlays to sign
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// The private key, as `isotherm keygen` or `openssl genpkey -algorithm ed25519` writes it
+    /// Private key, of `isotherm keygen` or `openssl genpkey -algorithm ed25519`
     #[arg(long, value_name = "FILE")]
     pub key: PathBuf,
-    /// Write the signed document here and leave the original as it is; for a single document
+    /// Signed document to write, instead of changing the original; for a single document
     #[arg(long = "out", alias = "output", value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Replace a signature that is there already, whether it holds or not
+    /// Replace an existing signature, valid or not
     #[arg(long = "overwrite", alias = "replace")]
     pub replace: bool,
     /// Print one JSON object on stdout instead
@@ -63,7 +62,8 @@ struct Outcome {
 }
 
 /// Signs the files and says what became of each.
-pub(crate) fn run(args: &SignArgs) -> Exit {
+#[must_use]
+pub fn run(args: &SignArgs) -> Exit {
     if args.output.is_some() && args.files.len() > 1 {
         say("isotherm: --out names one file, so one document can be given with it");
         return Exit::Usage;

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::signature::{PublicKey, TrustedKeys};
 
-use crate::text::{read_bounded, text, whole};
+use isotherm_document::file::{read_bounded, text};
+use isotherm_document::unplaced;
 
 /// Longest name of a signer, in characters.
 const LONGEST_NAME: usize = 64;
@@ -24,7 +25,8 @@ const WORLD_WRITABLE: u32 = 0o002;
 /// bad file among them no key is taken: a key that silently did not count would have its signer's documents refused.
 pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), Vec<Problem>> {
     let name = folder.display().to_string();
-    let files = key_files(folder).map_err(|error| vec![whole(&name, format!("cannot be read: {error}"))])?;
+    let files =
+        key_files(folder).map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?;
     let mut trusted = TrustedKeys::default();
     let (mut problems, mut warnings) = (Vec::new(), Vec::new());
     warnings.extend(open_to_all(folder));
@@ -34,12 +36,13 @@ pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), V
             trusted.insert(&name, key).map_err(|rival| format!("{rival}, in {}", folder.display()))
         });
         if let Err(message) = added {
-            problems.push(whole(&file, message));
+            problems.push(unplaced(Some(&file), message));
         }
         warnings.extend(open_to_all(&path));
     }
     warnings.extend(
-        private_keys(folder).map_err(|error| vec![whole(&name, format!("cannot be read: {error}"))])?,
+        private_keys(folder)
+            .map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?,
     );
     if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
 }
@@ -57,10 +60,9 @@ fn private_keys(folder: &Path) -> std::io::Result<Vec<Problem>> {
         }
         let bytes = read_bounded(&path).unwrap_or_default();
         if bytes.windows(PRIVATE.len()).any(|window| window == PRIVATE) {
-            let message = "holds a private key, in the folder that says who is trusted: whoever can read it can sign \
-                           documents in its owner's name. Move it away from this machine, and make a new key if others \
-                           could read it";
-            found.push(whole(&path.display().to_string(), message.to_owned()));
+            let message = "is a private key in the folder of trusted keys: anyone who can read it can sign in its \
+                           owner's name. Move it to another machine, and make a new key if others could read it";
+            found.push(unplaced(Some(&path.display().to_string()), message.to_owned()));
         }
     }
     found.sort_by(|a, b| a.file.cmp(&b.file));
@@ -89,13 +91,13 @@ fn read_key(path: &Path) -> Result<(String, PublicKey), String> {
     }
     let bytes = read_bounded(path).map_err(cannot)?;
     let text =
-        text(&bytes, "").map_err(|_| "is no text, so it is no PEM key: is it the right file?".to_owned())?;
+        text(&bytes, "").map_err(|_| "is not text, so not a PEM key: is it the right file?".to_owned())?;
     let key = PublicKey::from_pem(text).map_err(|error| error.to_string())?;
     let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
     if name.chars().count() > LONGEST_NAME || name.chars().any(char::is_control) || name.is_empty() {
         return Err(format!(
-            "has a name that cannot be shown: the signer is called by it, so it must be 1 to {LONGEST_NAME} \
-             printable characters before `.pub`"
+            "has an unprintable name: it is the signer's, so it must be 1 to {LONGEST_NAME} printable characters \
+             before `.pub`"
         ));
     }
     Ok((name.to_owned(), key))
@@ -106,8 +108,9 @@ fn open_to_all(path: &Path) -> Option<Problem> {
     let mode = std::fs::metadata(path).ok()?.permissions().mode() & 0o777;
     (mode & WORLD_WRITABLE != 0).then(|| {
         let file = path.display().to_string();
-        let message =
-            format!("says who is trusted, but everybody may write to it (mode {mode:o}): `chmod o-w {file}`");
-        whole(&file, message)
+        let message = format!(
+            "decides who is trusted, but everybody may write to it (mode {mode:o}): `chmod o-w {file}`"
+        );
+        unplaced(Some(&file), message)
     })
 }

@@ -93,7 +93,7 @@ async fn withhold(session: &Session) -> (Queryable<()>, Arc<Mutex<Vec<Query>>>) 
 fn isotherm(config: &Path, arguments: &[&str]) -> Output {
     let arguments = [arguments, &["--zenoh-config", config.to_str().unwrap(), "--timeout", "2"]].concat();
     // Zenoh's TLS links break where both ends speak at once (zenoh#2557): asked again, as the program says.
-    let broke = |output: &Output| String::from_utf8_lossy(&output.stderr).contains("ended without an answer");
+    let broke = |output: &Output| String::from_utf8_lossy(&output.stderr).contains("did not answer");
     let mut outputs = std::iter::repeat_with(|| run("isotherm", &arguments)).take(TRIES);
     outputs.find(|output| !broke(output)).expect("an answer that no broken link took")
 }

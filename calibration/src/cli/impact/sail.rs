@@ -1,10 +1,10 @@
 //! How the drifts are sailed: stated ones, seeded ones, that of a log.
 
+use isotherm_cli::Bar;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 
 use super::{Gyro, ImpactArgs, sizes};
-use crate::cli::bar::Bar;
 use crate::drift::HOUR_S;
 use crate::error::Error;
 use crate::impact::estimate::TICK_S;
@@ -59,14 +59,14 @@ impl ImpactArgs {
             }
         }
         let source = match (self.trend, self.constant) {
-            (Some(trend), None) => format!("A trend of {trend} °/h² and nothing else"),
+            (Some(trend), None) => format!("A trend of {trend} °/h² alone"),
             (None, Some(constant)) => format!("A constant of {constant} °/h from departure on"),
             _ => format!("A trend of {trend} °/h² and a constant of {constant} °/h from departure on"),
         };
         let notes = vec![
-            "Without noise: what the drift adds to every other error. 002 has 1460 m, 2850 m and 0.14′, 0.28′ for trends of 0.00008 \
-             and 0.00016 °/h² of the azimuth gyro, and less than 20 m for a level one, whose drift its filter follows through the \
-             velocity log; it does not say at what latitude."
+            "Without noise: what the drift adds to every other error. 002 has 1460 m, 2850 m and 0.14′, 0.28′ for \
+             trends of 0.00008 and 0.00016 °/h² of the azimuth gyro, and less than 20 m for a level one, because \
+             its filter follows that drift through the velocity log; the latitude is not stated."
                 .to_owned(),
         ];
         Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes, choices: Vec::new() })
@@ -97,16 +97,17 @@ impl ImpactArgs {
         );
         let source = format!("Drifts of {count} seeds from {}, {from}{trend}", self.seed);
         let mut notes =
-            vec!["Figures are the middle of all seeds, and what 95 % of them stay below.".to_owned()];
+            vec!["Figures are the median of all seeds, and the bound of 95 % of them.".to_owned()];
         notes.push(
-            "A drift that is held at its last value is held at what it truly is at departure, which no measurement gives: the row is a \
-             bound. The estimators see the drift through the angle random walk of the gyros and the noise of the references."
+            "A drift held at its last value is held at its true value at departure, which no measurement gives: the \
+             row is a bound. The estimators see the drift through the angle random walk of the gyros and the noise \
+             of the references."
                 .to_owned(),
         );
         if parts.iter().all(|gyro| gyro.sigma_rad_per_s == 0.0 && gyro.trend_sigma_rad_per_s2 == 0.0) {
             notes.push(
-                "These gyros have a constant part only, neither a slow drift nor a trend: held, it leaves nothing, and the trend state \
-                 has nothing to do."
+                "These gyros have a constant part only, neither a slow drift nor a trend: held, it leaves no error, \
+                 and the trend state has no effect."
                     .to_owned(),
             );
         }
@@ -133,13 +134,14 @@ impl ImpactArgs {
         notes.extend(words);
         if *parts == [sizes(); 3] {
             notes.push(
-                "The estimators expect gyros of the size of tables 1 and 2 of 002: no document states what the drift of these is."
+                "The estimators expect gyros as in tables 1 and 2 of 002, because no document states the drift of \
+                 these."
                     .to_owned(),
             );
         }
         notes.push(
-            "Taken as a platform's gyros x and y level, z up or down. The mean over the calibration, Earth's rate included, is taken \
-             out; what is held is the mean of its last hour."
+            "Taken as a platform's gyros x and y level, z up or down. The mean over the calibration, Earth's rate \
+             included, is removed; the mean of its last hour is held."
                 .to_owned(),
         );
         let mut rows = Vec::new();
@@ -158,13 +160,13 @@ impl ImpactArgs {
     /// What can be done where the log is shorter than the calibration.
     fn otherwise(&self, parts: &[DriftParts; 3]) -> String {
         match &self.document {
-            None => "say how large the drift is with --calibration or --trend instead of the log".to_owned(),
+            None => "state the drift with --calibration or --trend instead of the log".to_owned(),
             Some(path) if *parts == [sizes(); 3] => format!(
-                "say how large the drift is with --trend instead of the log: {} has no [gyro.sensor.drift], which isotherm-calibrate \
-                 drift --calibration puts in",
+                "state the drift with --trend instead of the log: {} has no [gyro.sensor.drift] (isotherm-calibrate \
+                 drift --calibration adds it)",
                 path.display()
             ),
-            Some(path) => format!("leave the log out: {} says how large the drift is", path.display()),
+            Some(path) => format!("leave the log out: {} states the drift", path.display()),
         }
     }
 }

@@ -19,17 +19,16 @@ pub(super) struct PlannedArgs {
     /// Planned: thermal expansion of housing and sensor (1e-6/°C)
     #[arg(long, value_name = "PPM", num_args = 2, default_values_t = [22.9, 15.0], requires = "budget")]
     pub(super) expansion: Vec<f64>,
-    /// Planned: temperature of calibration and highest temperature inside (°C)
+    /// Planned: calibration temperature and highest temperature inside (°C)
     #[arg(long, value_name = "DEG_C", num_args = 2, default_values_t = [20.0, 85.0], requires = "budget", allow_hyphen_values = true)]
     pub(super) temperatures: Vec<f64>,
     /// Planned: error of the measured temperature (°C)
     #[arg(long, value_name = "DEG_C", default_value_t = 0.2, requires = "budget")]
     pub(super) temperature_error: f64,
-    /// Planned: how fast an axis turns (″/°C); quartz 1.5, silicon up to 6
+    /// Planned: turn of an axis with temperature (″/°C); quartz 1.5, silicon up to 6
     #[arg(long, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget")]
     pub(super) axis_rate: f64,
-    /// Planned: hysteresis of an axis over thermal cycles (″); quartz 5 to 15, silicon 15 to 60, or as measured by a run that comes back to a
-    /// temperature
+    /// Planned: hysteresis of an axis over thermal cycles (″); quartz 5 to 15, silicon 15 to 60, or as measured
     #[arg(long, value_name = "ARCSEC", default_value_t = 5.0, requires = "budget")]
     pub(super) hysteresis: f64,
 }

@@ -1,9 +1,9 @@
 //! Steps on the way from runs to a judged document.
 
+use isotherm_cli::Bar;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{AccelOutput, Document};
 
-use crate::cli::bar::Bar;
 use crate::error::Error;
 use crate::positions::analysis::{Analysis, Settings};
 use crate::positions::bare::bare;

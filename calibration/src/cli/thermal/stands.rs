@@ -16,25 +16,25 @@ pub(in crate::cli) struct StandArgs {
     /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros
     #[arg(long, value_name = "DEG", requires = "heading", allow_negative_numbers = true)]
     latitude: Option<f64>,
-    /// Heading of the case's x axis from north towards east (°); once for all logs, or once for each, those of --judge behind
+    /// Heading of the case's x axis from north towards east (°); once for all logs, or for each log in order, then for those of --judge
     #[arg(long, value_name = "DEG", requires = "latitude", allow_negative_numbers = true)]
     heading: Vec<f64>,
-    /// Roll about the case's x axis (°), likewise; without it and --pitch the unit is levelled from its accelerometers
+    /// Roll about the case's x axis (°), likewise (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", requires_all = ["pitch", "latitude"], allow_negative_numbers = true)]
     roll: Vec<f64>,
-    /// Pitch of the case's x axis above the horizon (°), likewise
+    /// Pitch of the case's x axis above the horizon (°), likewise (default: levelled by the accelerometers)
     #[arg(long, value_name = "DEG", requires_all = ["roll", "latitude"], allow_negative_numbers = true)]
     pitch: Vec<f64>,
-    /// Gravity at the place (m/s²); normal gravity of the latitude without it
+    /// Gravity at the place (m/s²) (default: normal gravity of the latitude)
     #[arg(long, value_name = "M_PER_S2", requires = "roll")]
     gravity: Option<f64>,
     /// Axis of the rate table in case axes (x, -y, … or 0,0.6,0.8); once for all logs, or once for each
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rate")]
     axis: Vec<String>,
-    /// Rate of the table all through a log (°/s), 0 at rest; likewise
+    /// Rate of the table throughout a log (°/s), 0 at rest; likewise
     #[arg(long, value_name = "DEG_PER_S", allow_negative_numbers = true, requires = "axis")]
     rate: Vec<f64>,
-    /// Take the mean of each run off, as it is done without --latitude
+    /// Remove the mean of each run (default without --latitude)
     #[arg(long, conflicts_with = "latitude")]
     remove_mean: bool,
 }
@@ -54,8 +54,8 @@ impl StandArgs {
             let judging = if judges > 0 { format!(" and {judges} of --judge") } else { String::new() };
             let logs = if runs == 1 { "log" } else { "logs" };
             return Err(Error::Usage(format!(
-                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each, in the order of the logs, those of \
-                 --judge behind"
+                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each log in \
+                 their order, then for those of --judge"
             )));
         }
         if self.latitude.is_none() && self.rate.is_empty() {
@@ -89,8 +89,8 @@ impl StandArgs {
         }
         if !(low..=high).contains(&rate_deg_per_s.abs()) {
             return Err(Error::Usage(format!(
-                "--rate is {rate_deg_per_s} °/s, must be 0 for a log at rest, or from {low} to {high} °/s in size: slower turns tell nothing \
-                 of a scale factor"
+                "--rate is {rate_deg_per_s} °/s, must be 0 for a log at rest, or from {low} to {high} °/s in size: \
+                 slower turns do not determine a scale factor"
             )));
         }
         Ok(Some(Turning { axis, rate_deg_per_s }))

@@ -92,8 +92,8 @@ pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
     };
     let value = column.get(from).copied().unwrap_or_default();
     Some(format!(
-        "warning: {called} reads exactly {} from {:.2} s to {:.2} s{further}: it froze, or its output was lost; cut the log to \
-         where it lives with --start and --duration",
+        "warning: {called} reads exactly {} from {:.2} s to {:.2} s{further}: it froze, or its output was lost; cut \
+         the log to the valid part with --start and --duration",
         six(value),
         since(from),
         since(to)
@@ -117,8 +117,8 @@ pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, 
                 moving.push(words);
             } else if columns.corrected && middle.abs() > LARGEST_CORRECTED_DEG_PER_H {
                 notes.push(format!(
-                    "warning: {called} reads {middle:.0} °/h in the median after the correction, the Earth turns by 15 °/h: does the \
-                     unit rest, is the unit of measure in the mapping right?"
+                    "warning: {called} reads {middle:.0} °/h in the median after the correction, the Earth turns by \
+                     15 °/h: is the unit at rest? Check the unit of measure in the mapping"
                 ));
             }
         }
@@ -176,7 +176,7 @@ pub fn missing(spacing: &Spacing, count: usize) -> Option<String> {
     let share = missing as f64 / (count + missing) as f64;
     (share > LARGEST_MISSING).then(|| {
         format!(
-            "warning: {missing} of {} ticks ({:.1} %) are missing: look for what loses them",
+            "warning: {missing} of {} ticks ({:.1} %) are missing: find out what loses them",
             count + missing,
             share * 100.0
         )

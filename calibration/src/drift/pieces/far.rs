@@ -39,18 +39,18 @@ impl Far {
         let measure = columns.measure();
         let value = short(column.get(first).copied().unwrap_or_default());
         let (at, until) = (columns.since_s(first), columns.since_s(last));
-        let wide = if columns.corrected { " on all axes, since a correction carries them over" } else { "" };
+        let wide = if columns.corrected { " on all axes, because the correction couples them" } else { "" };
         Some(if self.are_single {
             format!(
-                "warning: {called}: {} far beyond the noise (more than {FAR} standard deviations), the first at {at:.2} s: {value} \
-                 {measure}; left out{wide}: look for what makes them",
+                "warning: {called}: {} far beyond the noise (more than {FAR} standard deviations), the first at \
+                 {at:.2} s: {value} {measure}; left out{wide}: find their cause",
                 counted(count, "single reading is", "single readings are")
             )
         } else {
             format!(
-                "warning: {called}: {count} readings between {at:.2} s and {until:.2} s are far beyond the noise (more than {FAR} \
-                 standard deviations), the first is {value} {measure}: did the unit turn, or was it knocked? Cut the log to where it \
-                 rests with --start and --duration"
+                "warning: {called}: {count} readings between {at:.2} s and {until:.2} s are far beyond the noise \
+                 (more than {FAR} standard deviations), the first is {value} {measure}: did the unit turn, or was \
+                 it knocked? Cut the log to the part at rest with --start and --duration"
             )
         })
     }

@@ -60,7 +60,7 @@ impl Written {
         let mut positions: Vec<Position> = Vec::new();
         for position in self.position {
             if positions.iter().any(|other| other.name == position.name) {
-                return Err(format!("position {:?} is there twice: names must differ", position.name));
+                return Err(format!("position {:?} is given twice: names must differ", position.name));
             }
             let attitude = match (position.axis_1_deg, position.axis_2_deg, position.up) {
                 (Some(first), Some(second), None) if first.is_finite() && second.is_finite() => {
@@ -69,7 +69,7 @@ impl Written {
                 (None, None, Some(up)) => {
                     let norm = libm::sqrt(up.iter().map(|c| c * c).sum());
                     if !(norm.is_finite() && norm > 0.0) {
-                        return Err(format!("position {:?}: up is {up:?}, no direction", position.name));
+                        return Err(format!("position {:?}: up is {up:?}, not a direction", position.name));
                     }
                     Attitude::Up(up.map(|c| c / norm))
                 }
@@ -105,7 +105,7 @@ fn of_csv(text: &str) -> Result<Written, String> {
             return Err(format!("line {}: {} cells, must be three", index + 1, cells.len()));
         };
         let number =
-            |cell: &str| cell.parse().map_err(|_| format!("line {}: {cell:?} is no number", index + 1));
+            |cell: &str| cell.parse().map_err(|_| format!("line {}: {cell:?} is not a number", index + 1));
         let (first, second) = (number(first)?, number(second)?);
         Ok(WrittenPosition { name: name.into(), axis_1_deg: Some(first), axis_2_deg: Some(second), up: None })
     };

@@ -28,8 +28,9 @@ const LITTLE: f64 = 5e-4;
 const FOLLOWS_TIME: f64 = 0.6;
 
 /// What to look at where the gyros do not follow the turns.
-pub(super) const WRONG_GYROS: &str = "look at the unit of measure of the gyros in the mapping (57.3 times too much is °/s read as rad/s), at the order and the signs \
-     of the columns, of the accelerometers too, at gyros at their limit in the turns, and at the time stamps";
+pub(super) const WRONG_GYROS: &str = "check the unit of measure of the gyros in the mapping (57.3 times too much is \
+    °/s read as rad/s), the order and the signs of the columns, of the accelerometers too, gyros at their limit in \
+    the turns, and the time stamps";
 
 /// A fit of the accelerometers without a solution, in words.
 pub(super) fn no_accelerometers(why: &NoSolution) -> String {
@@ -48,8 +49,8 @@ pub(super) fn no_accelerometers(why: &NoSolution) -> String {
         "the poses",
         |index| NAMES.get(index).copied().unwrap_or("all parameters").to_owned(),
         "put the unit down in more different ways",
-        "no scale factors, biases and angles were found with which |f| is g in all poses: is every column of the mapping the right \
-         one, in one unit of measure throughout? A unit that was put on its faces only needs edges and corners too",
+        "no scale factors, biases and angles make |f| = g in all poses: check every column of the mapping, and that \
+         the unit of measure is the same throughout. Put the unit on edges and corners too, not only on its faces",
     )
 }
 
@@ -59,7 +60,7 @@ pub(super) fn no_gyros(why: &NoSolution) -> String {
         "the turns",
         |index| format!("gyro {}", AXES[gyro_of(index)]),
         "turn the unit about each of its axes",
-        &format!("no scale factors and axes were found with which the gyros follow the turns: {WRONG_GYROS}"),
+        &format!("no scale factors and axes make the gyros follow the turns: {WRONG_GYROS}"),
     )
 }
 
@@ -74,8 +75,8 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
     for (axis, name) in AXES.iter().enumerate() {
         if !(fit.sigma[axis] <= LARGEST_SIGMA && fit.scale[axis].is_finite()) {
             reasons.push(format!(
-                "accelerometer {name}: its scale factor is known to {:.1} % only, at most {} % is a result: {} poses do not spread \
-                 enough, put it down with {name} up and down",
+                "accelerometer {name}: its scale factor is known only to {:.1} %, at most {} % is accepted: {} poses \
+                 do not spread enough, put it down with {name} up and down",
                 fit.sigma[axis] * 100.0,
                 LARGEST_SIGMA * 100.0,
                 poses.len()
@@ -86,8 +87,9 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
         let sigma = fit.sigma[6 + index].to_degrees();
         if sigma.is_nan() || sigma > LARGEST_ANGLE_SIGMA_DEG {
             reasons.push(format!(
-                "the angle between accelerometers {} and {} is known to {sigma:.1}° only, at most {LARGEST_ANGLE_SIGMA_DEG}° is a \
-                 result: {} poses do not tell it; put the unit on edges and corners too, not on its faces only",
+                "the angle between accelerometers {} and {} is known only to {sigma:.1}°, at most \
+                 {LARGEST_ANGLE_SIGMA_DEG}° is accepted: {} poses do not determine it; put the unit on edges and \
+                 corners too, not only on its faces",
                 AXES[one],
                 AXES[other],
                 poses.len()
@@ -96,7 +98,7 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
     }
     if flat(&fit.rows) {
         reasons.push(
-            "the axes of the accelerometers are found in one plane, or nearly so: does the mapping have a column twice?".to_owned(),
+            "the axes of the accelerometers lie in one plane, or nearly so: does the mapping have a column twice?".to_owned(),
         );
     }
     if reasons.is_empty() { Ok(()) } else { Err(reasons) }
@@ -120,13 +122,14 @@ pub(super) fn beyond_noise(track: &Track, poses: &[Pose], fit: &AccelFit) -> Opt
     let share = follows_time(poses, fit, along);
     let why = if share > FOLLOWS_TIME {
         format!(
-            "{:.0} % of its variance follows the time since the log's beginning: zeros or scale factors moved. Let the unit warm up \
-             before the still start, keep its temperature, and look for another unit of measure from some row on",
+            "{:.0} % of its variance follows the time since the log's beginning: zeros or scale factors moved. Let \
+             the unit warm up before the still start, keep its temperature, and check for a change of the unit of \
+             measure within the log",
             100.0 * share
         )
     } else {
-        "was it moved or touched in poses, do scale factors change with the direction, or is the unit of measure another one from some \
-         row on? The table has |f| − g pose by pose"
+        "was it moved or touched in poses, do scale factors depend on direction, or does the unit of measure change \
+         within the log? The table has |f| − g pose by pose"
             .to_owned()
     };
     Some(format!(
@@ -169,9 +172,9 @@ pub(super) fn ends_early(track: &Track, poses: &[Pose]) -> Option<String> {
     let [_, last] = poses.last()?.span_s;
     (last < (1.0 - LAST_SHARE) * length).then(|| {
         format!(
-            "no still pose is found after {last:.0} s of {length:.0} s: all that follows is left out. Was the unit moved without a rest, \
-             or is the noise larger there than in the still start (another unit of measure from some row on, a motor, a loose cable)? \
-             State a larger --threshold, or cut the log with --duration"
+            "no still pose is found after {last:.0} s of {length:.0} s: the rest is left out. Was the unit moved \
+             without a rest, or is the noise larger there than in the still start (another unit of measure, a \
+             motor, a loose cable)? State a larger --threshold, or cut the log with --duration"
         )
     })
 }
@@ -181,11 +184,11 @@ pub(super) fn lost(fit: &GyroFit) -> Option<String> {
     let left = fit.left_deg();
     if left.is_nan() || left > LARGEST_LEFT_DEG {
         return Some(format!(
-            "after a turn they still miss the direction of gravity by {left:.1}° rms, at most {LARGEST_LEFT_DEG}° is a result: \
-             {WRONG_GYROS}"
+            "after a turn they still miss the direction of gravity by {left:.1}° rms, at most {LARGEST_LEFT_DEG}° is \
+             accepted: {WRONG_GYROS}"
         ));
     }
-    flat(&fit.rows).then(|| format!("their axes are found in one plane, or nearly so: {WRONG_GYROS}"))
+    flat(&fit.rows).then(|| format!("their axes lie in one plane, or nearly so: {WRONG_GYROS}"))
 }
 
 /// Whether three axes lie so near one plane that no document may state them.

@@ -61,7 +61,7 @@ pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
         }
     }
     if summary.reading.iter().any(crate::source::LogReport::lost_data) {
-        words.push("Reading was not complete: see what the program said on standard error.".to_owned());
+        words.push("Reading was not complete: see the messages on standard error.".to_owned());
     }
     words
 }

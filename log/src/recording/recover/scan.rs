@@ -207,7 +207,7 @@ fn head_of(bytes: &[u8]) -> Option<(u8, u64)> {
 fn whole(opcode: u8, data: &[u8]) -> Result<Piece, String> {
     let damaged = |error: McapError| format!("{} is damaged: {error}", name(opcode));
     if opcode == op::METADATA && metadata_length(data) != Some(data.len()) {
-        return Err("a metadata record is damaged: its lengths do not go together".to_owned());
+        return Err("a metadata record is damaged: its lengths contradict each other".to_owned());
     }
     if opcode == op::CHUNK {
         return chunk_records(data).map(Piece::Chunk).map_err(damaged);

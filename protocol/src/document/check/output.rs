@@ -110,7 +110,7 @@ fn in_unit<Q: Quantity>(r: &mut Reader<'_>, path: &str, curve: Option<&Curve<Q>>
     let Some(curve) = curve.filter(|curve| curve.unit() != unit) else { return };
     let keys = Keys::new(curve.unit(), curve.argument().unwrap_or(Argument::DegC));
     let key = keys.of_values().map(|key| join(path, key)).into_iter().find(|key| r.has(key));
-    let message = format!("is in {}, but the output calls for {}", curve.unit().symbol(), unit.symbol());
+    let message = format!("is in {}, but the output needs {}", curve.unit().symbol(), unit.symbol());
     r.report(key.as_deref().unwrap_or(path), message);
     r.damage(path);
 }

@@ -27,7 +27,7 @@ impl DocumentChange {
                 format!("{key}: {} -> {}{size}", shown(before), shown(after))
             }
             (None, Some(after)) => format!("{key}: new, {}", shown(after)),
-            (Some(before), None) => format!("{key}: gone, was {}", shown(before)),
+            (Some(before), None) => format!("{key}: removed, was {}", shown(before)),
             (None, None) => key.clone(),
         }
     }

@@ -280,7 +280,7 @@ fn every_form_of_every_curve_in_the_schema_is_read() {
                 match Document::parse(&text, None) {
                     Ok(_) => read += 1,
                     Err(problems) => assert!(
-                        problems.iter().any(|problem| problem.message.contains("output calls for")),
+                        problems.iter().any(|problem| problem.message.contains("output needs")),
                         "{}: {form}\n{}",
                         key.path,
                         super::listed(&problems)

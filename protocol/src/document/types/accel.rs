@@ -84,10 +84,10 @@ pub struct AccelSensor {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 8))]
     pub regressor: Vec<AccelRegressor>,
-    /// K2: what it feels beyond f per f², f along its input axis. Source: models §3, IEEE 528.
+    /// K2: error per f², f along its input axis. Source: models §3, IEEE 528.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_order: Option<Curve<SecondOrder>>,
-    /// Where it sits in case axes, from the point whose specific force is published; default: there. Source: models §3.
+    /// Position in case axes, from the point of the published specific force (default). Source: models §3.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub position_m: Option<[f64; 3]>,

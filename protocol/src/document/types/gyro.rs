@@ -106,19 +106,17 @@ pub struct GyroSensor {
     /// Polynomial of the time since turn-on. Source: 002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
-    /// By how much of a tick its reading lags behind the tick's time; all sensors are held back to the one that lags most. Source:
-    /// models §3.
+    /// Lag of its reading, in ticks; all sensors are delayed to the slowest. Source: models §3.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub delay_ticks: Option<f64>,
     /// Transient of the path-length servo after a mode switch; needs `[mode_reversal]`. Source: models §6, 003.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub servo: Option<Servo>,
-    /// Statistics of the remaining drift: constant, Markov process and trend. Without them the in-run estimator does not
-    /// run for this gyro. Source: models §7, 002.
+    /// Statistics of the remaining drift (constant, Markov process, trend), for the in-run estimator. Source: models §7, 002.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift: Option<Drift>,
-    /// Standard errors, which have σ go out with every output. Source: models §2, IEEE 952.
+    /// Standard errors: σ is published with every output. Source: models §2, IEEE 952.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<GyroSigma>,
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::thread::available_parallelism;
 
+use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_log::diff::DiffOptions;
 use isotherm_log::file::read_small;
@@ -15,9 +16,8 @@ use isotherm_protocol::key::UnitId;
 use super::CorrectArgs;
 use super::report::Report;
 use super::sink::Sink;
-use crate::cli::{Outcome, print, show};
+use crate::cli::{print, show};
 use crate::error::Error;
-use crate::progress::Bar;
 
 /// Most units that a sentence names.
 const NAMED: usize = 8;
@@ -25,7 +25,7 @@ const NAMED: usize = 8;
 const TEXT_BATCH: usize = 64;
 
 /// Runs the command on recordings.
-pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let files = args.log.files(1, None)?;
     let mut part = args.log.part()?;
     let outlines = scan(&args.log.log)?;
@@ -48,11 +48,11 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     }
     let documents: Vec<_> = loaded.values().map(|(path, _)| path.as_path()).collect();
     let outcome = make(args, &files, &mut part, plans, &documents)?;
-    Ok(if without.is_some() { Outcome::DataLoss } else { outcome })
+    Ok(if without.is_some() { Exit::DataLoss } else { outcome })
 }
 
 /// Runs the command on a text log whose corrected ticks go into a recording.
-pub(super) fn run_text(args: &CorrectArgs, calibration: &Path) -> Result<Outcome, Error> {
+pub(super) fn run_text(args: &CorrectArgs, calibration: &Path) -> Result<Exit, Error> {
     let loaded = load_calibration(calibration)?;
     loaded.warnings.iter().for_each(|warning| show::warn(&warning.to_string()));
     let files = args.log.files(TEXT_BATCH, Some(&loaded.unit))?;
@@ -69,7 +69,7 @@ fn make(
     part: &mut Part,
     plans: Vec<UnitPlan>,
     documents: &[&Path],
-) -> Result<Outcome, Error> {
+) -> Result<Exit, Error> {
     let units: Vec<_> = plans.iter().map(|plan| plan.id.clone()).collect();
     let inputs: Vec<_> = args.log.inputs().into_iter().chain(args.calibration.iter().cloned()).collect();
     let mut sink = Sink::open(args.out.as_deref(), args.format, &units, &inputs)?;
@@ -88,7 +88,7 @@ fn make(
     };
     let (mut bar, mut ticks) = (None, 0);
     let result = correct(files, part, plans, options, &mut |made, progress| {
-        let bar = bar.get_or_insert_with(|| Bar::over_log(progress.clone()));
+        let bar = bar.get_or_insert_with(|| Bar::over_log(progress.watch()));
         ticks += made.iter().map(|(_, output)| output.ticks).sum::<u64>();
         bar.show(format!("{ticks} ticks"));
         sink.write(made).map_err(|error| match error {
@@ -107,7 +107,7 @@ fn make(
     } else {
         print(text.as_bytes())?;
     }
-    Ok(if report.lost_data() { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(report.lost_data()))
 }
 
 /// From which time of reception on ticks are given out; the part then begins with the log.
@@ -126,7 +126,7 @@ fn plans(
 ) -> Result<(Vec<UnitPlan>, Option<String>), Error> {
     let wanted = args.log.units()?;
     if let Some(unit) = wanted.iter().find(|unit: &&UnitId| !outlines.units.contains_key(*unit)) {
-        return Err(Error::Usage(format!("--unit {unit}: there is nothing of this unit in the log")));
+        return Err(Error::Usage(format!("--unit {unit}: the log has nothing of this unit")));
     }
     let (mut plans, mut without) = (Vec::new(), Vec::new());
     for (id, outline) in outlines.units {
@@ -144,7 +144,8 @@ fn plans(
         let basis = if by_journal {
             if let Some(setting) = args.given_setting() {
                 return Err(Error::Usage(format!(
-                    "{setting}: the journal of unit {id} has the settings that it had; leave it out, or --ignore-journal"
+                    "{setting}: the journal of unit {id} has its settings: leave the option out, or add \
+                     --ignore-journal"
                 )));
             }
             Basis::Journal {
@@ -163,7 +164,8 @@ fn plans(
             more => format!(" and {more} more"),
         };
         format!(
-            "there is no journal to correct {named}{more} by: give --calibration FILE for each, or name the other units with --unit"
+            "there is no journal to correct {named}{more} by: give --calibration FILE for each, or choose the other \
+             units with --unit"
         )
     });
     // What was asked for by name must be there.
@@ -171,12 +173,10 @@ fn plans(
         return Err(Error::Usage(words));
     }
     if let Some(unit) = calibrations.keys().next() {
-        return Err(Error::Usage(format!(
-            "--calibration: there are no raw messages of unit {unit} in the log"
-        )));
+        return Err(Error::Usage(format!("--calibration: the log has no raw messages of unit {unit}")));
     }
     if plans.is_empty() {
-        return Err(Error::Usage("there are no raw messages in the log to correct".to_owned()));
+        return Err(Error::Usage("the log has no raw messages to correct".to_owned()));
     }
     Ok((plans, without))
 }

@@ -42,7 +42,7 @@ impl<'r> Report<'r> {
                 show::warn(&format!("unit {}: {notice}", unit.unit));
             }
             if replica.further_notices > 0 {
-                show::warn(&format!("unit {}: {} further such", unit.unit, replica.further_notices));
+                show::warn(&format!("unit {}: {} more of these", unit.unit, replica.further_notices));
             }
         }
     }
@@ -87,9 +87,9 @@ impl<'r> Report<'r> {
         }
         match self.identical {
             Some(true) => {
-                text += "identical: every tick that the service published is made again to the bit\n";
+                text += "identical: every tick that the service published is reproduced to the bit\n";
             }
-            Some(false) => text += "different: not every tick is that which the service published\n",
+            Some(false) => text += "different: not every tick that the service published is reproduced\n",
             None => {}
         }
         text

@@ -3,16 +3,16 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use isotherm_cli::{Bar, Exit};
 use isotherm_log::file::refuse_overwriting;
 use isotherm_log::offline::{Offline, load_calibration};
 use isotherm_log::text::ReadReport;
 use serde::Serialize;
 
 use super::CorrectArgs;
-use crate::cli::{Outcome, print, show};
+use crate::cli::{print, show};
 use crate::error::Error;
 use crate::output::{Format, Output, write_frame, write_header, write_tick};
-use crate::progress::Bar;
 use crate::summary::{Summary, Sums};
 
 /// Outputs that are written together.
@@ -39,7 +39,7 @@ fn calibration(args: &CorrectArgs) -> Result<&Path, Error> {
     ];
     if let Some((name, _)) = only.into_iter().find(|(_, given)| *given) {
         return Err(Error::Usage(format!(
-            "{name} is for recordings: a text log has no journal and nothing corrected"
+            "{name} is for recordings: a text log has no journal and no corrected ticks"
         )));
     }
     match args.calibration.as_slice() {
@@ -50,7 +50,7 @@ fn calibration(args: &CorrectArgs) -> Result<&Path, Error> {
 }
 
 /// Runs the command on a text log.
-pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
+pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let settings = args.settings()?;
     let format = args.format.unwrap_or_default();
     let calibration = calibration(args)?;
@@ -73,13 +73,13 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     }
     let mut unit = Offline::new(&loaded, settings);
     let mut sums = Sums::default();
-    let mut bar = Bar::over_log(events.inner().progress());
+    let mut bar = Bar::over_log(events.inner().progress().watch());
     for event in &mut events {
         unit.handle(&event?);
         if unit.ready() >= BLOCK {
             take(&mut unit, &mut sums, output.as_mut(), format)?;
         }
-        bar.step(|| format!("{} ticks", sums.ticks()));
+        bar.step_saying(|| Some(format!("{} ticks", sums.ticks())));
     }
     unit.finish();
     take(&mut unit, &mut sums, output.as_mut(), format)?;
@@ -104,7 +104,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Outcome, Error> {
     } else {
         print(text.as_bytes())?;
     }
-    Ok(if log.lost_data() || unit.refused() > 0 { Outcome::DataLoss } else { Outcome::Complete })
+    Ok(Exit::of_loss(log.lost_data() || unit.refused() > 0))
 }
 
 /// Takes what is ready, sums it up and writes it.

@@ -42,7 +42,7 @@ fn files(text: &mut String, info: &LogInfo) {
         line(text, format_args!("{path}: {}", bytes_of(*bytes)));
         let Some(layout) = recording else { continue };
         let end =
-            if layout.complete { "whole" } else { "cut short: `isotherm-replay recover` makes it whole" };
+            if layout.complete { "whole" } else { "cut short: repair it with `isotherm-replay recover`" };
         line(
             text,
             format_args!(
@@ -61,14 +61,14 @@ fn files(text: &mut String, info: &LogInfo) {
                 line(text, format_args!("not read to the end: {words}"));
             }
             if report.foreign_messages > 0 {
-                line(
-                    text,
-                    format_args!("{} messages of something else passed over", report.foreign_messages),
-                );
+                line(text, format_args!("{} messages of something else skipped", report.foreign_messages));
             }
         }
         LogReport::Text(report) => {
-            line(text, format_args!("{} rows read, {} dropped in front", report.rows, report.dropped_rows));
+            line(
+                text,
+                format_args!("{} rows read, {} dropped before them", report.rows, report.dropped_rows),
+            );
             text.push_str(&show::reading(report));
         }
     }
@@ -164,14 +164,11 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
         }
         if order.restarts > 0 {
             let (restarts, series) = (order.restarts, order.series_changes);
-            line(
-                text,
-                format_args!("{key}: began anew {restarts} times, {series} of them with another series"),
-            );
+            line(text, format_args!("{key}: {restarts} restarts, {series} of them with a new series"));
         }
     }
     if topic.time_went_back > 0 {
-        line(text, format_args!("{key}: time did not go on {} times", topic.time_went_back));
+        line(text, format_args!("{key}: time did not advance {} times", topic.time_went_back));
     }
     if let (Some(longest), Some(intervals)) = (topic.longest_interval, topic.intervals)
         && longest.ns > intervals.p50_ns.saturating_mul(3) / 2
@@ -194,7 +191,10 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
         if drift.abs() < 10_000.0 {
             line(text, format_args!("{key}: the recorder's clock gains {drift:.1} ppm on the producer's"));
         } else {
-            line(text, format_args!("{key}: played at {:.3} times its speed", 1.0 / (1.0 + drift * 1e-6)));
+            line(
+                text,
+                format_args!("{key}: played at {:.3} times its recorded speed", 1.0 / (1.0 + drift * 1e-6)),
+            );
         }
     }
     if topic.unreadable > 0 {
@@ -289,7 +289,7 @@ fn journal_details(text: &mut String, journal: &JournalInfo) {
     line(text, format_args!("journal: {}", entries.join(", ")));
     if journal.missing_entries > 0 || journal.broken_parts > 0 {
         let (missing, broken) = (journal.missing_entries, journal.broken_parts);
-        line(text, format_args!("journal: {missing} entries are missing, {broken} parts make none"));
+        line(text, format_args!("journal: {missing} entries are missing, {broken} parts are incomplete"));
     }
     for swap in journal.swaps.iter().take(LISTED) {
         let (counter, digest) = (swap.revision.counter, hexadecimal(swap.revision.digest));

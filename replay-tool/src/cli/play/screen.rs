@@ -1,19 +1,18 @@
 //! The line that shows where playing is.
 
-use std::cell::RefCell;
 use std::io::{Write, stderr};
 use std::time::Duration;
 
 use indicatif::HumanDuration;
+use isotherm_cli::Bar;
 
 use super::show;
 use crate::keyboard::KEYS;
 use crate::play::{Position, Watch};
-use crate::progress::Bar;
 
 /// The progress bar, and what is said beside it.
 pub(super) struct Screen {
-    bar: RefCell<Bar>,
+    bar: Bar,
     /// The terminal does not go to a line's beginning by itself.
     raw: bool,
 }
@@ -21,7 +20,7 @@ pub(super) struct Screen {
 impl Screen {
     /// With the keys, where somebody is at the keyboard.
     pub(super) fn new(keyboard: bool) -> Self {
-        let screen = Self { bar: RefCell::new(Bar::over_share()), raw: keyboard };
+        let screen = Self { bar: Bar::over_share(), raw: keyboard };
         if keyboard {
             screen.line(KEYS);
         }
@@ -30,13 +29,13 @@ impl Screen {
 
     /// Takes the bar away.
     pub(super) fn finish(&self) {
-        self.bar.borrow().finish();
+        self.bar.finish();
     }
 
     /// Prints a line above the bar.
     fn line(&self, words: &str) {
         let end = if self.raw { "\r\n" } else { "\n" };
-        self.bar.borrow().beside(|| {
+        self.bar.beside(|| {
             // A reader that has gone away is no error.
             let _ = write!(stderr(), "{words}{end}");
         });
@@ -45,7 +44,7 @@ impl Screen {
 
 impl Watch for Screen {
     fn at(&self, position: &Position) {
-        let mut bar = self.bar.borrow_mut();
+        let bar = &self.bar;
         if bar.is_hidden() {
             return;
         }
@@ -60,7 +59,7 @@ impl Watch for Screen {
     }
 
     fn say(&self, words: &str) {
-        if self.bar.borrow().is_hidden() {
+        if self.bar.is_hidden() {
             show::warn(words);
         } else {
             self.line(&format!("warning: {words}"));

@@ -18,16 +18,14 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
     let uncalibrated =
         of(|unit| unit.returned.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
             format!(
-                "{units}: no calibration in the service for some ticks, whose readings came back unscaled"
+                "{units}: the service had no calibration for some ticks and returned their readings unscaled"
             )
         });
     let mixed = of(UnitReport::is_mixed).map(|units| {
-        format!(
-            "{units}: somebody else plays it, or more than one service answers: what came back is not sure to be what was sent"
-        )
+        format!("{units}: another player, or more than one service: what came back may not be what was sent")
     });
     let unreadable = of(|unit| unit.counts.messages_unreadable > 0).map(|units| {
-        format!("{units}: some of the log's messages cannot be read; they were played as they are")
+        format!("{units}: some of the log's messages cannot be read; they were played unchanged")
     });
     uncalibrated.into_iter().chain(mixed).chain(unreadable).collect()
 }
@@ -50,7 +48,7 @@ pub(super) fn human(report: &Report<'_>, options: &PlayOptions) -> String {
         ("time taken (s)", format!("{:.3}", play.elapsed_s)),
     ];
     if play.paused_s > 0.0 {
-        rows.push(("of it paused (s)", format!("{:.3}", play.paused_s)));
+        rows.push(("of that, paused (s)", format!("{:.3}", play.paused_s)));
     }
     rows.push(("actual speed", format!("{:.2}×", play.actual_speed)));
     if play.passes > 1 {
@@ -63,7 +61,7 @@ pub(super) fn human(report: &Report<'_>, options: &PlayOptions) -> String {
         rows.extend([
             ("deadlines missed", format!("{} of {}", late.misses, late.messages)),
             (
-                "late by (ms): half, 99 %, most",
+                "lateness (ms): p50, p99, max",
                 format!("{:.3}, {:.3}, {:.3}", late.p50_ms, late.p99_ms, late.max_ms),
             ),
         ]);

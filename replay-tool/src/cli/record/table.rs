@@ -155,7 +155,7 @@ pub(super) fn advise(error: Error, options: &RecordOptions) -> Error {
     let waits = matches!(options.service, ServiceWait::Within(_));
     match error {
         Error::Bus(BusError::NoService { .. } | BusError::Unreachable { .. }) if waits => Error::NoService {
-            words: format!("{error}; --wait waits for it, --no-service records what there is without one"),
+            words: format!("{error}; wait for it with --wait, or record without one with --no-service"),
         },
         error => error,
     }

@@ -83,6 +83,6 @@ fn what(what: &What) -> String {
         What::Entry { words, left_out: true, .. } => format!("journal, {words} (left out)"),
         What::Entry { words, .. } => format!("journal, {words}"),
         What::Notice { words } => format!("warning: {words}"),
-        What::Flushed => "the log is over: what waited is released".to_owned(),
+        What::Flushed => "end of the log: waiting ticks are released".to_owned(),
     }
 }

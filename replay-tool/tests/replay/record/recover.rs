@@ -47,8 +47,8 @@ fn what_is_lost_is_said_and_the_old_file_stays() {
     assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
 
     for (arguments, words) in [
-        (["recover", "a.mcap", "--out", "a.mcap"], "would be written over"),
-        (["recover", "a.mcap", "--out", "c.mcap"], "there already"),
+        (["recover", "a.mcap", "--out", "a.mcap"], "would be overwritten"),
+        (["recover", "a.mcap", "--out", "c.mcap"], "exists"),
         (["recover", "missing.mcap", "--out", "d.mcap"], "missing.mcap: cannot open"),
     ] {
         let output = replay(path, &arguments);

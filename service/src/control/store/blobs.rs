@@ -11,7 +11,7 @@ use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 use super::retention::is_older;
 use super::{StoreError, durable};
 use crate::control::compressed::CompressedBytes;
-use crate::text::{check_regular, read_bounded};
+use isotherm_document::file::{check_regular, read_bounded};
 
 /// Most bytes of documents that are kept in memory; beyond it the oldest go.
 const MAX_MEMORY_BYTES: usize = 64 * MAX_DOCUMENT_BYTES;

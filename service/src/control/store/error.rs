@@ -14,7 +14,7 @@ use thiserror::Error;
 pub enum StoreError {
     /// The folder is missing and cannot be made, or is none.
     #[error(
-        "cannot use {path} as state folder: {source}; let `state` name a folder that the service may write to",
+        "cannot use {path} as state folder: {source}; set `state` to a folder that the service may write to",
         path = path.display()
     )]
     Folder {
@@ -36,8 +36,8 @@ pub enum StoreError {
     },
     /// It was removed, or another folder is in its place, while the service runs.
     #[error(
-        "the state folder {path} is not the one any more that the service has opened: {reason}; put it back, or make an \
-         empty folder there that the service may write to, and what holds is written down anew",
+        "the state folder {path} is no longer the one that the service opened: {reason}; put it back, or make an \
+         empty writable folder there, and the service writes what is in force into it",
         path = path.display()
     )]
     Lost {
@@ -64,8 +64,8 @@ pub enum StoreError {
     },
     /// A stored document is not what it was.
     #[error(
-        "{path} was changed after it was stored: its SHA-256 is {found}, must be that of its name; \
-         put the document in its place again, or remove it",
+        "{path} was changed after it was stored: its SHA-256 is {found}, must be that of its name; restore or remove \
+         it",
         path = path.display()
     )]
     Corrupt {

@@ -85,7 +85,10 @@ impl Store {
         let Journal::Folder { log, path, .. } = &self.journal else { return Ok(()) };
         let taken_away = log.changed_by_others()?;
         if taken_away {
-            tracing::warn!("the audit file in {} was changed by others: a new one is begun", path.display());
+            tracing::warn!(
+                "the audit file in {} was changed by someone else: a new one is begun",
+                path.display()
+            );
         }
         let full = log.grown() >= self.full_bytes;
         let lacks_carried = log.is_empty() && !self.index.is_empty();

@@ -11,7 +11,7 @@ use isotherm_protocol::key::UnitId;
 
 use super::opened::{Damage, Gap, Opened, Torn};
 use super::{StoreError, durable, scan};
-use crate::text::check_regular;
+use isotherm_document::file::check_regular;
 
 /// Name of the file that is written to.
 pub(super) const NAME: &str = "audit.jsonl";

@@ -12,7 +12,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::durable;
-use crate::text::check_regular;
+use isotherm_document::file::check_regular;
 
 /// Name of the file.
 const NAME: &str = "revisions.json";

@@ -134,10 +134,10 @@ impl fmt::Display for LostRevision {
             "unit {unit}: revision {revision} was accepted, but its line of the audit file is damaged: "
         )?;
         match in_its_place {
-            Some(older) => write!(f, "revision {older}, an older one, is in force in its place")?,
-            None => f.write_str("there is no older one to be put in force in its place")?,
+            Some(older) => write!(f, "the older revision {older} is in force instead")?,
+            None => f.write_str("there is no older one to put in force")?,
         }
-        f.write_str("; put the newer document in force again with `isotherm swap`")
+        f.write_str("; put the newer document in force with `isotherm swap`")
     }
 }
 
@@ -147,26 +147,24 @@ impl fmt::Display for Emptied {
         let folder = folder.display();
         write!(
             f,
-            "the audit file of {folder} is empty, though {documents} document{} kept beside it: the history is lost, was \
-             it emptied or removed? ",
+            "the audit file of {folder} is empty, though {documents} document{} kept next to it: the history is \
+             lost; was the file emptied or removed? ",
             if *documents == 1 { " is" } else { "s are" }
         )?;
         f.write_str(if *has_older {
-            "The sets of the audit file before it are in force, which are older ones; "
+            "Older sets, of the audit file before it, are in force; "
         } else {
-            "What was in force is not known any more, units begin with the folder of calibrations; "
+            "What was in force is unknown, and units begin with the folder of calibrations; "
         })?;
         write!(
             f,
-            "look at every unit, and put back what is missing with `isotherm swap` ({folder}/documents has it). "
+            "check every unit, and restore what is missing with `isotherm swap` (documents: {folder}/documents). "
         )?;
         match floor {
             0 => f.write_str("Revisions begin at 1 again"),
-            floor => write!(
-                f,
-                "Revisions go on from {}, so that no number is given twice",
-                floor.saturating_add(1)
-            ),
+            floor => {
+                write!(f, "Revisions continue from {}, so no number is used twice", floor.saturating_add(1))
+            }
         }
     }
 }
@@ -180,7 +178,7 @@ impl fmt::Display for Gap {
             format!("entries {first} to {last} are")
         };
         write!(f, "{}:{line}: {entries} missing before this line; if it was an acceptance", file.display())?;
-        f.write_str(", an older calibration may hold than the operator knows of: look at `isotherm status`")
+        f.write_str(", an older calibration may be in force than expected: check `isotherm status`")
     }
 }
 
@@ -189,9 +187,9 @@ impl fmt::Display for Cut {
         let Self { last, written, floor } = self;
         write!(
             f,
-            "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are missing, and \
-             older calibrations may be in force than before. Look at every unit, and put back what is missing with `isotherm \
-             swap`. Revisions go on from {}, so that no number is given twice",
+            "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are \
+             missing, and older calibrations may be in force than before. Check every unit, and restore what is \
+             missing with `isotherm swap`. Revisions continue from {}, so no number is used twice",
             written - last,
             floor.saturating_add(1)
         )
@@ -201,7 +199,7 @@ impl fmt::Display for Cut {
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}: {}; the line is skipped", self.file.display(), self.line, self.words)?;
-        f.write_str(", and if it was an acceptance, the one before it holds")
+        f.write_str(", and if it was an acceptance, the one before it is in force")
     }
 }
 
@@ -211,7 +209,7 @@ impl fmt::Display for Torn {
             Self::Completed => f.write_str("the last line of the audit file had no line feed: it was added"),
             Self::Moved { to, bytes } => write!(
                 f,
-                "the last line of the audit file was not written to its end: its {bytes} bytes are in {} now",
+                "the last line of the audit file was cut short: its {bytes} bytes are now in {}",
                 to.display()
             ),
         }

@@ -39,7 +39,7 @@ impl Store {
         let removed =
             [&self.documents, &self.overlays].map(|blobs| blobs.prune(now, KEPT, unnamed)).iter().sum();
         if let 1_usize.. = removed {
-            tracing::info!(removed, "documents are removed that no revision names which can be gone back to");
+            tracing::info!(removed, "documents that no rollback can reach are removed");
         }
     }
 

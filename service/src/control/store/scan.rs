@@ -6,7 +6,7 @@ use std::path::Path;
 
 use isotherm_protocol::history::MAX_LINE_BYTES;
 
-use crate::text::check_regular;
+use isotherm_document::file::check_regular;
 
 /// Where the lines of a file end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -100,8 +100,8 @@ fn once(folder: &Path, full: &[PathBuf], noted: Option<Digest>) -> Result<Verifi
     if let Some(noted) = noted.filter(|_| !is_there) {
         broken += 1;
         let words = format!(
-            "no entry has the digest {noted} that was noted: the chain was made anew before its end, or is another \
-             service's; compare it with a backup"
+            "no entry has the noted digest {noted}: the chain was rewritten or cut, or is another service's; compare \
+             it with a backup"
         );
         breaks.push(Break { file: current, line: last_line, number: None, unit: None, words });
     }
@@ -140,7 +140,7 @@ impl fmt::Display for Verification {
             }
             (Some(_), None) => writeln!(f, "no entry has a digest: an older version wrote them")?,
             (Some(first), _) if *first > 1 && self.holds => {
-                writeln!(f, "it begins with entry {first}: older files are not there any more")?;
+                writeln!(f, "it begins with entry {first}: older files are gone")?;
             }
             _ => {}
         }

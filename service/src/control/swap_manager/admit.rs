@@ -16,7 +16,7 @@ use super::record::Record;
 use super::worker::Worker;
 use crate::config::SwapSettings;
 use crate::signing::read_trusted_keys;
-use crate::text;
+use isotherm_document::{file, unplaced};
 
 /// What was found out about an order. Nothing has changed yet.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ pub(super) struct Verdict {
 impl Worker {
     /// Judges an order.
     pub(super) fn admit(&self, order: &Order<'_>) -> Verdict {
-        let text = match text::text(order.bytes, order.name) {
+        let text = match file::text(order.bytes, order.name) {
             Ok(text) => text,
             Err(problems) => return refused(order.unit.clone(), problems),
         };
@@ -62,14 +62,13 @@ impl Worker {
             (Some(unit), _) | (None, Ok(unit)) => unit,
             // Not to be reached: a document's unit has been checked.
             (None, Err(error)) => {
-                problems.push(text::whole(order.name, format!("unit: {error}")));
+                problems.push(unplaced(Some(order.name), format!("unit: {error}")));
                 return Verdict { warnings, ..refused(None, problems) };
             }
         };
         if candidate.unit != unit.as_str() && self.takes_any_serial(order) {
             let other = &candidate.unit;
-            let message =
-                format!("is \"{other}\": taken for unit {unit} all the same, as asked (any_serial)");
+            let message = format!("is \"{other}\": accepted for unit {unit}, as requested (any_serial)");
             warnings.push(policy::at_key(text, order.name, "unit", message));
         }
         // That of an overlay's text may be another than that of the document below it.
@@ -101,12 +100,12 @@ impl Worker {
     fn other_serial(&self, order: &Order<'_>, named: Option<UnitId>, text: &str) -> Option<Problem> {
         let (unit, other) = (order.unit.as_ref()?, named?);
         let next = if self.swap.require_signature {
-            format!("have one signed for {unit} (any_serial does not count where require_signature is set)")
+            format!("or sign one for {unit} (require_signature is set, so any_serial does not count)")
         } else {
-            "correct the serial, or say so explicitly (any_serial)".to_owned()
+            "correct the serial, or add any_serial".to_owned()
         };
         let message =
-            format!("is \"{other}\", but the document was meant for unit {unit}: send it to {other}, {next}");
+            format!("is \"{other}\", but the document was sent to unit {unit}: send it to {other}, {next}");
         let wrong = other != *unit && !self.takes_any_serial(order);
         wrong.then(|| policy::at_key(text, order.name, "unit", message))
     }
@@ -115,11 +114,11 @@ impl Worker {
 /// What a change of the calibration does to what the unit is at.
 fn interrupts(order: &Order<'_>, state: State) -> Option<Problem> {
     let words = match state {
-        State::PreLaunchCalibration => "the unit is in pre-launch calibration, which is given up with this",
-        State::SelfTest => "the unit is in self-test, which begins anew with this",
+        State::PreLaunchCalibration => "the unit is in pre-launch calibration, which this ends",
+        State::SelfTest => "the unit is in self-test, which starts again",
         State::Standby | State::RunningWithReversal | State::RunningWithoutReversal => return None,
     };
-    Some(text::whole(order.name, words.to_owned()))
+    Some(unplaced(Some(order.name), words.to_owned()))
 }
 
 /// A verdict on what could not be read.
@@ -164,10 +163,10 @@ pub(super) fn check_signature(
     match signature::verify(text, &keys) {
         Ok(signature::Verdict::Signed { .. }) => {}
         Ok(signature::Verdict::Unsigned) if !settings.require_signature => {}
-        Ok(signature::Verdict::Unsigned) => verdict.push(text::whole(
-            name,
-            "is not signed, and require_signature is set: sign it (`isotherm sign`) with a key whose .pub file is in the \
-             folder of trusted keys"
+        Ok(signature::Verdict::Unsigned) => verdict.push(unplaced(Some(
+            name),
+            "is not signed, but require_signature is set: sign it (`isotherm sign`) with a key that has its .pub \
+             file in the folder of trusted keys"
                 .to_owned(),
         )),
         Err(error) => verdict.push(error.problem(Some(name))),

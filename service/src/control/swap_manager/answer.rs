@@ -45,12 +45,12 @@ impl Worker {
     pub(super) fn take_put(&mut self, sample: &Sample) {
         let key = sample.key_expr().as_str();
         if sample.kind() != SampleKind::Put {
-            tracing::warn!("{key}: a deletion means nothing here");
+            tracing::warn!("{key}: a deletion has no effect");
             return;
         }
         let serial = key::parse_calibration(key::asker(key).0);
         let Some(unit) = serial.and_then(|serial| UnitId::new(serial).ok()) else {
-            tracing::warn!("{key} names no unit: the document is passed over");
+            tracing::warn!("{key} names no unit: the document is ignored");
             return;
         };
         if !self.intake.answers_for(&unit) {
@@ -62,7 +62,7 @@ impl Worker {
         let options = options.map_err(|words| format!("attachment: {words}"));
         match options.and_then(|options| self.with_asker(key, Origin::Bus, options)) {
             Ok(options) => drop(self.bus_swap(&unit, &sample.payload().to_bytes(), options)),
-            Err(words) => tracing::warn!(%unit, "a document is passed over: {words}"),
+            Err(words) => tracing::warn!(%unit, "a document is ignored: {words}"),
         }
     }
 
@@ -114,10 +114,10 @@ impl Worker {
         match key::asker(key).1 {
             Some(name) if self.certified_names => Ok(format!("{CERTIFIED}{name}")),
             _ if stated.starts_with(CERTIFIED) => {
-                Err(format!("by is {stated:?}: {CERTIFIED} stands before the name of a certificate alone"))
+                Err(format!("by is {stated:?}: {CERTIFIED} is reserved for names of certificates"))
             }
             None if self.certified_names && origin == Origin::Bus => Err(format!(
-                "who asks must be the last part of the key, {key}/NAME, as the certificate says it (certified_names)"
+                "the key must end with the name of your certificate, {key}/NAME (certified_names is set)"
             )),
             Some(name) => Ok(name.to_owned()),
             None => Ok(stated),
@@ -136,7 +136,7 @@ impl Worker {
             Ok((unit, _)) if !self.intake.answers_for(&unit) => {}
             Ok((unit, order)) => match self.command(&unit, &order) {
                 Some(reply) => answer_json(query, query.key_expr().as_str(), &reply),
-                None => refuse(query, &format!("unit {unit} has not appeared: nothing was received of it")),
+                None => refuse(query, &format!("unit {unit} has not appeared: nothing was received from it")),
             },
             Err(words) => refuse(query, &words),
         }

@@ -72,10 +72,10 @@ impl Worker {
         match done {
             Ok(0) => return,
             Ok(count) => {
-                tracing::debug!(%unit, count, "entries of the other instance's audit file are written down here too");
+                tracing::debug!(%unit, count, "entries of the other instance's audit file are copied");
             }
             Err(error) => {
-                tracing::error!(%unit, "the other instance's history is not written down here: {error}");
+                tracing::error!(%unit, "the other instance's history is not copied: {error}");
                 return;
             }
         }
@@ -182,7 +182,8 @@ impl Worker {
             Ok(())
         });
         if let Err(error) = stored {
-            tracing::error!(%unit, revision = revision.counter, "what is in force is not in the audit file: {error}");
+            tracing::error!(%unit, revision = revision.counter, "the calibration in force is not in the audit file: \
+                {error}");
             return;
         }
         let (record, plan) = self.restored(unit);

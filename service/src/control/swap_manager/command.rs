@@ -134,8 +134,7 @@ impl Worker {
     /// Hands a command to the unit.
     fn give_command(&self, unit: &UnitId, command: &Command) -> Result<State, String> {
         let done = self.intake.with(unit, |actor| actor.command(command));
-        done.ok_or("the unit has started anew after an alarm: try again".to_owned())?
-            .map_err(|e| e.to_string())
+        done.ok_or("the unit was restarted after an alarm: try again".to_owned())?.map_err(|e| e.to_string())
     }
 
     fn command_rollback(
@@ -169,7 +168,7 @@ impl Worker {
             Order::Rest(order) => Command::Rest(place(order)?),
             Order::EndRest => Command::EndRest,
             Order::Rollback { .. } | Order::Forget => {
-                return Err("this is no command of the state machine".to_owned());
+                return Err("this is not a command of the state machine".to_owned());
             }
         })
     }
@@ -207,7 +206,7 @@ fn words(order: &Order) -> String {
         Order::Standby => "standby".to_owned(),
         Order::SelfTest => "self-test".to_owned(),
         Order::PreLaunch(order) => {
-            let install = if order.install { "" } else { ", not to be installed" };
+            let install = if order.install { "" } else { ", not put in force" };
             format!("pre-launch at {}{install}", at(&order.place))
         }
         Order::Abort => "abort".to_owned(),

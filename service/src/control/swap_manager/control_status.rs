@@ -89,7 +89,7 @@ impl Worker {
         let lost = self.lost.iter().map(|words| Standing {
             kind: "state_folder",
             count: 1,
-            words: format!("swaps are refused, nothing can be written down: {words}"),
+            words: format!("swaps are refused, the state folder cannot be written: {words}"),
         });
         let losses = self.losses.first().map(|(_, words)| Standing {
             kind: "audit_file",
@@ -107,7 +107,7 @@ impl Worker {
             kind: "untrusted_calibration",
             count,
             words: format!(
-                "in force again without a signature that is trusted today: {}; `isotherm status UNIT` says what to do",
+                "restored without a signature that is now trusted: {}; `isotherm status UNIT` says what to do",
                 first_of(untrusted.into_iter())
             ),
         });
@@ -116,7 +116,8 @@ impl Worker {
             kind: UNWRITTEN,
             count: unwritten.len() as u64,
             words: format!(
-                "{} could not be written down and is not in force, it is tried again: make room on the disk of the state folder",
+                "{} could not be written to the state folder and is not in force; it is tried again: make room on \
+                 the disk",
                 first.display()
             ),
         });

@@ -14,7 +14,7 @@ use super::admit::unit_of;
 use super::reading::Reading;
 use crate::control::compressed::CompressedBytes;
 use crate::control::watch::read_document;
-use crate::text;
+use isotherm_document::file;
 
 /// Files from which on it is worth while to read several at the same time.
 const FEW: usize = 8;
@@ -38,7 +38,7 @@ impl Read {
     pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
         let name = path.display().to_string();
         let digest = Digest::of(bytes);
-        let text = text::text(bytes, &name).ok();
+        let text = file::text(bytes, &name).ok();
         let found = text.map(|text| Candidate::parse(text, Some(&name), None).map(Reading::from));
         let hint = match &found {
             Some(Ok(reading)) => UnitId::new(&reading.unit).ok(),

@@ -26,7 +26,7 @@ use super::file::Read;
 use super::order::Order;
 use super::worker::Worker;
 use crate::control::watch::{FolderEvent, read_document};
-use crate::text;
+use isotherm_document::unplaced;
 
 /// Distance of the attempts to write down what could not be.
 const RETRY_INTERVAL: Duration = Duration::from_secs(2);
@@ -172,19 +172,20 @@ impl Worker {
                 self.look_for_survivor(before.as_ref());
             }
             FolderEvent::Unreadable { file, reason } => {
-                let problem = text::whole(&file.display().to_string(), format!("cannot be read: {reason}"));
-                tracing::error!("{problem}; what is in force stays in force");
+                let problem =
+                    unplaced(Some(&file.display().to_string()), format!("cannot be read: {reason}"));
+                tracing::error!("{problem}; the calibration in force stays");
                 self.folder.unreadable(&file, problem);
             }
             FolderEvent::Removed { file } => {
                 let before = self.folder.remove(&file);
                 let unit = before.as_ref().map(ToString::to_string).unwrap_or_default();
-                tracing::warn!(unit, "{} is gone; what is in force stays in force", file.display());
+                tracing::warn!(unit, "{} is gone; the calibration in force stays", file.display());
                 self.look_for_survivor(before.as_ref());
             }
             FolderEvent::FolderGone { reason } => {
                 let path = self.folder.path.as_deref().unwrap_or(Path::new("")).display();
-                tracing::error!("{path} cannot be read: {reason}; what is in force stays in force");
+                tracing::error!("{path} cannot be read: {reason}; the calibration in force stays");
                 self.folder.miss(reason);
             }
             FolderEvent::FolderBack => {
@@ -211,7 +212,7 @@ impl Worker {
         }
         let named = self.folder.files.get(path).and_then(|file| file.unit.clone());
         if named.is_some_and(|unit| !self.intake.speaks_for(&unit)) {
-            tracing::info!("{} is left to the instance that speaks for its unit", path.display());
+            tracing::info!("{} is left to the instance that publishes its unit", path.display());
             return true;
         }
         let problems = self.swap_file(path, read, at_start);
@@ -230,8 +231,8 @@ impl Worker {
         let may_be_overlay = read.unit().is_none();
         if may_be_overlay && std::str::from_utf8(bytes).is_ok_and(overlay::is_overlay) {
             let message =
-                "is an overlay: this folder is for whole documents; put it in force with `isotherm swap`";
-            let problem = text::whole(&name, message.to_owned());
+                "is an overlay, but this folder is for documents: put it in force with `isotherm swap`";
+            let problem = unplaced(Some(&name), message.to_owned());
             tracing::error!("{problem}");
             return vec![problem];
         }
@@ -243,7 +244,7 @@ impl Worker {
         let said = valid.as_ref().filter(|unit| active(unit).is_some());
         if let Some(unit) = said.filter(|unit| self.store.said_by_folder(unit) == Some(digest)) {
             if !at_start {
-                tracing::info!(%unit, "{name} holds what the folder said before: what is in force stays in force");
+                tracing::info!(%unit, "{name} has the same content as before: the calibration in force stays");
             }
             return Vec::new();
         }
@@ -276,13 +277,13 @@ impl Worker {
     fn judge_again(&self, order: &Order<'_>) -> Vec<Problem> {
         let mut problems = self.admit(order).problems;
         if problems.is_empty() {
-            let message = "was refused when it was put there, and a restart does not take it though it would pass now: put \
-                           it in force with `isotherm swap`, or write another document there";
-            problems.push(text::whole(order.name, message.to_owned()));
+            let message = "was refused when it was put there, and a restart does not change that: put it in force \
+                           with `isotherm swap`, or replace the file";
+            problems.push(unplaced(Some(order.name), message.to_owned()));
         }
         let unit = order.unit.as_ref().map(ToString::to_string).unwrap_or_default();
         for problem in &problems {
-            tracing::error!(unit, "refused: {problem}; what is in force stays in force");
+            tracing::error!(unit, "refused: {problem}; the calibration in force stays");
         }
         problems
     }
@@ -293,8 +294,7 @@ impl Worker {
             let others = files.iter().filter(|other| *other != path);
             let others: Vec<_> = others.map(|other| other.display().to_string()).collect();
             let message = format!(
-                "unit {unit} is named by {} too: none of them is taken, remove all but one; what is in force stays in \
-                 force",
+                "unit {unit} is also named by {}: neither is used, the calibration in force stays; remove all but one",
                 others.join(", ")
             );
             let file = Some(path.display().to_string());

@@ -156,10 +156,10 @@ impl Inbox {
         let Err(not_taken) = self.0.push(unit, request, bytes) else { return };
         let (request, why) = *not_taken;
         let why = match why {
-            Refused::Full => "too many requests for this unit, or for all, are waiting",
+            Refused::Full => "too many requests are waiting, for this unit or for all",
             Refused::Ended => "the service is ending",
         };
-        tracing::warn!(unit = shown, "a swap, command or question is refused: {why}");
+        tracing::warn!(unit = shown, "a swap, command or query is refused: {why}");
         if let Request::Calibration(query, _)
         | Request::Command(query, _)
         | Request::History(query)

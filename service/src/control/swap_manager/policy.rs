@@ -37,12 +37,12 @@ impl Doubt {
     pub(super) fn message(&self, forced: bool) -> String {
         match (self.refuses, forced) {
             (true, false) if self.policy.is_empty() => {
-                format!("{}: swap by force if it is meant so", self.words)
+                format!("{}: force the swap (--force) if this is intended", self.words)
             }
             (true, true) if self.policy.is_empty() => format!("{} (forced)", self.words),
             (true, false) => {
                 format!(
-                    "{} ([swap] {} = \"refuse\"): swap by force if it is meant so",
+                    "{} ([swap] {} = \"refuse\"): force the swap (--force) if this is intended",
                     self.words, self.policy
                 )
             }
@@ -64,7 +64,7 @@ pub(super) fn judge(
     doubts.extend(age(settings, candidate, now));
     if candidate.schema < CURRENT_SCHEMA {
         let words = format!(
-            "is version {}, this release writes {CURRENT_SCHEMA}: have the document written anew",
+            "is version {}, this release writes {CURRENT_SCHEMA}: have the document made again",
             candidate.schema
         );
         doubts.push(Doubt::new("schema", settings.old_schema, "old_schema", words));
@@ -85,19 +85,15 @@ fn stream(candidate: &Reading, active: &Active) -> Option<Doubt> {
         && (old.accel_count() == 0 || new.accel_count() == 0 || {
             (old.accel_output(), old.accel_count()) == (new.accel_output(), new.accel_count())
         });
-    let words = "has another kind of output or number of sensors than the document in force: unless the producer changes \
-                 with it, every tick would be refused";
+    let words = "has another kind of output or number of sensors than the document in force: every tick would be \
+                 refused unless the producer changes too";
     (!same).then(|| Doubt::new("", Severity::Refuse, "", words.to_owned()))
 }
 
 /// A document that has lost a section against the one in force may be the beginning of one that is still being written.
 pub(super) fn loss(lost: &[String]) -> Option<Doubt> {
-    let words = || {
-        format!(
-            "does not have {} any more, which the document in force has, as if only its beginning had been written",
-            lost.join(", ")
-        )
-    };
+    let words =
+        || format!("lacks {}, which the document in force has; is the file complete?", lost.join(", "));
     (!lost.is_empty()).then(|| Doubt::new("", Severity::Refuse, "", words()))
 }
 
@@ -106,14 +102,12 @@ fn age(settings: &SwapSettings, candidate: &Reading, now: SystemTime) -> Option<
     let limit_days = limit_s / DAY_S;
     let doubt = |words| Some(Doubt::new("created", settings.age, "age", words));
     let (Some(created), Some(created_unix_s)) = (&candidate.created, candidate.label.created_unix_s) else {
-        return doubt(format!(
-            "is missing: whether the document is older than {limit_days} days cannot be said"
-        ));
+        return doubt(format!("is missing: the document may be older than {limit_days} days"));
     };
     let now_s = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let age_s = i64::try_from(now_s).unwrap_or(i64::MAX).saturating_sub(created_unix_s);
     if age_s < -DAY_S {
-        return doubt(format!("is {created}, which lies ahead by {} days", -age_s / DAY_S));
+        return doubt(format!("is {created}, {} days in the future", -age_s / DAY_S));
     }
     (age_s > limit_s).then_some(())?;
     doubt(format!("is {created}: {} days old, more than {limit_days}", age_s / DAY_S))
@@ -125,12 +119,10 @@ fn downgrade(settings: &SwapSettings, candidate: &Reading, active: &Active) -> O
     let shown = WallTime::from_unix_ms(in_force.saturating_mul(1000));
     let words = match (&candidate.created, candidate.label.created_unix_s) {
         (Some(created), Some(own)) if own < in_force => {
-            format!("is {created}: older than the document in force, which is of {shown}")
+            format!("is {created}: older than the document in force, of {shown}")
         }
         (Some(_), Some(_)) => return None,
-        _ => format!(
-            "is missing: whether the document is older than the one in force, of {shown}, cannot be said"
-        ),
+        _ => format!("is missing: the document may be older than the one in force, of {shown}"),
     };
     Some(Doubt::new("created", settings.downgrade, "downgrade", words))
 }
@@ -164,8 +156,8 @@ fn jump(settings: &SwapSettings, candidate: &Reading, active: &Active, present: 
     let before = active.calibration.steady(thermal, present.mode);
     let Some(jump) = before.jump(&candidate.calibration.steady(thermal, present.mode)) else {
         return vec![doubt(
-            "has other sensors or another kind of output than the document in force: how far the output would jump \
-             cannot be said"
+            "has other sensors or another kind of output than the document in force: the jump of the output is \
+             unknown"
                 .to_owned(),
         )];
     };

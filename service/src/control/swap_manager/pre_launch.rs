@@ -53,7 +53,7 @@ impl Worker {
 
     /// Tells and writes down that it was given up, and not by a command.
     fn note_given_up(&mut self, unit: &UnitId, reason: &str) {
-        tracing::warn!(%unit, "pre-launch calibration given up, the constants stay: {reason}");
+        tracing::warn!(%unit, "pre-launch calibration ended, the constants stay: {reason}");
         // Left in its place: the next one may have begun.
         let run = self.records.get(unit).and_then(|record| record.pre_launch.as_ref());
         let by = run.map(|run| run.by.clone()).unwrap_or_default();
@@ -94,12 +94,12 @@ impl Worker {
         };
         let Some(written) = written else {
             return Err(format!(
-                "revision {} never was a document, so that there is nothing that an overlay could lie on",
+                "revision {} never was a document, so there is no base for an overlay",
                 end.revision
             ));
         };
         let Some(document) = document_in(&written.text) else {
-            return Err(format!("the document of revision {} cannot be read any more", end.revision));
+            return Err(format!("the document of revision {} can no longer be read", end.revision));
         };
         let overlay = overlay((&written, &document), end, constants, run);
         let text =
@@ -111,11 +111,12 @@ impl Worker {
             self.intake.with(unit, |actor| actor.tell_swaps(account));
         }
         if !run.order.install {
-            return Ok(format!("kept as overlay {digest}, not put in force, as asked"));
+            return Ok(format!("stored as overlay {digest}, not put in force, as requested"));
         }
         if !is_last {
             return Ok(format!(
-                "kept as overlay {digest} of revision {}, not put in force: another calibration was accepted meanwhile",
+                "stored as overlay {digest} of revision {}, not put in force: another calibration was accepted \
+                 meanwhile",
                 end.revision
             ));
         }
@@ -131,9 +132,9 @@ impl Worker {
         });
         if reply.outcome == SwapOutcome::Refused {
             let problems: Vec<_> = reply.problems.iter().map(|problem| problem.message.clone()).collect();
-            return Err(format!("kept as overlay {digest}, not put in force: {}", problems.join("; ")));
+            return Err(format!("stored as overlay {digest}, not put in force: {}", problems.join("; ")));
         }
-        Ok(format!("kept as overlay {digest}, in force as revision {}", reply.revision))
+        Ok(format!("stored as overlay {digest}, in force as revision {}", reply.revision))
     }
 }
 

@@ -1,13 +1,12 @@
 //! Back to an earlier revision: a swap like any other, with a document that was accepted before.
 
 use isotherm_protocol::control::{Schedule, SwapOptions, SwapOutcome, SwapReply};
-use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::key::UnitId;
 
 use super::order::Order;
 use super::worker::Worker;
-use crate::text;
+use isotherm_document::unplaced;
 
 impl Worker {
     /// Goes back to the calibration before the present one, or to a stated revision.
@@ -22,7 +21,7 @@ impl Worker {
         let bytes = match self.store.document(&set.digest) {
             Ok(Some(bytes)) => bytes,
             Ok(None) => {
-                let message = format!("the document of revision {} is not kept any more", set.revision);
+                let message = format!("the document of revision {} is no longer kept", set.revision);
                 return self.no_rollback(unit, message);
             }
             Err(error) => return self.no_rollback(unit, error.to_string()),
@@ -50,7 +49,7 @@ impl Worker {
         match to {
             _ if revisions.is_empty() => format!("no document was ever accepted for unit {unit}"),
             Some(to) => {
-                format!("revision {to} is not one of unit {unit}; its latest are {}", revisions.join(", "))
+                format!("unit {unit} has no revision {to}; its latest are {}", revisions.join(", "))
             }
             None if self
                 .store
@@ -58,11 +57,10 @@ impl Worker {
                 .zip(self.store.good_sets(unit).skip(1))
                 .all(|(a, b)| a.corrects_as(b)) =>
             {
-                format!("unit {unit} was never given another document than the present one")
+                format!("unit {unit} has had no other document than the present one")
             }
             None => format!(
-                "nothing is kept of unit {unit} before what was gone back to: to go forth again, name a revision; its \
-                 latest are {}",
+                "unit {unit} has no older revision to roll back to: to go forward, give a revision; its latest are {}",
                 revisions.join(", ")
             ),
         }
@@ -80,7 +78,7 @@ impl Worker {
             schedule: Schedule::NextTick,
             slew_s: 0.0,
             // No matter of a file.
-            problems: vec![Problem { file: None, ..text::whole("", message) }],
+            problems: vec![unplaced(None, message)],
             warnings: Vec::new(),
             difference: None,
         }

@@ -22,7 +22,7 @@ use crate::control::calibrations::{Calibrations, Change, Installable, Plan};
 use crate::control::compressed::CompressedText;
 use crate::control::store::Store;
 use crate::control::watch::{Known, documents_in};
-use crate::text;
+use isotherm_document::{file, unplaced};
 
 /// How many units a line of the log names.
 const NAMED: usize = 8;
@@ -125,7 +125,7 @@ impl Worker {
                 }
                 Err(error) => {
                     let problem =
-                        text::whole(&file.display().to_string(), format!("cannot be read: {error}"));
+                        unplaced(Some(&file.display().to_string()), format!("cannot be read: {error}"));
                     tracing::error!("{problem}");
                     self.folder.unreadable(&file, problem);
                     found.insert(file, Known::Unreadable);
@@ -155,8 +155,7 @@ impl Worker {
     /// Goes on without a folder that cannot be read, with what the state folder has.
     pub(crate) fn miss_folder(&mut self, error: &std::io::Error) {
         tracing::error!(
-            "the folder of calibrations cannot be read: {error}; the last good sets are in force, and it is taken when it \
-             is back"
+            "the folder of calibrations cannot be read: {error}; the last good sets are in force until it is back"
         );
         self.folder.miss(error.to_string());
     }
@@ -175,8 +174,8 @@ impl Worker {
         check_signature(&self.swap, &signed, &name, &mut problems, &mut warnings);
         let first = problems.first()?;
         let words = format!(
-            "revision {revision} is in force again, and would be refused today: {}; it stays in force, put a document in \
-             its place that a trusted key has signed (`isotherm swap`)",
+            "revision {revision} is restored, but would be refused now: {}; it stays in force until you swap to a \
+             document signed by a trusted key (`isotherm swap`)",
             first.message
         );
         tracing::error!(%unit, revision, "{words}");
@@ -190,7 +189,8 @@ impl Worker {
             let file = set.and_then(|set| set.source.file()).filter(|file| !Path::new(file).exists());
             if let (Some(file), Some(active)) = (file, &record.active) {
                 tracing::warn!(
-                    %unit, revision = active.revision, "{file} is gone; what it held is the last good set and is in force"
+                    %unit, revision = active.revision, "{file} is gone; its content is the last good set and is in \
+                        force"
                 );
             }
         }
@@ -212,10 +212,10 @@ pub(super) fn written(
 ) -> Result<(Written, Label, Arc<Calibration>), Vec<Problem>> {
     let file = store.document_file(&set.digest);
     let name = file.map_or_else(|| format!("document {}", set.digest), |file| file.display().to_string());
-    let problem = |message: String| vec![text::whole(&name, message)];
+    let problem = |message: String| vec![unplaced(Some(&name), message)];
     let bytes = store.document(&set.digest).map_err(|error| problem(error.to_string()))?;
-    let bytes = bytes.ok_or_else(|| problem("is not in the state folder any more".to_owned()))?;
-    let document_text = text::text(&bytes, &name)?;
+    let bytes = bytes.ok_or_else(|| problem("is no longer in the state folder".to_owned()))?;
+    let document_text = file::text(&bytes, &name)?;
     let parsed = Document::parse(document_text, Some(&name))?;
     let written = Written {
         digest: set.digest,

@@ -19,7 +19,7 @@ use super::worker::Worker;
 use crate::control::calibrations::{Change, Installable};
 use crate::control::compressed::CompressedText;
 use crate::control::store::StoreError;
-use crate::text;
+use isotherm_document::unplaced;
 
 /// A document that was found good, before it is written down.
 #[derive(Debug)]
@@ -96,11 +96,11 @@ impl Worker {
 
     /// Tells and counts that a document is refused because it cannot be written down.
     fn refuse_unwritten(&mut self, unit: &UnitId, name: &str, error: &StoreError) -> Problem {
-        let message = format!("the swap cannot be written down, nothing has changed: {error}");
-        let problem = text::whole(name, message);
+        let message = format!("the swap cannot be written to the state folder, nothing has changed: {error}");
+        let problem = unplaced(Some(name), message);
         self.folder.note_unwritten(Path::new(name));
         if !self.retrying {
-            tracing::error!(%unit, "a swap is refused, it cannot be written down: {error}");
+            tracing::error!(%unit, "a swap is refused, it cannot be written to the state folder: {error}");
             self.count_refusal(&refused(Some(unit.clone()), vec![problem.clone()]));
         }
         problem
@@ -279,7 +279,7 @@ impl Worker {
 
     /// Writes down that an accepted revision never came in force.
     fn note_withdrawn(&mut self, unit: &UnitId, revision: u64, why: Withdrawn) {
-        tracing::info!(%unit, revision, "a change that waited for its tick is withdrawn");
+        tracing::info!(%unit, revision, "a pending change is withdrawn");
         let event = AuditEvent::Withdrawn(Withdrawal { revision, why });
         if let Err(error) = self.append(Some(unit), "", event) {
             tracing::error!(%unit, revision, "the withdrawal is not in the audit file: {error}");

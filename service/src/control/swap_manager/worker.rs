@@ -108,7 +108,7 @@ impl Worker {
             });
             if catch_unwind(work).is_err() {
                 tracing::error!(
-                    "alarm: a swap, command or question was given up by a panic; what is in force stays"
+                    "alarm: a swap, command or query ended in a panic; the calibration in force stays"
                 );
             }
             self.show();
@@ -135,20 +135,20 @@ impl Worker {
         match self.store.keep(SystemTime::now(), documents, overlays) {
             Ok(false) => {
                 if self.lost.take().is_some() {
-                    tracing::info!("the state folder is back: swaps are taken again");
+                    tracing::info!("the state folder is back: swaps are accepted again");
                 }
             }
             Ok(true) => {
                 self.lost = None;
                 tracing::warn!(
-                    "the state folder was removed and another one is in its place: everything that holds was written down \
-                     in it anew; documents and entries before that are in the old one"
+                    "the state folder was replaced: what is in force was written into the new one; earlier documents \
+                     and entries are in the old one"
                 );
             }
             Err(error) => {
                 let words = error.to_string();
                 if self.lost.as_ref() != Some(&words) {
-                    tracing::error!("swaps are refused, nothing can be written down: {words}");
+                    tracing::error!("swaps are refused, the state folder cannot be written: {words}");
                 }
                 self.lost = Some(words);
             }

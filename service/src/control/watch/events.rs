@@ -87,7 +87,7 @@ impl FsEvents {
         let reason = reason(error);
         if self.complaint.as_ref() != Some(&reason) {
             let (folder, poll) = (self.folder.display(), self.poll);
-            tracing::warn!(%folder, "the folder sends no events, it is looked at every {poll:?}: {reason}");
+            tracing::warn!(%folder, "the folder sends no events, it is polled every {poll:?}: {reason}");
             self.complaint = Some(reason);
         }
     }
@@ -97,10 +97,10 @@ impl FsEvents {
 fn reason(error: &notify::Error) -> String {
     match &error.kind {
         notify::ErrorKind::MaxFilesWatch => {
-            "no more watches are granted, raise fs.inotify.max_user_watches".to_owned()
+            "no more watches are available: raise fs.inotify.max_user_watches".to_owned()
         }
         notify::ErrorKind::Io(io) if io.raw_os_error() == Some(EMFILE) => {
-            format!("{io}, raise fs.inotify.max_user_instances or the limit of open files")
+            format!("{io}: raise fs.inotify.max_user_instances or the limit of open files")
         }
         _ => error.to_string(),
     }

@@ -147,14 +147,14 @@ impl Watch {
                 let (alarms, since_s) = (progress.seen.alarms, since.as_secs());
                 reason(
                     Kind::Alarm,
-                    format!("unit {unit}: an event thought impossible {since_s} s ago; {alarms} so far"),
+                    format!("unit {unit}: an internal fault {since_s} s ago; {alarms} so far"),
                 );
             }
             if let Some((ticks, since)) = self.stall(now, unit, held_back) {
                 let since_s = since.as_secs();
                 reason(
                     Kind::NoOutput,
-                    format!("unit {unit}: no corrected tick for {since_s} s, while {ticks} raw ones came"),
+                    format!("unit {unit}: no corrected tick for {since_s} s, but {ticks} raw ones arrived"),
                 );
             }
         }

@@ -73,7 +73,9 @@ pub(super) async fn serve(listener: TcpListener, exporter: Arc<Exporter>) {
             Ok((stream, _)) => stream,
             Err(error) => {
                 if !std::mem::replace(&mut told, true) {
-                    tracing::warn!("metrics: cannot accept a connection: {error}; further ones are not told");
+                    tracing::warn!(
+                        "metrics: cannot accept a connection: {error}; further failures are not reported"
+                    );
                 }
                 tokio::time::sleep(PAUSE).await;
                 continue;
@@ -177,7 +179,7 @@ async fn metrics(request: &Request<Incoming>, exporter: &Arc<Exporter>) -> Answe
     let made = match exporter.look(move |source, watch| write(source.look(watch, stopping))).await {
         Err(NoLook::Starting) => write(Look::starting(exporter.started.elapsed())),
         Err(NoLook::TooSlow) => {
-            return text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "units could not be looked at in time\n");
+            return text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "units could not be read in time\n");
         }
         Ok(made) => made,
     };

@@ -47,7 +47,7 @@ impl Collector for Look {
                 Type::Histogram => MetricType::Histogram,
             };
             let encoder = encoder.encode_descriptor(family.name, family.help, unit.as_ref(), kind)?;
-            (family.samples)(self, &mut Samples { encoder, labels: family.labels })?;
+            family.give(self, &mut Samples { encoder, labels: family.labels })?;
         }
         Ok(())
     }

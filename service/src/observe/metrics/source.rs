@@ -13,11 +13,12 @@ use serde::Serialize;
 use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
 use crate::control::swap_manager::{ControlStatus, Posted, UNWRITTEN};
-use crate::logging::dropped_lines;
+use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
 use crate::receive::unit::UnitActor;
+use isotherm_cli::stderr::dropped_lines;
 
 /// Where a look is taken from.
 #[derive(Debug)]
@@ -30,6 +31,7 @@ pub(crate) struct Source {
     state_folder: Option<PathBuf>,
     held_back: HeldBack,
     pulse: Option<Arc<Pulse>>,
+    subscribers: Arc<Subscribers>,
 }
 
 /// One look at everything.
@@ -47,6 +49,8 @@ pub(super) struct Look {
     pub(super) faults: Vec<Fault>,
     /// Log lines dropped so far.
     pub(super) log_lines_dropped: u64,
+    /// Receipts of subscribers that came late.
+    pub(super) late_receipts: u64,
     /// What the swap manager has posted.
     pub(super) posted: Arc<Posted>,
     /// Whether the state folder can be written; `None` where none is configured.
@@ -95,6 +99,7 @@ impl Look {
             instances: 1,
             faults: Vec::new(),
             log_lines_dropped: dropped_lines(),
+            late_receipts: 0,
             posted: Arc::default(),
             state_folder_writable: None,
             units: Vec::new(),
@@ -123,7 +128,7 @@ impl Verdict {
     pub(super) fn too_busy(uptime: Duration, limit: Duration) -> Self {
         let limit_s = limit.as_secs_f64();
         let words = format!(
-            "units or state folder could not be looked at within {limit_s} s: something holds them up"
+            "units or state folder could not be read within {limit_s} s: a slow subscriber or disk blocks them"
         );
         Self::new(uptime, vec![Reason { kind: Kind::Busy, unit: None, words }])
     }
@@ -155,12 +160,18 @@ impl Source {
                 window: Duration::from_nanos(window),
             },
             pulse: None,
+            subscribers: Arc::default(),
         }
     }
 
     /// The same, of a service whose receive path is felt.
     pub(crate) fn feeling(self, pulse: Arc<Pulse>) -> Self {
         Self { pulse: Some(pulse), ..self }
+    }
+
+    /// The same, of a service that asks for receipts.
+    pub(crate) fn asking(self, subscribers: Arc<Subscribers>) -> Self {
+        Self { subscribers, ..self }
     }
 
     /// Whether the receive path is alive, as far as it is felt.
@@ -200,6 +211,7 @@ impl Source {
             instances: self.pair.others().len() as u64 + 1,
             faults: self.intake.faults(),
             log_lines_dropped: dropped_lines(),
+            late_receipts: self.subscribers.late_receipts(),
             posted: self.control_status.read(),
             state_folder_writable: self.state_folder(now, watch).map(|tried| tried.is_ok()),
             units,
@@ -234,7 +246,7 @@ impl Source {
         let folder = self.state_folder.as_deref()?;
         let reason = |error| {
             let words = format!(
-                "the state folder {} cannot be written: {error}; until it can, every swap is refused",
+                "the state folder {} cannot be written: {error}; until then every swap is refused",
                 folder.display()
             );
             Reason { kind: Kind::StateFolder, unit: None, words }

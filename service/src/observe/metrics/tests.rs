@@ -20,9 +20,7 @@ use crate::receive::intake::{Intake, OutletMaker};
 use checker::Page;
 use client::{connect, get, read};
 
-#[path = "../../../tests/service/metrics/checker.rs"]
 mod checker;
-#[path = "../../../tests/service/metrics/client.rs"]
 mod client;
 
 const LIMIT: Duration = Duration::from_secs(30);

@@ -9,9 +9,10 @@ use isotherm_protocol::status::MAX_FAULTS;
 use zenoh::Session;
 
 use crate::control::swap_manager::{ControlStatus, Posted};
-use crate::logging::dropped_lines;
+use crate::observe::subscribers::Subscribers;
 use crate::receive::fault::standing;
 use crate::receive::intake::Intake;
+use isotherm_cli::stderr::dropped_lines;
 
 /// When the service's status is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +31,7 @@ pub(super) struct Instance {
     started: (Instant, i64),
     settings_digest: Option<Digest>,
     control_status: Arc<ControlStatus>,
+    subscribers: Arc<Subscribers>,
     /// What was said last, as far as a change of it is news.
     said: Option<ServiceStatus>,
     /// What the swap manager had posted then.
@@ -41,6 +43,7 @@ impl Instance {
         session: &Session,
         settings_digest: Option<Digest>,
         control_status: Arc<ControlStatus>,
+        subscribers: Arc<Subscribers>,
     ) -> Self {
         let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let started_unix_ms = i64::try_from(since.as_millis()).unwrap_or(i64::MAX);
@@ -49,6 +52,7 @@ impl Instance {
             started: (Instant::now(), started_unix_ms),
             settings_digest,
             control_status,
+            subscribers,
             said: None,
             posted: None,
         }
@@ -96,9 +100,10 @@ impl Instance {
         faults.extend(intake.faults());
         let dropped = dropped_lines();
         if dropped > 0 {
-            let words = "log lines were dropped: stderr took none (a stopped terminal, a full pipe)";
+            let words = "log lines were dropped: stderr was blocked (a stopped terminal, a full pipe)";
             faults.push(standing("log_lines_dropped", dropped, words.to_owned()));
         }
+        faults.extend(self.subscribers.fault());
         faults.truncate(MAX_FAULTS);
         // Time and faults go on all the time: no news by themselves.
         Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })

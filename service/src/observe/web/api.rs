@@ -16,7 +16,7 @@ use serde_json::json;
 use super::guard::{Guard, Refusal};
 use super::{Web, assets, live};
 use crate::observe::metrics::http::{Answer, JSON, packed, text};
-use crate::operator::ConsoleError;
+use isotherm_operator::ConsoleError;
 
 /// Longest body of a request: a document, each of its characters written in JSON.
 const MAX_BODY: usize = 6 * MAX_DOCUMENT_BYTES + 4096;
@@ -177,7 +177,7 @@ impl Web {
         match watched.await {
             Ok(Ok(live)) => of_json(live),
             Ok(Err(unit)) => Err(no_unit(unit.as_str())),
-            Err(_) => Err((StatusCode::INTERNAL_SERVER_ERROR, "the unit could not be looked at".to_owned())),
+            Err(_) => Err((StatusCode::INTERNAL_SERVER_ERROR, "the unit could not be read".to_owned())),
         }
     }
 
@@ -198,7 +198,7 @@ impl Web {
         let body = match Limited::new(request.into_body(), MAX_BODY).collect().await {
             Ok(body) => body.to_bytes(),
             Err(_) => {
-                return refused((StatusCode::PAYLOAD_TOO_LARGE, "longer than any document, or broken off"));
+                return refused((StatusCode::PAYLOAD_TOO_LARGE, "longer than any document, or cut short"));
             }
         };
         match self.question(&route, &body) {
@@ -247,13 +247,11 @@ impl Web {
             return Ok(question);
         }
         if !self.write {
-            let words = "this console changes nothing: set write = true in [web], and restart the service";
+            let words = "this console is read-only: set write = true in [web], and restart the service";
             return Err((StatusCode::FORBIDDEN, words.to_owned()));
         }
         if by.trim().is_empty() || by.chars().count() > MAX_BY {
-            return Err(bad(format!(
-                "say who asks, in 1 to {MAX_BY} characters: it goes into the audit file"
-            )));
+            return Err(bad(format!("give your name for the audit file, in 1 to {MAX_BY} characters")));
         }
         Ok(question)
     }

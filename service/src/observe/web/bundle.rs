@@ -8,9 +8,9 @@ use flate2::write::GzEncoder;
 use isotherm_protocol::key::{self, UnitId};
 
 use super::Web;
-use crate::operator::page::{self, tone};
-use crate::operator::status::{Report, unix_ms};
-use crate::operator::worst_first;
+use isotherm_operator::page::{self, tone};
+use isotherm_operator::status::{Report, unix_ms};
+use isotherm_operator::worst_first;
 
 /// Latest entries of a unit's history that go in.
 const ENTRIES: usize = 1000;
@@ -23,13 +23,13 @@ Fault report of isotherm, made by its console in the browser.
 
 summary.txt            the lines of `isotherm status`, worst first
 status.json            all of it: services and units, as `isotherm status --json`
-service/ID.toml        configuration that holds, defaults included; secrets of the Zenoh configuration left out
+service/ID.toml        effective configuration, defaults included; secrets of the Zenoh configuration left out
 unit/SERIAL/calibration.toml   document in force
 unit/SERIAL/history.json       what was done to the unit, as `isotherm history --all --json`
-missing.txt            what could not be had, if there is any
+missing.txt            what could not be read, if anything
 
 Not in it: the service's log (for example: journalctl -u isotherm), and recordings (isotherm-replay record).
-Names of operators and paths of files stand in it as they are.
+Names of operators and paths of files are in it unchanged.
 ";
 
 impl Web {
@@ -75,9 +75,7 @@ impl Web {
         let mut lines = page::services(&services, &gone, COLUMNS);
         lines.extend(page::pairs(&fleet.pairs, COLUMNS));
         lines.push(page::tally(&units, COLUMNS));
-        let grid = page::units(&units, COLUMNS);
-        lines.push(grid.head);
-        lines.extend(grid.lines);
+        lines.extend(page::units(&units, COLUMNS).lines());
         let units = units.iter().map(|it| it.status.clone()).collect();
         (tone::text(&lines, false), Report { services, units, instances: fleet.pairs.clone() })
     }

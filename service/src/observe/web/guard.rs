@@ -36,7 +36,7 @@ impl Guard {
     /// The host, with its port, that the asker believes to speak to, where that is this service: a name that somebody else has the
     /// browser resolve to this address (DNS rebinding) is none of it. `local` is the address that was connected to.
     pub(super) fn host(&self, headers: &HeaderMap, local: SocketAddr) -> Result<String, Refusal> {
-        let refused = (StatusCode::MISDIRECTED_REQUEST, "this host is not served: [web] hosts can name it");
+        let refused = (StatusCode::MISDIRECTED_REQUEST, "this host is not served: add it to [web] hosts");
         let host = one(headers, &HOST).ok_or(refused)?.to_ascii_lowercase();
         let authority: Authority = host.parse().map_err(|_| refused)?;
         let name = authority.host();

@@ -7,14 +7,13 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::{Exit, failed, print, say};
 use isotherm_protocol::digest::Digest;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::exit::Exit;
 use crate::signing::create;
-use crate::text::{check_regular, read_bounded};
-use crate::words::{print, say};
+use isotherm_document::file::{check_regular, read_bounded};
 
 /// Its name in the state folder.
 const FILE: &str = "web-token";
@@ -30,12 +29,12 @@ Examples:
   isotherm web --config /etc/isotherm/service.toml
   isotherm web --state state
 
-Prints the address to open in a browser. The part behind the # is the token: whoever has it sees what the console shows.")]
+Prints the address to open in a browser. The part after the # is the token: anyone who has it sees the console.")]
 pub struct WebArgs {
     /// Service configuration (TOML)
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// State folder of the service; replaces the configured one
+    /// State folder of the service (default: as configured)
     #[arg(long, value_name = "FOLDER")]
     pub state: Option<PathBuf>,
     /// Print JSON on stdout
@@ -44,7 +43,8 @@ pub struct WebArgs {
 }
 
 /// Prints where the console is.
-pub(crate) fn show(args: &WebArgs) -> Exit {
+#[must_use]
+pub fn show(args: &WebArgs) -> Exit {
     match address(args) {
         Ok((url, token)) => {
             let text = if args.json {
@@ -58,8 +58,7 @@ pub(crate) fn show(args: &WebArgs) -> Exit {
             if let ServiceError::Configuration(problems) = &error {
                 problems.iter().for_each(say);
             }
-            say(format_args!("isotherm: {error}"));
-            error.exit()
+            failed(&error, error.exit())
         }
     }
 }
@@ -72,7 +71,8 @@ fn address(args: &WebArgs) -> Result<(String, String), ServiceError> {
     settings.web.enabled = true;
     settings.listen_for_web();
     let Some(file) = file(&settings) else {
-        let words = "neither a state folder nor [web] token_file is given: such a service writes its token to its log";
+        let words =
+            "there is no state folder and no [web] token_file: such a service writes its token to its log";
         return Err(ServiceError::Token {
             path: FILE.into(),
             source: io::Error::new(ErrorKind::InvalidData, words),
@@ -144,7 +144,8 @@ fn read(file: &Path) -> io::Result<String> {
         return Ok(token);
     }
     let words = format!(
-        "its {} characters are no token, which is {} to {} letters, digits, - or _; remove the file, and the service makes one",
+        "its {} characters are no token, which is {} to {} letters, digits, - or _; remove the file, and the service \
+         makes a new one",
         token.chars().count(),
         LENGTHS.start(),
         LENGTHS.end()

@@ -11,12 +11,12 @@ use isotherm_protocol::status::Status;
 use serde::{Serialize, Serializer};
 
 use super::Web;
-use crate::operator::page::{
+use isotherm_operator::page::{
     Level, Unit, channel_in_view, duplicates, is_running, knows_rates, late, length, range, said_of_pairs,
     state_word,
 };
-use crate::operator::status::unix_ms;
-use crate::operator::{Fleet, worst_first};
+use isotherm_operator::status::unix_ms;
+use isotherm_operator::{Fleet, worst_first};
 
 /// All units, those that need somebody first.
 #[derive(Debug, Serialize)]
@@ -30,7 +30,7 @@ struct Overview<'f> {
     now_unix_ms: i64,
     services: Vec<Service>,
     /// Who speaks for how many units, where there are two services, and what is wrong with that.
-    pair: Vec<Said>,
+    pair: Vec<Columns>,
     units: Vec<Row>,
 }
 
@@ -152,11 +152,24 @@ impl From<(Level, String)> for Said {
     }
 }
 
+/// A line in columns.
+#[derive(Debug, Serialize)]
+struct Columns {
+    level: &'static str,
+    columns: Vec<String>,
+}
+
+impl From<(Level, Vec<String>)> for Columns {
+    fn from((level, columns): (Level, Vec<String>)) -> Self {
+        Self { level: self::level(level), columns }
+    }
+}
+
 /// Temperatures some time ago.
 #[derive(Debug)]
 struct Past<'f> {
     age_s: f64,
-    of: &'f crate::operator::page::Past,
+    of: &'f isotherm_operator::page::Past,
 }
 
 impl Serialize for Past<'_> {
@@ -185,7 +198,7 @@ impl Web {
             options: &self.options,
             now_unix_ms,
             services: services.collect(),
-            pair: said_of_pairs(&fleet.pairs).into_iter().map(Said::from).collect(),
+            pair: said_of_pairs(&fleet.pairs).into_iter().map(Columns::from).collect(),
             units: worst_first(self.seen(&fleet, now, now_unix_ms)).iter().map(Row::of).collect(),
         })
     }

@@ -62,7 +62,7 @@ impl NoticeCollector {
             // By a command, which is written down as such.
             Some(PreLaunchView::Aborted | PreLaunchView::Running(_)) => None,
             None => {
-                self.given_up = Some("the unit started anew after an alarm".to_owned());
+                self.given_up = Some("the unit was restarted after an alarm".to_owned());
                 None
             }
         };

@@ -49,14 +49,14 @@ impl Producers {
         if std::mem::take(&mut self.returns) >= RETURNS {
             let (one, other) = (self.previous.map_or(0, |(series, _)| series), self.current.unwrap_or(0));
             return Some(format!(
-                "two producers: ticks of series {one} and of series {other} come by turns; stop one of them"
+                "two producers: ticks of series {one} and {other} alternate; stop one of them"
             ));
         }
         let two = contradicting >= FEWEST && contradicting * ONE_IN >= ticks;
         two.then(|| {
             format!(
-                "two producers, it seems: {contradicting} of {ticks} gyro ticks were late, contradicted others or had come before; \
-                 stop one of them"
+                "probably two producers: {contradicting} of {ticks} gyro ticks were late, contradictory or \
+                 duplicates; stop one of them"
             )
         })
     }
@@ -87,7 +87,7 @@ mod tests {
         for series in [1, 2, 1, 2, 1] {
             producers.heard(series, now);
         }
-        assert!(producers.look(&counters(400, 0)).unwrap().contains("series 2 and of series 1"));
+        assert!(producers.look(&counters(400, 0)).unwrap().contains("series 2 and 1"));
         assert_eq!(producers.look(&counters(800, 0)), None, "it is over");
         assert!(producers.look(&counters(1200, 200)).unwrap().contains("200 of 400"));
     }

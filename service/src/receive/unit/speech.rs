@@ -254,7 +254,7 @@ impl UnitActor {
             // Silent on purpose: the other is told.
             self.speech.memory_due |= standing.alone_since.is_none();
         } else if standing.alone_since.is_none() && (ahead || (standing.yields && keeps_up)) {
-            tracing::info!(unit = %self.stream.id(), sequence = tick.sequence, "another instance speaks: standby");
+            tracing::info!(unit = %self.stream.id(), sequence = tick.sequence, "another instance publishes: standby");
             let footing = if self.speech.uncertain { Footing::Nothing } else { Footing::All };
             self.follow(now, footing);
             if let Some(following) = &mut self.speech.following {
@@ -296,13 +296,14 @@ impl UnitActor {
         }
         let Some(rebuilt) = rebuilt else { return };
         if !rebuilt.exact {
-            tracing::debug!(unit = %self.stream.id(), "what the other instance had heard is not known to the last frame");
+            tracing::debug!(unit = %self.stream.id(), "the last frame that the other instance received is unknown");
         }
         following.kept.replace(rebuilt.frames, had_joined, now);
         (following.isolated, following.intact) = (false, true);
         self.stream = rebuilt.stream;
         if !had_joined && following.follower.has_joined() {
-            tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the instance that speaks");
+            tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the \
+                publishing instance");
         }
         self.status_due = true;
         self.look();
@@ -317,7 +318,8 @@ impl UnitActor {
         }
         if self.speech.following.is_none() {
             if standing.deserted && self.stream_timeout.is_over(now) {
-                tracing::info!(unit = %self.stream.id(), "neither the other instance nor the producer is heard: standby");
+                tracing::info!(unit = %self.stream.id(), "nothing is received from the other instance or the \
+                    producer: standby");
                 self.follow(now, Footing::Isolated);
                 self.speech.uncertain = true;
                 return wants;

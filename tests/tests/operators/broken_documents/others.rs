@@ -59,7 +59,7 @@ pub(super) fn badly_signed() -> Vec<Case> {
     let line = signed.lines().last().unwrap().to_owned();
     let at_last = |name, text: String, says| Case::new(name, text, last, "", says);
     vec![
-        Case::new("unsigned", BASE, 1, "", "is not signed, and require_signature is set"),
+        Case::new("unsigned", BASE, 1, "", "is not signed, but require_signature is set"),
         at_last("signed by a stranger", by_a_stranger, "which is not trusted here; ann ("),
         at_last(
             "changed after signing",
@@ -79,11 +79,11 @@ pub(super) fn badly_signed() -> Vec<Case> {
         at_last("signature of another kind", signed.replace("ed25519", "rsa"), "is of kind"),
         Case::new("signed twice", format!("{signed}{line}\n"), last + 1, "", "is a second signature line"),
         Case::new(
-            "more behind the signature",
+            "more after the signature",
             format!("{signed}note = 1\n"),
             last + 1,
             "",
-            "behind the signature",
+            "after the signature",
         ),
     ]
 }

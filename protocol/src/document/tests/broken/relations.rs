@@ -9,7 +9,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"block\"",
         "# digital sensor",
         "temperature.channel[1].name",
-        "is the name of channel 0 too",
+        "is also the name of channel 0",
     ),
     (
         "name too long",
@@ -33,7 +33,7 @@ pub(super) const CASES: [Case; 32] = [
         "channels = [\"rock\"]",
         "rock",
         "gyro.orientation.thermal.channels[0]",
-        "is \"rock\", which is no temperature channel",
+        "is \"rock\", not a temperature channel",
     ),
     (
         "two sensors of one name",
@@ -41,7 +41,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"x\"",
         "name = \"x\"\nchannel = \"block\"\nincrement_weight_arcsec_per_count = 0.9841",
         "gyro.sensor[1].name",
-        "the name of gyro.sensor[0] too",
+        "also the name of gyro.sensor[0]",
     ),
     (
         "filter left out",
@@ -153,7 +153,7 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"supply\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "supply",
         "gyro.sensor[3].regressor[0].channel",
-        "is \"supply\", which is no channel; the channels are: block, coil, accel, board",
+        "is \"supply\", not a channel; the channels are: block, coil, accel, board",
     ),
     (
         "difference to no channel",
@@ -161,7 +161,7 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"coil\", minus = \"air\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "\"air\"",
         "gyro.sensor[3].regressor[0].minus",
-        "which is no channel",
+        "not a channel",
     ),
     (
         "reference that is no number",
@@ -217,7 +217,7 @@ pub(super) const CASES: [Case; 32] = [
         "scale_factor = { kind = \"constant\", value_v_per_m_per_s2 = 0.1 }",
         "value_v_per",
         "accel.sensor[2].scale_factor.value_v_per_m_per_s2",
-        "is in V/(m/s²), but the output calls for (counts/s)/(m/s²)",
+        "is in V/(m/s²), but the output needs (counts/s)/(m/s²)",
     ),
     (
         "scale factor of zero",
@@ -233,7 +233,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"half-wave x\"",
         "name = \"half-wave x\"\nrange_v = [41.0, 55.0]\n\n[[self_test.counter]]",
         "self_test.voltage[1].name",
-        "the name of self_test.voltage[0] too",
+        "also the name of self_test.voltage[0]",
     ),
     (
         "counter with the name of a voltage",
@@ -241,7 +241,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"half-wave y\"",
         "name = \"half-wave y\"\nmax",
         "self_test.counter[0].name",
-        "the name of self_test.voltage[1] too",
+        "also the name of self_test.voltage[1]",
     ),
     (
         "table for an array of tables",

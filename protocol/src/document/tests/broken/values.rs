@@ -51,7 +51,7 @@ pub(super) const CASES: [Case; 31] = [
         "colour = ",
         "colour",
         "colour",
-        "remove it; not yet used here: note",
+        "remove it; keys not used here: note",
     ),
     (
         "missing key",

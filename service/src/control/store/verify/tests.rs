@@ -71,7 +71,7 @@ fn what_a_service_has_written_holds_over_restarts_and_full_files() {
     fs::remove_file(&full_files(folder.path()).unwrap()[0]).unwrap();
     let found = verified(&folder);
     assert!(found.holds && found.first > Some(1), "{found:?}");
-    assert!(found.to_string().contains("older files are not there any more"), "{found}");
+    assert!(found.to_string().contains("older files are gone"), "{found}");
     // One in the middle is missed.
     let file = full_files(folder.path()).unwrap().remove(2);
     fs::remove_file(file).unwrap();
@@ -144,7 +144,7 @@ fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
     );
     let exchanged = with(&|lines| lines.swap(2, 3));
     assert!(
-        places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2.contains("stands behind entry 4"),
+        places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2.contains("comes after entry 4"),
         "{exchanged:?}"
     );
     let inserted = with(&|lines| lines.insert(3, bare(&lines[3])));
@@ -226,7 +226,7 @@ fn files_that_others_take_away_are_missed() {
     fs::remove_file(folder.path().join(NAME)).unwrap();
     run(&mut store, 1);
     let found = verified(&folder);
-    assert!(found.first > Some(1) && found.to_string().contains("older files are not there"), "{found}");
+    assert!(found.first > Some(1) && found.to_string().contains("older files are gone"), "{found}");
     drop(store);
     // While no service runs: the number tells.
     fs::write(folder.path().join(NAME), "").unwrap();

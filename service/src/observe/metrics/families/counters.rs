@@ -1,29 +1,18 @@
 //! A metric for each counter of a unit, under the counter's own name (`docs/wire.md`).
 
-use std::fmt;
-
-use super::super::page::{Samples, Type};
-use super::super::source::Look;
 use super::Family;
 
 /// Declares the metric of each counter.
 macro_rules! counters {
     ($($name:literal: $help:literal,)+) => {
         /// All of them.
-        pub(super) const FAMILIES: &[Family] = &[$(Family {
-            name: concat!("isotherm_unit_", $name),
-            unit: "",
-            kind: Type::Counter,
-            labels: &["unit"],
-            help: $help,
-            samples: |look, out| samples(look, out, $name),
-        },)+];
+        pub(super) const FAMILIES: &[Family] = &[$(Family::unit_counter(
+            (concat!("isotherm_unit_", $name), ""),
+            &["unit"],
+            $help,
+            |unit, look, out| out.counter(&[unit], look.status.counter($name)),
+        ),)+];
     };
-}
-
-/// A counter of every unit.
-fn samples(look: &Look, out: &mut Samples<'_>, name: &str) -> fmt::Result {
-    look.units.iter().try_for_each(|unit| out.counter(&[&unit.status.unit], unit.status.counter(name)))
 }
 
 counters! {

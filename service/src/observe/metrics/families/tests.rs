@@ -19,19 +19,8 @@ impl Family {
 
     /// A line of the table.
     fn row(&self) -> String {
-        let kind = format!("{:?}", self.kind).to_lowercase();
-        let unit = match self.unit {
-            "" => "—",
-            "seconds" => "s",
-            "celsius" => "°C",
-            "celsius_per_second" => "°C/s",
-            "radians_per_second" => "rad/s",
-            "meters_per_second_squared" => "m/s²",
-            "per_second" => "1/s",
-            unit => panic!("{unit} is a new unit of measure"),
-        };
         let labels: Vec<_> = self.labels.iter().map(|label| format!("`{label}`")).collect();
-        format!("| `{}` | {kind} | {unit} | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
+        format!("| `{}` | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
     }
 }
 
@@ -41,7 +30,7 @@ fn docs(name: &str) -> PathBuf {
 
 #[test]
 fn the_page_of_the_metrics_has_every_one_and_no_other() {
-    let mut table = "| name | type | unit of measure | labels | says |\n|---|---|---|---|---|\n".to_owned();
+    let mut table = "| name | labels | meaning |\n|---|---|---|\n".to_owned();
     // Counters stand in `docs/wire.md`, in the same words.
     table.extend(service::FAMILIES.iter().chain(unit::FAMILIES).map(Family::row));
     let file = docs("metrics.md");
@@ -53,6 +42,22 @@ fn the_page_of_the_metrics_has_every_one_and_no_other() {
         std::fs::write(&file, [before, begin, &table, end, behind].concat()).unwrap();
     } else {
         assert!(present == table, "docs/metrics.md is not what the code says: run with ISOTHERM_BLESS=1");
+    }
+}
+
+#[test]
+fn the_alert_rules_name_metrics_that_exist() {
+    let file = docs("../config/prometheus-rules.yml");
+    let rules = std::fs::read_to_string(&file).unwrap();
+    let names: Vec<_> = all().map(Family::whole_name).collect();
+    let told: BTreeSet<_> = rules
+        .split(|c: char| !c.is_ascii_lowercase() && c != '_')
+        .filter(|word| word.starts_with("isotherm_"))
+        .map(|word| word.strip_suffix("_bucket").unwrap_or(word))
+        .collect();
+    assert!(told.len() > 5, "{told:?}");
+    for name in told {
+        assert!(names.iter().any(|known| known == name), "{name} is no metric");
     }
 }
 

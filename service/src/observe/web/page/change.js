@@ -58,7 +58,7 @@ class Proposal {
 
   note() {
     return this.page.writes() ? null
-      : make("p", { className: "hint" }, "This console changes nothing: the service has no write = true in [web]. The difference can be seen.");
+      : make("p", { className: "hint" }, READ_ONLY + " The difference can be seen.");
   }
 
   /** What was asked for is another thing now: it has to be looked at first. */
@@ -74,7 +74,7 @@ class Proposal {
     const by = this.by.value.trim();
     if (!dryRun && !by) {
       this.by.focus();
-      return this.say("bad", "Say who asks: it goes into the audit file.");
+      return this.say("bad", "Enter your name: it goes into the audit file.");
     }
     this.look.disabled = this.act.disabled = true;
     this.say("", "Asking…");
@@ -97,7 +97,7 @@ class Proposal {
     const words = {
       "refused": "Refused. Revision " + reply.revision + " stays in force.",
       "unchanged": "Unchanged: revision " + reply.revision + " is this document.",
-      "would-be-accepted": "Would be accepted (" + id + ") in the place of revision " + reply.revision + ".",
+      "would-be-accepted": "Would be accepted (" + id + ") and replace revision " + reply.revision + ".",
       "accepted": "Accepted as revision " + reply.revision + " (" + id + ").",
     }[reply.outcome];
     const className = { "refused": "bad", "accepted": "good" }[reply.outcome] ?? "";
@@ -118,18 +118,18 @@ function difference({ document: entries, correction, temperatures }) {
     const table = figureTable(["Entry", "Before", "After"]);
     table.classList.add("words");
     table.show(entries.map(({ key, before, after }) => [key, before ?? NONE, after ?? NONE]));
-    parts.push(make("h3", {}, "What changes in the document"), table);
+    parts.push(make("h3", {}, "Changes in the document"), table);
   } else {
     parts.push(make("p", {}, "No entry of the document differs."));
   }
   if (!temperatures.length) {
-    parts.push(make("p", {}, "The unit's temperatures are not known yet: what comes of it cannot be said."));
+    parts.push(make("p", {}, "The unit's temperatures are not known yet, so the effect is unknown."));
   } else if (correction.length) {
     const table = figureTable(["Correction", "Before", "After", "Change", "Unit"]);
     const six = value => fixed(value, 6);
     table.show(correction.map(({ quantity, unit, before, after }) =>
       [quantity, six(before), six(after), (after > before ? "+" : "") + six(after - before), unit]));
-    parts.push(make("h3", {}, "What that does now, at " + temperatures.join(", ")), table);
+    parts.push(make("h3", {}, "Effect on the correction now, at " + temperatures.join(", ")), table);
   } else {
     parts.push(make("p", {}, "The correction stays as it is at " + temperatures.join(", ") + "."));
   }
@@ -165,9 +165,9 @@ function swap(page) {
     field("Calibration document or overlay", file), field("Text", text),
     make("details", {}, make("summary", {}, "Options"), make("div", { className: "fields" },
       field("Over, s", slew, "0 is at once"), field("From tick", at, "sequence number"),
-      make("label", { className: "check" }, force, "Take it although age, range, version or jump speak against it"),
-      make("label", { className: "check" }, any, "Take a document of another serial"))),
-    field("Who asks", by), proposal.element).classList.add("large");
+      make("label", { className: "check" }, force, "Force: accept it despite age, range, version or jump"),
+      make("label", { className: "check" }, any, "Accept a document of another serial"))),
+    field("Your name", by), proposal.element).classList.add("large");
 }
 
 /** The window for a rollback. */
@@ -182,7 +182,7 @@ async function rollback(page) {
   const proposal = new Proposal(page, by, question, line);
   choose.addEventListener("change", () => proposal.renew());
   by.addEventListener("input", () => proposal.line.renew());
-  dialog("Roll back " + serial, field("To revision", choose), field("Who asks", by), proposal.element).classList.add("large");
+  dialog("Roll back " + serial, field("To revision", choose), field("Your name", by), proposal.element).classList.add("large");
   proposal.ask(true);
   try {
     const present = page.instance.status.calibration?.revision.counter;

@@ -3,7 +3,7 @@
 const COMMANDS = [
   ["run", "Run", "Publish corrected increments"],
   ["standby", "Standby", "Publish nothing until further notice"],
-  ["self-test", "Self-test", "Look the instrument over: 10 s, from standby"],
+  ["self-test", "Self-test", "Check the instrument's own voltages and counters: 10 s, from standby"],
   ["pre-launch", "Pre-launch calibration…", "Determine C0 and B0 of each gyro at rest: 10 min, from standby"],
   ["abort", "Abort", "End self-test or pre-launch calibration; nothing changes"],
   ["rest", "Rest…", "The unit is at rest: feed the drift estimator"],
@@ -28,7 +28,7 @@ class CommandPart {
     });
     this.by.addEventListener("input", () => this.line.renew());
     this.element = card("Commands", "commands", make("div", { className: "controls" }, ...this.buttons), this.note,
-      field("Who asks", this.by), this.answer, this.line);
+      field("Your name", this.by), this.answer, this.line);
   }
 
   words(name, more = "") {
@@ -53,7 +53,7 @@ class CommandPart {
       button.hidden = name === "abort" && !possible;
       button.title = possible ? title : "Not possible in state " + status.state;
     });
-    say(this.note, writes ? "Possible now: " + allowed.join(", ") + "." : "This console changes nothing: the service has no write = true in [web].");
+    say(this.note, writes ? "Possible now: " + allowed.join(", ") + "." : READ_ONLY);
   }
 
   press(name, button) {
@@ -72,7 +72,7 @@ class CommandPart {
     const by = this.by.value.trim();
     if (!by) {
       this.by.focus();
-      return this.tell("bad", "Say who asks: it goes into the audit file.");
+      return this.tell("bad", "Enter your name: it goes into the audit file.");
     }
     this.tell("", "Asking…");
     try {

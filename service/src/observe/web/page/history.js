@@ -20,7 +20,7 @@ class HistoryPart {
       const shown = entries.filter(entry => this.all.checked || entry.event === "accepted").slice(0, 50);
       this.table.hidden = !shown.length;
       this.table.show(shown.map(row));
-      say(this.note, shown.length ? "" : "Nothing has been done to it.");
+      say(this.note, shown.length ? "" : "Nothing yet.");
     } catch (error) {
       say(this.note, error instanceof Refused ? error.message : "The service does not answer.");
     }

@@ -85,12 +85,12 @@ class App {
       const folder = service.calibrations;
       return [
         service.gone ? ["gone", "the service does not answer any more"] : null,
-        folder?.state === "gone" ? ["fault", "calibrations " + folder.path + ": " + (folder.reason ?? "cannot be read") + "; what is in force stays in force"] : null,
+        folder?.state === "gone" ? ["fault", "calibrations " + folder.path + ": " + (folder.reason ?? "cannot be read") + "; calibrations in force stay"] : null,
         ...service.faults.map(fault => ["warning", fault.kind.replaceAll("_", " ") + " " + count(fault.count) + "×: " + fault.first]),
         ...service.bad_documents.map(bad => ["warning", (bad.problem.startsWith(bad.file) ? "" : bad.file + ": ") + bad.problem +
           (bad.problems > 1 ? " (and " + (bad.problems - 1) + " more)" : "")]),
       ].filter(Boolean).map(([level, words]) => [level, name + words]);
-    }).concat(pair.map(({ level, words }) => [level, words.replaceAll("  ", " · ")]));
+    }).concat(pair.map(({ level, columns }) => [level, columns.join(" · ")]));
     const key = JSON.stringify(troubles);
     if (key === this.troubled) return;
     this.troubled = key;
@@ -139,7 +139,7 @@ class App {
   }
 
   help() {
-    const keys = [["/", "filter units"], ["j, ↓", "next unit"], ["k, ↑", "unit before"], ["Enter", "open the unit"], ["u", "back to all units"],
+    const keys = [["/", "filter units"], ["j, ↓", "next unit"], ["k, ↑", "previous unit"], ["Enter", "open the unit"], ["u", "back to all units"],
       ["Esc", "leave a field, close a window"], ["?", "this"]];
     const list = facts();
     list.show(keys.map(([key, words]) => [key, words]));

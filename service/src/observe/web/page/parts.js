@@ -30,6 +30,8 @@ function setMark(node, level, running = true) {
   node.title = idle ? "Not running" : LEVELS[level];
 }
 
+const READ_ONLY = "This console is read-only: write = true under [web] in the service's configuration allows changes.";
+
 /** A button that copies a text. */
 function copyButton(words, text, title) {
   const button = make("button", { type: "button", className: "copy", title }, words);

@@ -25,7 +25,7 @@ class UnitPage {
     this.instances = figureTable(["Instance", "State", "Rev.", "Document", "Last tick", "Published", "p99", ""]);
     this.instancesCard = card("Instances", "wide", make("p", { className: "hint" },
       "More than one service has this unit. Swaps and commands go to all of them."), this.instances);
-    this.pair = figureTable(["Service", "Does", "Priority", "Takeovers", "Ticks compared", "With other bits", ""]);
+    this.pair = figureTable(["Service", "Role", "Priority", "Takeovers", "Ticks compared", "Ticks different", ""]);
     this.pairCard = card("Pair", "wide pairs", this.pair);
     this.drift = figureTable(["Gyro", "Drift, °/h", "σ, °/h", "Updates", "Refused", ""]);
     this.driftCard = card("Drift in addition to the calibrated bias", "drift", this.drift);
@@ -124,7 +124,7 @@ class UnitPage {
   /** @param {Status} status */
   showCalibration(status) {
     const { calibration, pending, swaps } = status;
-    const output = { calibrated: null, "pass-through": "none: raw readings pass through", held: "none: nothing goes out" }[status.output];
+    const output = { calibrated: null, "pass-through": "none: raw readings pass through", held: "none: nothing is published" }[status.output];
     this.calibration.show([
       ["In force", calibration ? "revision " + calibration.revision.counter : output ?? NONE],
       ["Document", calibration ? head(calibration.digest ?? calibration.revision.digest) : null],

@@ -20,7 +20,7 @@ declare global {
     now_unix_ms: number;
     services: Array<wire.ServiceStatus & { gone: boolean }>;
     units: Array<Row>;
-    pair: Array<Said>;
+    pair: Array<{ level: string; columns: Array<string> }>;
   }
 
   interface Said {

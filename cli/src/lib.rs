@@ -1,0 +1,27 @@
+//! What the programs' command lines share.
+//!
+//! What this crate refuses to do: know what a command does.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`advanced`] | the command line, with a short and a long help |
+//! | [`program`] | completions and manual pages |
+//! | [`mod@print`] | results on stdout |
+//! | [`stderr`] | words on stderr, through a queue where a blocked reader must not hold the program up |
+//! | [`bar`] | progress |
+//! | [`exit`] | exit codes |
+
+pub mod advanced;
+pub mod bar;
+pub mod exit;
+pub mod print;
+pub mod program;
+mod queue;
+pub mod stderr;
+
+pub use advanced::parse;
+pub use bar::Bar;
+pub use exit::Exit;
+pub use print::{coloured, grouped, print, print_within, to_stdout};
+pub use program::Common;
+pub use stderr::{failed, failed_lines, say, say_lines};

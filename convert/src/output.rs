@@ -1,0 +1,205 @@
+//! Files that are written under another name until they are whole.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use flate2::{Compression, write::GzEncoder};
+use isotherm_log::file::refuse_overwriting;
+use isotherm_protocol::key::UnitId;
+
+use isotherm_log::error::Error;
+
+/// Where outputs may go.
+#[derive(Debug, Clone, Default)]
+pub struct Place {
+    /// Files that are there already are written over.
+    pub overwrite: bool,
+    /// Files that are read: none of them is ever written over.
+    pub inputs: Vec<PathBuf>,
+}
+
+/// A file that is being written; removed when dropped before it is whole.
+#[derive(Debug)]
+pub(super) struct Partial {
+    path: PathBuf,
+    writing: PathBuf,
+    kept: bool,
+}
+
+impl Place {
+    /// Refuses a file that is there already, or is read.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check(&self, path: &Path) -> Result<(), Error> {
+        let inputs: Vec<_> = self.inputs.iter().map(PathBuf::as_path).collect();
+        refuse_overwriting(path, &inputs)?;
+        if !self.overwrite && path.symlink_metadata().is_ok() {
+            let path = path.display();
+            return Err(Error::Usage(format!("{path} exists: give another name, or --overwrite")));
+        }
+        Ok(())
+    }
+
+    /// Refuses a folder that has something in it, or a file in its place.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_folder(&self, path: &Path) -> Result<(), Error> {
+        let name = path.display();
+        if path.is_dir() {
+            let empty = path.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+            if empty || self.overwrite {
+                return Ok(());
+            }
+            return Err(Error::Usage(format!(
+                "the folder {name} is not empty: give another name, or --overwrite (other files in it stay)"
+            )));
+        }
+        if path.symlink_metadata().is_ok() {
+            return Err(Error::Usage(format!(
+                "{name} is a file, but the output is a folder: give another name"
+            )));
+        }
+        Ok(())
+    }
+
+    /// A file to be written, with its folder.
+    pub(super) fn partial(&self, path: &Path) -> Result<Partial, Error> {
+        self.check(path)?;
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder)
+                .map_err(|source| Error::file(folder, "create the folder", source))?;
+        }
+        let mut writing = path.as_os_str().to_owned();
+        writing.push(".partial");
+        Ok(Partial { path: path.to_owned(), writing: writing.into(), kept: false })
+    }
+
+    /// A file of text or bytes to be written, compressed where its name ends in `.gz`.
+    pub(super) fn sink(&self, path: &Path) -> Result<Sink, Error> {
+        let partial = self.partial(path)?;
+        let file = File::create(partial.writing()).map_err(|source| Error::file(path, "create", source))?;
+        let file = BufWriter::with_capacity(1 << 16, file);
+        let stream = if path.extension().is_some_and(|extension| extension == "gz") {
+            Stream::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
+        } else {
+            Stream::Plain(file)
+        };
+        Ok(Sink { stream, partial })
+    }
+
+    /// A whole text as a file.
+    pub(super) fn write(&self, path: &Path, text: &str) -> Result<Partial, Error> {
+        let mut sink = self.sink(path)?;
+        sink.write(|writer| writer.write_all(text.as_bytes()))?;
+        sink.finish()
+    }
+}
+
+impl Partial {
+    /// Where it is written to.
+    pub(super) fn writing(&self) -> &Path {
+        &self.writing
+    }
+
+    /// Where it will be.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// It is whole: gives it its name.
+    pub(super) fn keep(mut self) -> Result<(), Error> {
+        std::fs::rename(&self.writing, &self.path)
+            .map_err(|source| Error::file(&self.path, "name the file", source))?;
+        self.kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if !self.kept {
+            // It may never have been created.
+            let _ = std::fs::remove_file(&self.writing);
+        }
+    }
+}
+
+/// A file that is being written.
+#[derive(Debug)]
+pub(super) struct Sink {
+    stream: Stream,
+    partial: Partial,
+}
+
+#[derive(Debug)]
+enum Stream {
+    Plain(BufWriter<File>),
+    Gzip(Box<GzEncoder<BufWriter<File>>>),
+}
+
+impl Sink {
+    /// Writes whatever `write` does.
+    pub(super) fn write<T>(
+        &mut self,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<T>,
+    ) -> Result<T, Error> {
+        let written = match &mut self.stream {
+            Stream::Plain(file) => write(file),
+            Stream::Gzip(encoder) => write(encoder),
+        };
+        written.map_err(|source| Error::file(self.partial.path(), "write", source))
+    }
+
+    /// Everything is written.
+    pub(super) fn finish(self) -> Result<Partial, Error> {
+        let Self { stream, partial } = self;
+        let flushed = match stream {
+            Stream::Plain(mut file) => file.flush(),
+            Stream::Gzip(encoder) => encoder.finish().and_then(|mut file| file.flush()),
+        };
+        flushed.map_err(|source| Error::file(partial.path(), "write", source))?;
+        Ok(partial)
+    }
+}
+
+/// A unit's folder: its serial; one that begins with a dot begins with `%2E`, which no serial has, so that it is
+/// neither hidden nor another folder.
+pub(super) fn folder(unit: &UnitId) -> String {
+    match unit.as_str().strip_prefix('.') {
+        Some(rest) => format!("%2E{rest}"),
+        None => unit.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_serial_leaves_its_folder() {
+        let folder = |serial: &str| folder(&UnitId::new(serial).unwrap());
+        assert_eq!([folder("A.1"), folder("."), folder(".."), folder(".a")], ["A.1", "%2E", "%2E.", "%2Ea"]);
+    }
+
+    #[test]
+    fn what_is_not_whole_is_removed_and_what_is_there_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.csv");
+        let place = Place::default();
+        let mut sink = place.sink(&path).unwrap();
+        sink.write(|writer| writer.write_all(b"half")).unwrap();
+        drop(sink);
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+        place.write(&path, "whole").unwrap().keep().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "whole");
+        assert!(place.sink(&path).unwrap_err().to_string().contains("--overwrite"));
+        let over = Place { overwrite: true, ..Place::default() };
+        over.write(&path, "again").unwrap().keep().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "again");
+        let input = Place { overwrite: true, inputs: vec![path.clone()] };
+        assert!(input.sink(&path).unwrap_err().to_string().contains("would be overwritten"));
+    }
+}

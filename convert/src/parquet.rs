@@ -1,0 +1,71 @@
+//! Streams as Parquet files: one file per unit and stream, plain columns named with their units of measure.
+//!
+//! | stream | one row per |
+//! |---|---|
+//! | `raw_gyro`, `raw_accel` | tick |
+//! | `raw_temperature`, `raw_health` | reading |
+//! | `reference` | rate reference |
+//! | `corrected` | corrected tick or navigation step |
+//! | `applied_temperature` | channel and corrected batch |
+//! | `status` | status message |
+//!
+//! Messages are written as they came: in their order, doubled where they were. Where ticks of one stream have different
+//! numbers or kinds of readings, the columns are there for all of them and empty where a tick has none.
+
+mod columns;
+mod rows;
+mod streams;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use isotherm_log::error::Error;
+use isotherm_log::streams::decoded::decode;
+use isotherm_protocol::key::UnitId;
+
+use super::output::{Partial, folder};
+use super::{Conversion, Converted, Found, Outcome};
+use streams::UnitTables;
+
+pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {
+    let provenance = conversion.provenance();
+    let mut partials: Vec<Partial> = Vec::new();
+    let mut tables = BTreeMap::<UnitId, UnitTables>::new();
+    for (unit, contents) in &found.contents.units {
+        let created = UnitTables::create(unit, contents, &provenance, |stream| {
+            let path = conversion.out.join(folder(unit)).join(format!("{stream}.parquet"));
+            let partial = conversion.place.partial(&path)?;
+            let writing = partial.writing().to_owned();
+            partials.push(partial);
+            Ok::<_, Error>(writing)
+        })?;
+        tables.insert(unit.clone(), created);
+    }
+    let mut converted = Converted::default();
+    let log = conversion.read("writing", |message, _| {
+        match decode(message) {
+            Ok(Some((unit, decoded))) => {
+                let written = match tables.get_mut(unit) {
+                    Some(tables) => tables.take(message.received_ns, &decoded)?,
+                    None => false,
+                };
+                converted.leave_out("journal messages", u64::from(!written));
+            }
+            Ok(None) => converted.leave_out("messages of no unit", 1),
+            Err(_) => converted.lose("frames that cannot be read", 1),
+        }
+        Ok(())
+    })?;
+    for tables in tables.into_values() {
+        converted.files.extend(tables.finish()?);
+    }
+    for partial in partials {
+        if let Some(file) = converted.files.iter_mut().find(|file| file.path == partial.writing()) {
+            partial.path().clone_into(&mut file.path);
+        }
+        partial.keep()?;
+    }
+    Ok(Outcome::of(converted, log))
+}

@@ -1,0 +1,328 @@
+//! A Parquet file that is written row by row, in constant memory.
+
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::mem;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use parquet::basic::{Compression, Encoding, LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int32Type, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::{ColumnPath, Type, TypePtr};
+
+use isotherm_log::error::Error;
+
+/// Rows that are written together, where the file does not need larger groups.
+const GROUP_ROWS: u64 = 1 << 14;
+/// Most groups of a file: the format numbers them with 15 bits.
+const MOST_GROUPS: u64 = 30_000;
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Whole numbers of so many bits, signed or not.
+    Integer(i8, bool),
+    /// Doubles.
+    Double,
+    /// Yes or no.
+    Boolean,
+    /// Text.
+    Text,
+    /// JSON as text.
+    Json,
+}
+
+/// Signed 64 bits.
+pub(super) const I64: Kind = Kind::Integer(64, true);
+/// Unsigned 64 bits.
+pub(super) const U64: Kind = Kind::Integer(64, false);
+/// Signed 32 bits.
+pub(super) const I32: Kind = Kind::Integer(32, true);
+
+/// A column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Column {
+    /// Its name, with the unit of measure.
+    pub(super) name: String,
+    /// What it holds.
+    pub(super) kind: Kind,
+    /// Cells may be empty.
+    pub(super) optional: bool,
+}
+
+/// A column that has a value in every row.
+pub(super) fn full(name: impl Into<String>, kind: Kind) -> Column {
+    Column { name: name.into(), kind, optional: false }
+}
+
+/// A column that may be empty.
+pub(super) fn sparse(name: impl Into<String>, kind: Kind) -> Column {
+    Column { name: name.into(), kind, optional: true }
+}
+
+/// One cell of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Cell<'a> {
+    /// Nothing.
+    Empty,
+    /// A whole number; unsigned ones of 64 bits by their bits.
+    Integer(i64),
+    /// A double.
+    Double(f64),
+    /// Yes or no.
+    Boolean(bool),
+    /// Text.
+    Text(&'a str),
+}
+
+impl From<u64> for Cell<'_> {
+    fn from(number: u64) -> Self {
+        Self::Integer(number.cast_signed())
+    }
+}
+
+impl From<i64> for Cell<'_> {
+    fn from(number: i64) -> Self {
+        Self::Integer(number)
+    }
+}
+
+impl From<f64> for Cell<'_> {
+    fn from(number: f64) -> Self {
+        Self::Double(number)
+    }
+}
+
+impl<'a, T: Into<Cell<'a>>> From<Option<T>> for Cell<'a> {
+    fn from(cell: Option<T>) -> Self {
+        cell.map_or(Self::Empty, Into::into)
+    }
+}
+
+/// Values of a column that wait for their group.
+#[derive(Debug)]
+enum Values {
+    Int32(Vec<i32>),
+    Int64(Vec<i64>),
+    Double(Vec<f64>),
+    Boolean(Vec<bool>),
+    Text(Vec<ByteArray>),
+}
+
+/// A column and what waits of it.
+#[derive(Debug)]
+struct Pending {
+    name: String,
+    optional: bool,
+    values: Values,
+    /// 1 where there is a value, 0 where there is none; for optional columns.
+    present: Vec<i16>,
+}
+
+/// A Parquet file that is being written.
+pub(super) struct Table {
+    writer: SerializedFileWriter<BufWriter<File>>,
+    path: PathBuf,
+    columns: Vec<Pending>,
+    group_rows: u64,
+    /// Rows that wait.
+    waiting: u64,
+    rows: u64,
+}
+
+impl std::fmt::Debug for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Table").field("path", &self.path).field("rows", &self.rows).finish_non_exhaustive()
+    }
+}
+
+impl Table {
+    /// Creates the file for about so many rows. `provenance`: names and values for the file's metadata.
+    pub(super) fn create(
+        path: &Path,
+        columns: &[Column],
+        expected_rows: u64,
+        provenance: &[(String, String)],
+    ) -> Result<Self, Error> {
+        let file = File::create(path).map_err(|source| Error::file(path, "create", source))?;
+        let writer = open(BufWriter::new(file), columns, provenance).map_err(|error| failed(path, error))?;
+        Ok(Self {
+            writer,
+            path: path.to_owned(),
+            columns: columns.iter().map(Pending::of).collect(),
+            group_rows: GROUP_ROWS.max(expected_rows / MOST_GROUPS + 1),
+            waiting: 0,
+            rows: 0,
+        })
+    }
+
+    /// Writes one row: a cell for each column.
+    pub(super) fn push<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Error> {
+        let mut cells = cells.into_iter();
+        for column in &mut self.columns {
+            let cell = cells.next().unwrap_or(Cell::Empty);
+            if !column.push(cell) {
+                let words = format!("{cell:?} does not fit the column {:?}", column.name);
+                return Err(Error::file(&self.path, "write", io::Error::other(words)));
+            }
+        }
+        self.rows += 1;
+        self.waiting += 1;
+        if self.waiting >= self.group_rows { self.write_group() } else { Ok(()) }
+    }
+
+    /// Where it is written to.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Ends the file, on the disk.
+    pub(super) fn finish(mut self) -> Result<u64, Error> {
+        if self.waiting > 0 {
+            self.write_group()?;
+        }
+        let path = self.path;
+        let buffered = self.writer.into_inner().map_err(|error| failed(&path, error))?;
+        let file = buffered.into_inner().map_err(|error| Error::file(&path, "write", error.into_error()))?;
+        file.sync_all().map_err(|source| Error::file(&path, "write", source))?;
+        Ok(self.rows)
+    }
+
+    fn write_group(&mut self) -> Result<(), Error> {
+        let columns = &mut self.columns;
+        let mut write = || {
+            let mut group = self.writer.next_row_group()?;
+            columns.iter_mut().try_for_each(|column| column.write(&mut group))?;
+            group.close().map(|_| ())
+        };
+        write().map_err(|error| failed(&self.path, error))?;
+        self.waiting = 0;
+        Ok(())
+    }
+}
+
+impl Pending {
+    fn of(column: &Column) -> Self {
+        let values = match column.kind {
+            Kind::Integer(64, _) => Values::Int64(Vec::new()),
+            Kind::Integer(..) => Values::Int32(Vec::new()),
+            Kind::Double => Values::Double(Vec::new()),
+            Kind::Boolean => Values::Boolean(Vec::new()),
+            Kind::Text | Kind::Json => Values::Text(Vec::new()),
+        };
+        Self { name: column.name.clone(), optional: column.optional, values, present: Vec::new() }
+    }
+
+    /// Takes a cell; false where it does not fit.
+    fn push(&mut self, cell: Cell<'_>) -> bool {
+        if cell == Cell::Empty && self.optional {
+            self.present.push(0);
+            return true;
+        }
+        let fits = match (&mut self.values, cell) {
+            (Values::Int64(values), Cell::Integer(number)) => push(values, number),
+            (Values::Int32(values), Cell::Integer(number)) => match i32::try_from(number) {
+                Ok(number) => push(values, number),
+                Err(_) => false,
+            },
+            (Values::Double(values), Cell::Double(number)) => push(values, number),
+            (Values::Boolean(values), Cell::Boolean(boolean)) => push(values, boolean),
+            (Values::Text(values), Cell::Text(text)) => push(values, ByteArray::from(text)),
+            _ => false,
+        };
+        if self.optional && fits {
+            self.present.push(1);
+        }
+        fits
+    }
+
+    /// Writes what waits as the group's next column.
+    fn write(
+        &mut self,
+        group: &mut SerializedRowGroupWriter<'_, BufWriter<File>>,
+    ) -> Result<(), ParquetError> {
+        let present = mem::take(&mut self.present);
+        let present = self.optional.then_some(present.as_slice());
+        match &mut self.values {
+            Values::Int32(values) => write::<Int32Type>(group, values, present),
+            Values::Int64(values) => write::<Int64Type>(group, values, present),
+            Values::Double(values) => write::<DoubleType>(group, values, present),
+            Values::Boolean(values) => write::<BoolType>(group, values, present),
+            Values::Text(values) => write::<ByteArrayType>(group, values, present),
+        }
+    }
+}
+
+fn push<T>(values: &mut Vec<T>, value: T) -> bool {
+    values.push(value);
+    true
+}
+
+/// Writes the values of one column and forgets them.
+fn write<D: DataType>(
+    group: &mut SerializedRowGroupWriter<'_, BufWriter<File>>,
+    values: &mut Vec<D::T>,
+    present: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    let column = group.next_column()?;
+    let mut column = column.ok_or_else(|| ParquetError::General("a column too many".to_owned()))?;
+    column.typed::<D>().write_batch(values, present, None)?;
+    values.clear();
+    column.close()
+}
+
+/// The writer of a file with these columns.
+fn open(
+    file: BufWriter<File>,
+    columns: &[Column],
+    provenance: &[(String, String)],
+) -> Result<SerializedFileWriter<BufWriter<File>>, ParquetError> {
+    let fields = columns.iter().map(field).collect::<Result<Vec<TypePtr>, _>>()?;
+    let schema = Type::group_type_builder("schema").with_fields(fields).build()?;
+    let pairs = provenance.iter().map(|(name, value)| KeyValue::new(name.clone(), value.clone()));
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::SNAPPY)
+        .set_created_by(concat!("isotherm ", env!("CARGO_PKG_VERSION")).to_owned())
+        .set_key_value_metadata(Some(pairs.collect()));
+    for column in columns {
+        let path = ColumnPath::new(vec![column.name.clone()]);
+        match column.kind {
+            // Sequences and times go on evenly: their differences are short.
+            Kind::Integer(64, _) => {
+                properties = properties
+                    .set_column_dictionary_enabled(path.clone(), false)
+                    .set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
+            }
+            Kind::Double | Kind::Boolean => {
+                properties = properties.set_column_dictionary_enabled(path, false);
+            }
+            _ => {}
+        }
+    }
+    SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))
+}
+
+/// A column as the format has it.
+fn field(column: &Column) -> Result<TypePtr, ParquetError> {
+    let (physical, logical) = match column.kind {
+        Kind::Integer(64, signed) => (Physical::INT64, Some(LogicalType::integer(64, signed))),
+        Kind::Integer(bits, signed) => (Physical::INT32, Some(LogicalType::integer(bits, signed))),
+        Kind::Double => (Physical::DOUBLE, None),
+        Kind::Boolean => (Physical::BOOLEAN, None),
+        Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Kind::Json => (Physical::BYTE_ARRAY, Some(LogicalType::Json)),
+    };
+    let repetition = if column.optional { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+    let field = Type::primitive_type_builder(&column.name, physical)
+        .with_repetition(repetition)
+        .with_logical_type(logical);
+    field.build().map(Arc::new)
+}
+
+fn failed(path: &Path, error: ParquetError) -> Error {
+    Error::file(path, "write", io::Error::other(error))
+}

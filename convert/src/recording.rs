@@ -1,0 +1,38 @@
+//! A text log as a recording.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use isotherm_log::message::Topic;
+use isotherm_log::recording::{METADATA, Metadata, RecordingOptions, RecordingWriter};
+
+use super::{Conversion, Converted, Outcome, Written};
+use isotherm_log::error::Error;
+
+pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
+    let partial = conversion.place.partial(&conversion.out)?;
+    // What an earlier run left behind when it was killed.
+    let _ = std::fs::remove_file(partial.writing());
+    let options = RecordingOptions {
+        compress: conversion.compress,
+        json: conversion.json,
+        ..RecordingOptions::default()
+    };
+    let mut writer = RecordingWriter::create(partial.writing(), options)?;
+    let mut values: BTreeMap<_, _> = conversion.provenance().into_iter().collect();
+    values.insert("origin".to_owned(), "converted from a text log".to_owned());
+    writer.metadata(&Metadata { name: METADATA.to_owned(), values })?;
+    let mut topics = BTreeSet::<Topic>::new();
+    let log = conversion.read("writing", |message, _| {
+        if !topics.contains(&message.topic) {
+            topics.insert(message.topic.clone());
+        }
+        Ok(writer.write(message)?)
+    })?;
+    let rows = topics.iter().map(|topic| writer.messages(topic)).sum();
+    writer.finish()?;
+    let path = partial.path().to_owned();
+    partial.keep()?;
+    let unit = topics.first().and_then(Topic::unit).map(ToString::to_string);
+    let files = vec![Written { path, unit, what: "recording", rows }];
+    Ok(Outcome::of(Converted { files, ..Converted::default() }, log))
+}

@@ -1,0 +1,282 @@
+//! A log as a ROS 2 bag.
+
+mod nominal;
+
+use std::collections::BTreeMap;
+
+use isotherm_correction::sample::{ChannelName, TickFlags};
+use isotherm_log::ros2::{Header, Imu, Names, RosMessage, Temperature, time};
+use isotherm_log::streams::contents::{UnitContents, usual};
+use isotherm_log::streams::decoded::{Decoded, decode};
+use isotherm_log::streams::rows::{Row, Rows, Step};
+use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::document::Document;
+use isotherm_protocol::key::UnitId;
+
+use crate::bag::BagWriter;
+use nominal::Nominal;
+
+use super::{Conversion, Converted, Found, Outcome, Written};
+use isotherm_log::error::Error;
+
+/// What stands in for the reason where a time is beyond what a bag holds.
+const NO_TIME: &str = "times before 1970 or after 2038, outside the range of ROS";
+
+/// How a ROS 2 bag is made.
+#[derive(Debug, Clone, Default)]
+pub struct Ros2Options {
+    /// Raw readings too, where there are corrected ticks.
+    pub raw: bool,
+    /// The frame of all messages; `None`: each unit's own name.
+    pub frame: Option<String>,
+    /// Calibration documents that say what raw readings are.
+    pub documents: Vec<Document>,
+}
+
+pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {
+    let mut notes = Vec::new();
+    let names = Names::of(found.contents.units.keys().map(UnitId::as_str), "unit");
+    let mut units = BTreeMap::new();
+    for (unit, contents) in &found.contents.units {
+        let documents = conversion.ros2.documents.iter().chain(&found.documents);
+        let document = documents.into_iter().find(|document| document.unit == unit.as_str());
+        let mut units_own =
+            UnitBag::new(unit, contents, &names.get(unit.as_str()), &conversion.ros2, document);
+        notes.extend(units_own.note.take());
+        units.insert(unit.clone(), units_own);
+    }
+    if !units.values().any(|unit| unit.corrected || unit.raw.is_some()) {
+        let words = "the log has nothing for a ROS 2 bag";
+        return Err(Error::Usage(if notes.is_empty() {
+            format!("{words}: it has no units")
+        } else {
+            format!("{words}:\n{}", notes.join("\n"))
+        }));
+    }
+    let folder = conversion.out.file_name().map_or("bag".into(), |name| name.to_string_lossy().into_owned());
+    let file = format!("{folder}_0.mcap");
+    let bag = conversion.place.partial(&conversion.out.join(&file))?;
+    let mut writer = BagWriter::create(bag.writing())?;
+    writer.metadata("isotherm", conversion.provenance().into_iter().collect())?;
+    let mut converted = Converted::default();
+    let log = conversion.read("writing", |message, _| {
+        match decode(message) {
+            Ok(Some((unit, decoded))) => match units.get_mut(unit) {
+                Some(unit) => unit.take(&decoded, &mut writer, &mut converted)?,
+                None => converted.leave_out("messages of no unit", 1),
+            },
+            Ok(None) => converted.leave_out("messages of no unit", 1),
+            Err(_) => converted.lose("frames that cannot be read", 1),
+        }
+        Ok(())
+    })?;
+    for unit in units.values_mut() {
+        unit.finish(&mut writer, &mut converted)?;
+    }
+    let (summary, yaml) = writer.finish(&file)?;
+    let metadata = conversion.place.write(&conversion.out.join("metadata.yaml"), &yaml)?;
+    converted.files.push(Written {
+        path: bag.path().to_owned(),
+        unit: None,
+        what: "ROS 2 bag",
+        rows: summary.messages(),
+    });
+    converted.files.push(Written {
+        path: metadata.path().to_owned(),
+        unit: None,
+        what: "its description",
+        rows: 1,
+    });
+    bag.keep()?;
+    metadata.keep()?;
+    Ok(Outcome { topics: summary.topics, notes, ..Outcome::of(converted, log) })
+}
+
+/// The topics of a unit.
+#[derive(Debug)]
+struct UnitBag {
+    unit: String,
+    /// First part of its topics' names: `/imu/<unit>`.
+    base: String,
+    frame: String,
+    channels: Names,
+    corrected: bool,
+    raw: Option<(Rows, Nominal)>,
+    /// Why its raw readings are not in the bag though nothing else is.
+    note: Option<String>,
+}
+
+impl UnitBag {
+    fn new(
+        unit: &UnitId,
+        contents: &UnitContents,
+        name: &str,
+        options: &Ros2Options,
+        document: Option<&Document>,
+    ) -> Self {
+        let corrected = contents.corrected_ticks > 0;
+        let nominal = document.map(Nominal::of).unwrap_or_default();
+        let wanted = options.raw || !corrected;
+        let stated =
+            usual(&contents.gyro).map(|shape| (nominal.states(shape.output(), shape.sensors), shape));
+        let note = match stated {
+            _ if !wanted => None,
+            Some((true, _)) => None,
+            Some((false, shape)) if shape.sensors != 3 => Some(format!(
+                "{unit}: an Imu message has three axes, the unit has {} gyros: correct the log first",
+                shape.sensors
+            )),
+            Some((false, _)) => Some(format!(
+                "{unit}: its raw readings are counts: correct the log first, or give the calibration document with \
+                 --calibration"
+            )),
+            None => Some(format!("{unit}: it has neither corrected ticks nor raw gyro ticks")),
+        };
+        let raw = (wanted && note.is_none()).then(|| (Rows::of(contents), nominal));
+        let channels = contents.channels.iter().chain(&contents.applied_channels);
+        Self {
+            unit: unit.to_string(),
+            base: format!("/imu/{name}"),
+            frame: options.frame.clone().unwrap_or_else(|| name.to_owned()),
+            channels: Names::of(channels.map(ChannelName::as_str), "channel"),
+            corrected,
+            raw,
+            note,
+        }
+    }
+
+    fn take(
+        &mut self,
+        decoded: &Decoded,
+        bag: &mut BagWriter,
+        converted: &mut Converted,
+    ) -> Result<(), Error> {
+        match decoded {
+            Decoded::Corrected(batch) => self.write_corrected(batch, bag, converted)?,
+            Decoded::Gyro(_) | Decoded::Accel(_) | Decoded::Temperature(_) => match &mut self.raw {
+                Some((rows, _)) => {
+                    rows.take(decoded);
+                    self.drain(bag, converted)?;
+                }
+                None => converted.leave_out("raw messages", 1),
+            },
+            Decoded::Health(_) => converted.leave_out("health messages", 1),
+            Decoded::Reference(_) => converted.leave_out("rate references", 1),
+            Decoded::Status(_) => converted.leave_out("status messages", 1),
+            Decoded::Journal => converted.leave_out("journal messages", 1),
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, bag: &mut BagWriter, converted: &mut Converted) -> Result<(), Error> {
+        if let Some((rows, _)) = &mut self.raw {
+            rows.finish();
+            self.drain(bag, converted)?;
+        }
+        if let Some((rows, _)) = &self.raw {
+            converted.add(&rows.tally());
+        }
+        Ok(())
+    }
+
+    fn write_corrected(
+        &self,
+        batch: &CorrectedBatch,
+        bag: &mut BagWriter,
+        converted: &mut Converted,
+    ) -> Result<(), Error> {
+        let mut topic = String::new();
+        for tick in &batch.ticks {
+            if tick.flags.contains(TickFlags::UNCALIBRATED) {
+                converted.leave_out("uncalibrated ticks, which have no unit of measure", 1);
+            } else if tick.duration.as_ns() <= 0 {
+                converted.lose("ticks without a duration", 1);
+            } else {
+                topic.clone_from(&self.base);
+                topic.push_str("/data");
+                let imu = |header| Imu::of_tick(header, tick);
+                self.write(&topic, None, tick.end_time.as_ns(), imu, bag, converted)?;
+            }
+        }
+        let Some(last) = batch.ticks.last() else { return Ok(()) };
+        for applied in &batch.temperatures {
+            let message =
+                |header| Temperature { header, temperature: applied.temperature_deg_c, variance: 0.0 };
+            let topic = self.channel_topic("temperature", &applied.channel);
+            self.write(&topic, Some(&applied.channel), last.end_time.as_ns(), message, bag, converted)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the raw rows that are ready.
+    fn drain(&mut self, bag: &mut BagWriter, converted: &mut Converted) -> Result<(), Error> {
+        let Some((mut rows, nominal)) = self.raw.take() else { return Ok(()) };
+        while let Some(step) = rows.next_step() {
+            if let Step::Row(row) = step {
+                self.write_raw(&row, &nominal, bag, converted)?;
+            }
+        }
+        self.raw = Some((rows, nominal));
+        Ok(())
+    }
+
+    fn write_raw(
+        &self,
+        row: &Row,
+        nominal: &Nominal,
+        bag: &mut BagWriter,
+        converted: &mut Converted,
+    ) -> Result<(), Error> {
+        for reading in &row.temperatures {
+            match nominal.temperature(&reading.channel, reading.raw) {
+                Some(temperature) => {
+                    let message = |header| Temperature { header, temperature, variance: 0.0 };
+                    let topic = self.channel_topic("temperature_raw", &reading.channel);
+                    self.write(&topic, Some(&reading.channel), row.time_ns, message, bag, converted)?;
+                }
+                None => {
+                    converted.leave_out("raw temperature readings without a document that converts them", 1);
+                }
+            }
+        }
+        let Some((output, gyro)) = &row.gyro else {
+            converted
+                .leave_out("raw accelerometer ticks without a gyro tick", u64::from(row.accel.is_some()));
+            return Ok(());
+        };
+        let Some(rate) = nominal.rate(*output, gyro) else {
+            converted.lose("raw ticks whose rate cannot be stated", 1);
+            return Ok(());
+        };
+        let force = row.accel.as_ref().and_then(|(output, accel)| nominal.force(*output, accel));
+        let imu = |header| Imu::new(header, Some(rate), force);
+        self.write(&format!("{}/data_raw", self.base), None, row.time_ns, imu, bag, converted)
+    }
+
+    fn channel_topic(&self, kind: &str, channel: &str) -> String {
+        format!("{}/{kind}/{}", self.base, self.channels.get(channel))
+    }
+
+    /// Writes a message with its header; one whose time no bag can hold is counted.
+    fn write<M: RosMessage>(
+        &self,
+        topic: &str,
+        channel: Option<&str>,
+        time_ns: i64,
+        message: impl FnOnce(Header) -> M,
+        bag: &mut BagWriter,
+        converted: &mut Converted,
+    ) -> Result<(), Error> {
+        let Some((stamp, log_ns)) = time(time_ns).zip(u64::try_from(time_ns).ok()) else {
+            converted.lose(NO_TIME, 1);
+            return Ok(());
+        };
+        let message = message(Header { stamp, frame_id: self.frame.clone() });
+        let origin = || {
+            let mut origin = BTreeMap::from([("unit".to_owned(), self.unit.clone())]);
+            origin.extend(channel.map(|channel| ("channel".to_owned(), channel.to_owned())));
+            origin
+        };
+        Ok(bag.write(topic, log_ns, &message, origin)?)
+    }
+}

@@ -1,0 +1,57 @@
+//! Files as text, or what keeps them from being read as such.
+
+use std::io::Read;
+use std::path::Path;
+
+use crate::problem::Problem;
+use crate::text::{MAX_BYTES, unplaced, utf8};
+
+/// Reads a file up to one byte more than a text may have, so that a wrong file cannot fill the memory.
+///
+/// # Errors
+/// That of the file.
+pub fn read_bounded(file: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(file)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Refuses a pipe or a device under the name of a file: to open or read it might wait for ever. What is not there is no problem here.
+///
+/// # Errors
+/// What the file is instead.
+pub fn check_regular(file: &Path) -> std::io::Result<()> {
+    match std::fs::metadata(file) {
+        Ok(found) if !found.is_file() => {
+            Err(std::io::Error::other("it is a folder, pipe or device, not a file"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What was read by [`read_bounded`], as text.
+///
+/// # Errors
+/// The one problem of a file that is too long, or not UTF-8.
+pub fn text<'b>(bytes: &'b [u8], file: &str) -> Result<&'b str, Vec<Problem>> {
+    if bytes.len() > MAX_BYTES {
+        let message = format!("is longer than {MAX_BYTES} bytes: is it the right file?");
+        return Err(vec![unplaced(Some(file), message)]);
+    }
+    utf8(bytes, Some(file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_text_has_one_problem() {
+        let words = |bytes: &[u8]| text(bytes, "f").unwrap_err()[0].to_string();
+        assert_eq!(text("°".as_bytes(), "f"), Ok("°"));
+        assert!(words(b"a = 1\n\xff").starts_with("f:2:1: is not UTF-8 at byte 6"));
+        assert!(words(&vec![b'#'; MAX_BYTES + 1]).contains("is longer than 1048576 bytes"));
+        let zero = read_bounded(Path::new("/dev/zero")).unwrap();
+        assert_eq!(zero.len(), MAX_BYTES + 1);
+    }
+}

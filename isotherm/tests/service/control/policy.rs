@@ -1,0 +1,141 @@
+//! Age, temperature range, jump, signature: warned about or refused, as configured.
+
+use std::time::Duration;
+
+use isotherm_protocol::control::{SwapOptions, SwapOutcome};
+use isotherm_protocol::signature::{Existing, PrivateKey, sign};
+use isotherm_service::Settings;
+use isotherm_service::config::Severity;
+
+use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, document};
+
+const PLAIN: SwapOptions = SwapOptions {
+    by: String::new(),
+    dry_run: false,
+    schedule: isotherm_protocol::control::Schedule::NextTick,
+    slew_s: None,
+    any_serial: false,
+    force: false,
+};
+
+/// A document that a policy speaks against: warned about, refused and forced, as configured.
+async fn policy(set: impl Fn(&mut Settings, Severity), temperature_deg_c: f64, text: &str, words: &[&str]) {
+    for severity in [Severity::Warn, Severity::Refuse] {
+        let folders = Folders::new();
+        let mut settings = folders.settings();
+        set(&mut settings, severity);
+        let mut stand = Stand::start(settings).await;
+        stand.temperature_deg_c = temperature_deg_c;
+        let before =
+            document(UNIT, 1.0).replace("2026-01-05", "2999-01-01").replace("-10.0, 40.0", "-60.0, 90.0");
+        let forced = SwapOptions { force: true, ..PLAIN };
+        assert_accepted(&stand.swap(UNIT, &before, &forced).await, 1);
+        stand.revisions(UNIT, 2000).await;
+        let reply = stand.swap(UNIT, text, &PLAIN).await;
+        let reply = if severity == Severity::Refuse {
+            assert_refused(&reply, words);
+            assert_refused(&reply, &["--force"]);
+            stand.swap(UNIT, text, &forced).await
+        } else {
+            reply
+        };
+        assert_accepted(&reply, 2);
+        let warnings: Vec<_> = reply.warnings.iter().map(ToString::to_string).collect();
+        let warned = |warning: &&String| words.iter().all(|words| warning.contains(words));
+        assert!(warnings.iter().any(|warning| warned(&warning)), "{words:?} in {warnings:#?}");
+        assert_eq!(stand.revisions(UNIT, 20).await, [2]);
+        stand.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_old_document_is_warned_about_or_refused() {
+    let set = |settings: &mut Settings, severity| {
+        settings.swap.max_age = Some(Duration::from_secs(30 * 86_400));
+        settings.swap.age = severity;
+    };
+    let old = document(UNIT, 2.0).replace("2026-01-05", "2020-01-05");
+    policy(set, 25.0, &old, &["created: is 2020-01-05", "days old, more than 30"]).await;
+    let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
+    policy(set, 25.0, &undated, &["created: is missing"]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_document_older_than_the_one_in_force_is_warned_about_or_refused() {
+    let set = |settings: &mut Settings, severity| settings.swap.downgrade = severity;
+    let older = ["created: is 2026-01-05: older than the document in force", "2999-01-01T00:00:00"];
+    policy(set, 25.0, &document(UNIT, 2.0), &older).await;
+    let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
+    policy(set, 25.0, &undated, &["created: is missing: the document may be older"]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_document_that_was_fitted_elsewhere_is_warned_about_or_refused() {
+    let set = |settings: &mut Settings, severity| settings.swap.outside_range = severity;
+    policy(set, 55.0, &document(UNIT, 2.0), &["channel body is at 55.00 °C", "-10 to 40 °C"]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_jump_of_the_output_is_warned_about_or_refused() {
+    let set = |settings: &mut Settings, severity| {
+        // 2 °/h
+        settings.swap.max_jump_rad_per_s = Some(2.0_f64.to_radians() / 3600.0);
+        settings.swap.jump = severity;
+    };
+    policy(set, 25.0, &document(UNIT, 4.5), &["the angular rate about x would jump by -3.5000 °/h", "2"])
+        .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_refused() {
+    let folders = Folders::new();
+    let keys = tempfile::tempdir().unwrap();
+    let trusted = PrivateKey::from_seed(&[7; 32]);
+    let pem = trusted.public().to_pem().unwrap();
+    std::fs::write(keys.path().join("bench.pub"), pem).unwrap();
+    let mut settings = folders.settings();
+    settings.swap.require_signature = true;
+    settings.swap.downgrade = Severity::Refuse;
+    settings.swap.trusted_keys = Some(keys.path().to_owned());
+    let mut stand = Stand::start(settings).await;
+    stand.revisions(UNIT, 10).await;
+
+    let text = document(UNIT, 1.0);
+    let signed = sign(&text, &trusted, Existing::Refuse).unwrap();
+    let foreign = sign(&text, &PrivateKey::from_seed(&[8; 32]), Existing::Refuse).unwrap();
+    let changed = signed.replace("coefficients_deg_per_h = [1, ", "coefficients_deg_per_h = [1.5, ");
+    assert_ne!(changed, signed);
+    let force = SwapOptions { force: true, any_serial: true, ..PLAIN };
+    for options in [PLAIN, force] {
+        assert_refused(&stand.swap(UNIT, &text, &options).await, &["is not signed", "isotherm sign"]);
+        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &["not trusted here", "bench"]);
+        assert_refused(&stand.swap(UNIT, &changed, &options).await, &["changed after signing"]);
+    }
+    assert_accepted(&stand.swap(UNIT, &signed, &PLAIN).await, 1);
+    let second = sign(&document(UNIT, 2.0), &trusted, Existing::Refuse).unwrap();
+    assert_accepted(&stand.swap(UNIT, &second, &PLAIN).await, 2);
+    let reply = stand.command(UNIT, r#"{"command":"rollback"}"#).await;
+    assert_eq!(reply.swap.unwrap().outcome, SwapOutcome::Accepted, "it was verified when it was accepted");
+
+    // What was signed for one unit is not taken for another, and what was replaced does not come back but by a rollback.
+    let foreign = sign(&document("ZLG-9", 3.0), &trusted, Existing::Refuse).unwrap();
+    for options in [PLAIN, SwapOptions { force: true, any_serial: true, ..PLAIN }] {
+        let words = ["is \"ZLG-9\", but the document was sent to unit", "so any_serial does not count"];
+        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &words);
+    }
+    let newer =
+        sign(&document(UNIT, 4.0).replace("2026-01-05", "2026-03-05"), &trusted, Existing::Refuse).unwrap();
+    assert_accepted(&stand.swap(UNIT, &newer, &PLAIN).await, 4);
+    assert_refused(
+        &stand.swap(UNIT, &second, &PLAIN).await,
+        &["older than the document in force", "downgrade"],
+    );
+    let reply = stand.command(UNIT, r#"{"command":"rollback"}"#).await;
+    assert_eq!(reply.swap.unwrap().outcome, SwapOutcome::Accepted, "somebody asks for it by its revision");
+
+    // A key that is taken away no longer counts, at once.
+    std::fs::remove_file(keys.path().join("bench.pub")).unwrap();
+    let third = sign(&document(UNIT, 3.0), &trusted, Existing::Refuse).unwrap();
+    assert_refused(&stand.swap(UNIT, &third, &PLAIN).await, &["not trusted here"]);
+    stand.stop().await;
+}

@@ -1,0 +1,202 @@
+//! `history`: what was done to a unit, by whom, when, from where; and whether the audit file still says what was written.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use isotherm_cli::{Exit, print};
+use isotherm_protocol::control::Schedule;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
+use isotherm_protocol::key;
+
+use super::client::{self, Client, ClientArgs};
+use super::status::or_none;
+use super::{ConsoleError, show};
+
+/// Most entries that are asked for.
+const MOST_ENTRIES: u32 = 10_000;
+
+/// Columns of the terminal that a table fits.
+const WIDTH: usize = 100;
+/// Longest name of who and of what it came from.
+const LONGEST_NAME: usize = 16;
+/// What stands before a line of what changed.
+const INDENT: &str = "        ";
+
+/// Arguments of `history`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Examples:
+  isotherm history ZLG-0001
+  isotherm history ZLG-0001 --all --limit 100
+  isotherm history ZLG-0001 --json | jq '.[0]'
+  isotherm history --verify /var/lib/isotherm")]
+pub struct HistoryArgs {
+    /// Serial of the unit
+    #[arg(required_unless_present = "verify")]
+    pub unit: Option<String>,
+    /// Verify the chain of the audit files in this state folder, without a service
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["unit", "limit", "all"])]
+    pub verify: Option<PathBuf>,
+    /// Digest printed by an earlier `--verify`: its entry must still exist
+    #[arg(long, value_name = "DIGEST", requires = "verify")]
+    pub noted: Option<Digest>,
+    /// Number of entries, newest first
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_ENTRIES)))]
+    pub limit: u32,
+    /// Show refusals, commands and first ticks too, not only calibrations
+    #[arg(long)]
+    pub all: bool,
+    /// Print the entries as JSON on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// How to reach the service
+    #[command(flatten)]
+    pub client: ClientArgs,
+}
+
+/// Prints a unit's history.
+pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
+    let unit = client::unit(args.unit.as_deref().unwrap_or_default())?;
+    let client = Client::open(&args.client).await?;
+    // Calibrations stand among the other entries, how far apart nobody knows.
+    let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });
+    let mut entries: Vec<AuditEntry> = client.json(&key::history(&unit), &parameters, None).await?;
+    if entries.is_empty() {
+        let (statuses, services) = (client.statuses().await?, or_none(client.services().await)?);
+        if !statuses.iter().any(|status| status.unit == unit.as_str()) {
+            return Err(ConsoleError::unlisted(unit.as_str(), client.tried(), &statuses, &services));
+        }
+    }
+    client.close().await;
+    entries.sort_by_key(|entry| std::cmp::Reverse(entry.number));
+    entries.retain(|entry| args.all || matches!(entry.event, AuditEvent::Accepted(_)));
+    entries.truncate(args.limit as usize);
+    let text = if args.json {
+        serde_json::to_string_pretty(&entries).unwrap_or_default() + "\n"
+    } else if entries.is_empty() {
+        format!("{unit}: nothing has been done to it\n")
+    } else {
+        table(&entries)
+    };
+    Ok(print(&text, Exit::Ok))
+}
+
+/// The entries, each with a line of its own for what changed; the JSON has them whole.
+fn table(entries: &[AuditEntry]) -> String {
+    let header = ["no.", "time (UTC)", "what", "rev", "digest", "by", "from"];
+    let (rows, changes): (Vec<_>, Vec<_>) = entries.iter().map(row).unzip();
+    let table = show::table(header, rows, header.len()).to_string();
+    // The header and the line under it change nothing.
+    let changes = [const { String::new() }; 2].into_iter().chain(changes);
+    let mut text = String::new();
+    for (line, changes) in table.lines().zip(changes) {
+        text.extend([line.trim_end(), "\n"]);
+        if !changes.is_empty() {
+            text.extend([INDENT, &show::cut(&changes, WIDTH - INDENT.len()), "\n"]);
+        }
+    }
+    text
+}
+
+/// One line of the table, and what changed.
+fn row(entry: &AuditEntry) -> (Vec<String>, String) {
+    let AuditEntry { number, time, by, event, .. } = entry;
+    let head = |digest: &dyn std::fmt::Display| digest.to_string().chars().take(12).collect::<String>();
+    let [revision, digest, from, changes] = match event {
+        AuditEvent::Accepted(accepted) => [
+            accepted.revision.to_string(),
+            head(&accepted.digest),
+            source(&accepted.source),
+            effect(accepted.schedule, accepted.slew_ms, &accepted.changed),
+        ],
+        AuditEvent::InForce(first) => [
+            first.revision.to_string(),
+            String::new(),
+            String::new(),
+            format!("from tick {} on", first.first_sequence),
+        ],
+        AuditEvent::Withdrawn(withdrawal) => {
+            [withdrawal.revision.to_string(), String::new(), String::new(), event.to_string()]
+        }
+        AuditEvent::Refused(refused) => [
+            String::new(),
+            head(&refused.digest),
+            source(&refused.source),
+            format!(
+                "{}: {}",
+                show::count(usize::try_from(refused.count).unwrap_or(usize::MAX), "problem"),
+                refused.problems.first().map_or("", String::as_str)
+            ),
+        ],
+        AuditEvent::Command(command) => [
+            String::new(),
+            String::new(),
+            String::new(),
+            format!("{} → {}", command.command, command.reason.as_deref().unwrap_or(&command.state_after)),
+        ],
+        _ => [String::new(), String::new(), String::new(), event.to_string()],
+    };
+    // To the second; the JSON has the rest.
+    let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
+    let cut = |text: &str| show::cut(text, LONGEST_NAME);
+    let cells =
+        vec![number.to_string(), time, event.name().to_owned(), revision, digest, cut(by), cut(&from)];
+    (cells, changes)
+}
+
+/// When it took effect and what changed, short.
+fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
+    let mut words = match changed {
+        [] => "first document, or no entry changed".to_owned(),
+        [one] => one.clone(),
+        [first, rest @ ..] => format!("{first}, and {} more", rest.len()),
+    };
+    #[expect(clippy::cast_precision_loss, reason = "at most an hour")]
+    let seconds = slew_ms as f64 / 1000.0;
+    if schedule != Schedule::NextTick || slew_ms > 0 {
+        words = format!("{words} ({})", show::schedule(schedule, seconds));
+    }
+    words
+}
+
+/// The last part of a path.
+fn file_name(path: &str) -> String {
+    path.rsplit('/').next().unwrap_or(path).to_owned()
+}
+
+/// Where a calibration came from, in words.
+fn source(source: &Source) -> String {
+    match source {
+        Source::Folder { path } | Source::Start { path } => file_name(path),
+        Source::Bus => "bus".to_owned(),
+        Source::Rollback { to } => format!("rollback to {to}"),
+        Source::PreLaunch => "pre-launch".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_fits_a_hundred_columns() {
+        let accepted = |number: u64, path: &str, changed: &str| -> AuditEntry {
+            let json = serde_json::json!({
+                "number": number, "time": "2026-11-21T13:40:26.082Z", "unit": "ZLG-0001", "by": "operator-of-the-night-shift",
+                "event": "accepted", "revision": number, "digest": "ef".repeat(32), "source": { "from": "start", "path": path },
+                "changed": [changed], "schedule": { "sequence": 1_000_000_000_u64 }, "slew_ms": 2500,
+            });
+            serde_json::from_value(json).unwrap()
+        };
+        let change = "gyro.sensor[0].static_bias.coefficients_deg_per_h[0]: 0.45 -> 0.41 (-0.04, -8.889 %)";
+        let entries =
+            [accepted(12_345, "/home/ann/bench/units/ZLG-0001.toml", change), accepted(1, "/u.toml", "x")];
+        let text = table(&entries);
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(
+            text.contains("ZLG-0001.toml") && text.contains("0.45 -> 0.41") && !text.contains("/home"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,105 @@
+//! What operators see of units and services, as lines: pure, so that `status`, `top` and tests show the same.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `remark` | what is to be noticed of a unit, and how grave it is |
+//! | `units`, `services`, `pairs` | one line a unit, one a service instance, one an instance of a pair |
+//! | `sheet` | everything of one unit |
+//! | `grid`, `figure`, `tone`, `chart` | columns, numbers, colours, bars |
+
+mod chart;
+mod figure;
+mod grid;
+mod pairs;
+mod remark;
+mod services;
+mod sheet;
+#[cfg(test)]
+pub(crate) mod tests;
+pub mod tone;
+mod units;
+
+use std::time::{Duration, Instant};
+
+use isotherm_correction::sample::ChannelName;
+use isotherm_protocol::status::Status;
+
+pub use figure::fit;
+pub use pairs::{of_unit, pairs, said as said_of_pairs};
+pub use remark::{Level, is_running, knows_rates, state_word};
+pub use services::{services, tally};
+pub use sheet::sheet;
+pub use units::{channel_in_view, length, range, units};
+
+/// A unit: its status, and what only an onlooker knows.
+#[derive(Debug, Clone)]
+pub struct Unit<'a> {
+    /// Its last status.
+    pub status: &'a Status,
+    /// How long ago that came.
+    pub age: Duration,
+    /// How long nobody has answered for the unit; `None` while it is there.
+    pub gone: Option<Duration>,
+    /// The present time by the service's clock (ms since 1970-01-01 UTC).
+    pub now_unix_ms: i64,
+    /// What has changed of late; all zero where nobody has looked for long enough.
+    pub lately: Lately,
+    /// Temperatures as they were, oldest first; empty where nobody has looked.
+    pub past: &'a [Past],
+}
+
+impl<'a> Unit<'a> {
+    /// A unit of which only the status is known, and that it has just come.
+    pub fn now(status: &'a Status, now_unix_ms: i64) -> Self {
+        let (age, lately) = (Duration::ZERO, Lately::default());
+        Self { status, age, gone: None, now_unix_ms, lately, past: &[] }
+    }
+
+    /// What is to be noticed, the gravest first.
+    pub fn remarks(&self) -> Vec<remark::Remark> {
+        remark::remarks(self)
+    }
+
+    /// How it is, taken all together.
+    pub fn level(&self) -> Level {
+        remark::level(self, &self.remarks())
+    }
+}
+
+/// By how much counters grew over the last minute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Lately {
+    /// Gaps announced.
+    pub gaps: u64,
+    /// Ticks that had been taken before.
+    pub duplicates: u64,
+    /// Ticks and readings that came too late.
+    pub late: u64,
+    /// Frames refused.
+    pub bad: u64,
+    /// Raw ticks come, the unit is running, and for ten seconds nothing has gone out.
+    pub stuck: bool,
+}
+
+/// Every channel at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Past {
+    /// When it was seen.
+    pub at: Instant,
+    /// Name, temperature (°C), rate (°C/s).
+    pub channels: Vec<(ChannelName, f64, f64)>,
+}
+
+/// Counters that stand in one column.
+pub fn duplicates(status: &Status) -> u64 {
+    total(status, &["gyro_duplicates", "accel_duplicates"])
+}
+
+/// As [`duplicates`], of what came too late.
+pub fn late(status: &Status) -> u64 {
+    total(status, &["gyro_late", "accel_late", "temperature_late", "references_late"])
+}
+
+fn total(status: &Status, names: &[&str]) -> u64 {
+    names.iter().fold(0, |total, name| total.saturating_add(status.counter(name)))
+}

@@ -1,0 +1,218 @@
+//! Numbers and times as people read them.
+
+use std::time::Duration;
+
+use isotherm_protocol::digest::Digest;
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+/// Stands where a value is not known.
+pub(super) const NONE: &str = "–";
+
+/// Seconds in a day.
+const DAY_S: u64 = 86_400;
+
+/// A number of things in few characters: to 99 999 as it is, then three digits.
+#[expect(clippy::cast_precision_loss, reason = "three digits of it are shown")]
+pub(super) fn count(number: u64) -> String {
+    if number < 100_000 {
+        return number.to_string();
+    }
+    let mut value = number as f64 / 1e3;
+    for unit in ["k", "M", "G", "T"] {
+        if value < 999.5 {
+            let decimals = if value < 9.995 { 2 } else { usize::from(value < 99.95) };
+            return format!("{value:.decimals$}{unit}");
+        }
+        value /= 1e3;
+    }
+    format!("{value:.0}P")
+}
+
+/// "1 unit", "3 units".
+pub(super) fn of(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// About four digits, for what spans decades.
+pub(super) fn digits(value: f64) -> String {
+    let decimals = match value.abs() {
+        size if size >= 999.5 => 0,
+        size if size >= 99.95 => 1,
+        size if size >= 9.995 => 2,
+        _ => 3,
+    };
+    if value.is_finite() { format!("{value:.decimals$}") } else { NONE.to_owned() }
+}
+
+/// As [`digits`], with its sign.
+pub(super) fn signed(value: f64) -> String {
+    let text = digits(value);
+    if value >= 0.0 && value.is_finite() { format!("+{text}") } else { text }
+}
+
+/// Temperature (°C).
+pub(super) fn temperature(deg_c: Option<f64>) -> String {
+    deg_c.filter(|value| value.is_finite()).map_or_else(|| NONE.to_owned(), |value| format!("{value:.1}"))
+}
+
+/// Rate of a temperature (°C/s), shown in °C/min.
+pub(super) fn temperature_rate(deg_c_per_s: Option<f64>) -> String {
+    let per_min = deg_c_per_s.map(|rate| rate * 60.0).filter(|rate| rate.is_finite());
+    // Zero without the sign of what was rounded away.
+    per_min.map_or_else(|| NONE.to_owned(), |rate| format!("{:+.2}", (rate * 100.0).round() / 100.0 + 0.0))
+}
+
+/// Frequency (1/s).
+pub(super) fn frequency(per_s: f64) -> String {
+    if !per_s.is_finite() {
+        NONE.to_owned()
+    } else if per_s == 0.0 || per_s >= 9.95 {
+        format!("{per_s:.0}")
+    } else {
+        format!("{per_s:.1}")
+    }
+}
+
+/// Latency (ns).
+#[expect(clippy::cast_precision_loss, reason = "three digits of it are shown")]
+pub(super) fn latency(ns: u64) -> String {
+    let mut value = ns as f64;
+    for unit in ["ns", "µs", "ms"] {
+        if value < 999.5 {
+            let decimals = if unit == "ns" || value >= 99.95 { 0 } else { 1 + usize::from(value < 9.995) };
+            return format!("{value:.decimals$} {unit}");
+        }
+        value /= 1e3;
+    }
+    format!("{value:.1} s")
+}
+
+/// A time that has passed, in its largest unit: "12 s", "5 min", "3 h", "40 d".
+pub(crate) fn since(time: Duration) -> String {
+    match time.as_secs() {
+        s if s < 120 => format!("{s} s"),
+        s if s < 7200 => format!("{} min", s / 60),
+        s if s < 2 * DAY_S => format!("{} h", s / 3600),
+        s => format!("{} d", s / DAY_S),
+    }
+}
+
+/// As [`since`], of seconds that may be negative: what lies ahead is "in 3 h".
+pub(super) fn since_s(seconds: i64) -> String {
+    let words = since(Duration::from_secs(seconds.unsigned_abs()));
+    if seconds < 0 { format!("in {words}") } else { words }
+}
+
+/// How long before `now` a time lies (both in ms since 1970-01-01 UTC); zero where it lies ahead.
+pub(super) fn ago(unix_ms: i64, now_unix_ms: i64) -> Duration {
+    Duration::from_millis(u64::try_from(now_unix_ms.saturating_sub(unix_ms)).unwrap_or(0))
+}
+
+/// The first twelve hexadecimal digits of a digest, of which perhaps only the head is known.
+pub(super) fn digest(digest: Option<Digest>, head: [u8; 8]) -> String {
+    let mut bytes = [0; 32];
+    bytes.iter_mut().zip(head).for_each(|(byte, of_head)| *byte = of_head);
+    digest.unwrap_or(Digest(bytes)).to_string().chars().take(12).collect()
+}
+
+/// How many columns a text takes.
+pub(super) fn width(text: &str) -> usize {
+    text.width()
+}
+
+/// The text in at most `width` columns; where something is cut off, `…` stands for it.
+pub fn fit(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_owned();
+    }
+    let mut fitted = take(text.chars(), width.saturating_sub(1));
+    if width > 0 {
+        fitted.push('…');
+    }
+    fitted
+}
+
+/// As [`fit`], but cut in the middle: serials differ at their ends.
+pub(super) fn fit_middle(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.to_owned();
+    }
+    let tail: String = take(text.chars().rev(), width.saturating_sub(1) / 2).chars().rev().collect();
+    let head = take(text.chars(), width.saturating_sub(1 + tail.width()));
+    if width == 0 { String::new() } else { format!("{head}…{tail}") }
+}
+
+/// As many characters as fit in `width` columns.
+fn take(text: impl Iterator<Item = char>, width: usize) -> String {
+    let mut taken = 0;
+    text.take_while(|c| {
+        taken += c.width().unwrap_or(0);
+        taken <= width
+    })
+    .collect()
+}
+
+/// The text broken at blanks into lines of at most `width` columns; what has no blank is cut.
+pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(8);
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        let mut word = word;
+        if let Some(last) = lines.last_mut()
+            && last.width() + 1 + word.width() <= width
+        {
+            last.push(' ');
+            last.push_str(word);
+            continue;
+        }
+        while word.width() > width {
+            let part = take(word.chars(), width);
+            word = word.get(part.len()..).unwrap_or_default();
+            lines.push(part);
+        }
+        lines.push(word.to_owned());
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_place() {
+        let counts = [0, 99_999, 100_000, 999_499, 1_234_567, 12_345_678_901];
+        assert_eq!(counts.map(count), ["0", "99999", "100k", "999k", "1.23M", "12.3G"]);
+        assert_eq!(count(u64::MAX), "18447P");
+        assert_eq!([1234.5, 123.45, 12.345, 0.01234].map(digits), ["1234", "123.5", "12.35", "0.012"]);
+        assert_eq!([1.0, -1.0, f64::NAN].map(signed), ["+1.000", "-1.000", NONE]);
+        assert_eq!([0.0, 0.4, 9.96, 2000.2].map(frequency), ["0", "0.4", "10", "2000"]);
+        let latencies = [0, 999, 1_000, 12_345, 999_999, 1_240_000, 3_200_000_000];
+        assert_eq!(
+            latencies.map(latency),
+            ["0 ns", "999 ns", "1.00 µs", "12.3 µs", "1.00 ms", "1.24 ms", "3.2 s"]
+        );
+        assert_eq!(temperature_rate(Some(-0.000_01)), "+0.00");
+        assert_eq!(temperature(Some(f64::INFINITY)), NONE);
+    }
+
+    #[test]
+    fn times_are_told_in_their_largest_unit() {
+        let times = [0, 119, 120, 7200, 172_799, 172_800].map(|s| since(Duration::from_secs(s)));
+        assert_eq!(times, ["0 s", "119 s", "2 min", "2 h", "47 h", "2 d"]);
+        assert_eq!((since_s(-7200), ago(5_000, 3_000)), ("in 2 h".to_owned(), Duration::ZERO));
+    }
+
+    #[test]
+    fn texts_fit_their_columns_whatever_they_hold() {
+        for text in ["", "short", "ZLG-0001-of-the-north-hall", "水準器水準器水準器", "a\u{301}bc"] {
+            for columns in 0..40 {
+                assert!(fit(text, columns).width() <= columns, "{text} in {columns}");
+                assert!(fit_middle(text, columns).width() <= columns, "{text} in {columns}");
+            }
+        }
+        assert_eq!((fit("abcdef", 4), fit_middle("abcdef", 5)), ("abc…".to_owned(), "ab…ef".to_owned()));
+        let text = "one two-three averyveryverylongword";
+        assert_eq!(wrap(text, 9), ["one", "two-three", "averyvery", "verylongw", "ord"]);
+    }
+}

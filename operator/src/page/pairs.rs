@@ -1,0 +1,169 @@
+//! Instances of a pair: who speaks for how many units, what the others do, and units that nobody takes.
+
+use isotherm_cli::grouped;
+use isotherm_protocol::pair::{PairReport, Role, UnitRole};
+use ratatui::text::{Line, Span};
+
+use super::figure::{fit, of};
+use super::{Level, tone};
+
+/// Units that are named; more of them are counted.
+const NAMED: usize = 8;
+
+/// The lines of all instances; none of one alone that takes every unit.
+pub fn pairs(reports: &[PairReport], width: usize) -> Vec<Line<'static>> {
+    let line = |(level, columns): (Level, Vec<String>)| {
+        let (mark, style) = match level {
+            Level::Fault => ("! ", tone::FAULT),
+            Level::Warning => ("▲ ", tone::WARNING),
+            _ => ("", tone::PLAIN),
+        };
+        Line::from(Span::styled(fit(&format!("{mark}{}", columns.join("  ")), width), style))
+    };
+    said(reports).into_iter().map(line).collect()
+}
+
+/// What there is to say of all instances, in columns, and how grave it is.
+pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
+    let mut said = Vec::new();
+    if reports.len() > 1 {
+        for report in reports {
+            said.push((Level::Fine, instance(report)));
+            let differences = report.units.iter().filter_map(|unit| unit.last_difference.as_deref());
+            said.extend(differences.take(NAMED).map(|difference| {
+                (Level::Fault, vec![format!("{}: other bits: {difference}", report.member.name)])
+            }));
+        }
+        let twice = named(reports, |report, unit| {
+            let speaks = |other: &PairReport| role(other, unit) == Some(Role::Speaking);
+            speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
+        });
+        if !twice.is_empty() {
+            said.push((Level::Fault, vec![format!("two instances speak for {}", listed(&twice))]));
+        }
+    }
+    let mut nobody: Vec<String> = reports.iter().flat_map(|report| report.passed_over.clone()).collect();
+    nobody.retain(|serial| reports.iter().all(|report| role(report, serial).is_none()));
+    nobody.sort_unstable();
+    nobody.dedup();
+    if !nobody.is_empty() {
+        said.push((Level::Warning, vec![format!("nobody takes {}", listed(&nobody))]));
+    }
+    said
+}
+
+/// "north", "speaks for 20 units, standby for 3, joining 1", "standby", "priority 1", "takeovers 2", "40 000 ticks compared, 0 other".
+fn instance(report: &PairReport) -> Vec<String> {
+    let count = |role| report.units.iter().filter(|unit| unit.role == role).count();
+    let sum = |number: fn(&UnitRole) -> u64| grouped(report.units.iter().map(number).sum());
+    let member = &report.member;
+    let silent = [Role::Standby, Role::Joining].into_iter().filter(|role| count(*role) > 0);
+    let silent: Vec<_> = silent.map(|role| format!(", {} for {}", role.name(), count(role))).collect();
+    vec![
+        member.name.clone(),
+        format!("speaks for {}{}", of(count(Role::Speaking), "unit"), silent.concat()),
+        member.mode.name().to_owned(),
+        format!("priority {}", member.priority),
+        format!("takeovers {}", sum(|unit| unit.takeovers)),
+        format!(
+            "{} ticks compared, {} other",
+            sum(|unit| unit.ticks_compared),
+            sum(|unit| unit.ticks_differing)
+        ),
+    ]
+}
+
+/// Who does what for one unit: "north speaks, south standby"; nothing where there is one instance.
+pub fn of_unit(reports: &[PairReport], serial: &str) -> Option<Line<'static>> {
+    let roles: Vec<_> = reports
+        .iter()
+        .filter_map(|report| Some(format!("{} {}", report.member.name, role(report, serial)?.name())))
+        .collect();
+    (reports.len() > 1).then(|| Line::from(format!("instances  {}", roles.join(", "))))
+}
+
+fn role(report: &PairReport, serial: &str) -> Option<Role> {
+    report.units.iter().find(|unit| unit.unit == serial).map(|unit| unit.role)
+}
+
+fn named(reports: &[PairReport], is: impl Fn(&PairReport, &str) -> bool) -> Vec<String> {
+    let units = reports.iter().flat_map(|report| report.units.iter().map(move |unit| (report, &unit.unit)));
+    let mut named: Vec<_> =
+        units.filter(|(report, unit)| is(report, unit)).map(|(_, unit)| unit.clone()).collect();
+    named.sort_unstable();
+    named.dedup();
+    named
+}
+
+fn listed(units: &[String]) -> String {
+    let first = units.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(" ");
+    let beyond = units.len().saturating_sub(NAMED);
+    if beyond > 0 { format!("{first} and {beyond} more") } else { first }
+}
+
+#[cfg(test)]
+mod tests {
+    use isotherm_protocol::pair::{Member, Mode};
+
+    use super::*;
+
+    fn report(name: &str, units: &[(&str, Role)], passed_over: &[&str]) -> PairReport {
+        let unit = |(unit, role): &(&str, Role)| UnitRole {
+            unit: (*unit).to_owned(),
+            role: *role,
+            ticks_compared: 1000,
+            ticks_differing: 0,
+            takeovers: 1,
+            last_difference: None,
+        };
+        let member = Member {
+            instance: name.to_owned(),
+            name: name.to_owned(),
+            mode: Mode::Standby,
+            priority: 1,
+            started_unix_ms: 0,
+            group: String::new(),
+        };
+        let passed_over = passed_over.iter().map(|unit| (*unit).to_owned()).collect();
+        PairReport { member, takes: Vec::new(), units: units.iter().map(unit).collect(), passed_over }
+    }
+
+    fn text(reports: &[PairReport]) -> String {
+        tone::text(&pairs(reports, 200), false)
+    }
+
+    #[test]
+    fn who_speaks_is_seen_and_one_instance_alone_says_nothing() {
+        assert_eq!(text(&[report("north", &[("A", Role::Speaking)], &[])]), "");
+        let pair = [
+            report("north", &[("A", Role::Speaking), ("B", Role::Standby)], &[]),
+            report("south", &[("A", Role::Joining), ("B", Role::Speaking)], &[]),
+        ];
+        let seen = text(&pair);
+        assert!(
+            seen.contains("north  speaks for 1 unit, standby for 1  standby  priority 1  takeovers 2"),
+            "{seen}"
+        );
+        assert!(
+            seen.contains("south  speaks for 1 unit, joining for 1") && !seen.contains("two instances"),
+            "{seen}"
+        );
+        assert_eq!(
+            of_unit(&pair, "A").map(|line| line.to_string()).as_deref(),
+            Some("instances  north speaking, south joining")
+        );
+    }
+
+    #[test]
+    fn two_that_speak_and_units_of_nobody_are_told() {
+        let pair = [
+            report("north", &[("A", Role::Speaking)], &["B", "C"]),
+            report("south", &[("A", Role::Speaking), ("B", Role::Speaking)], &["C"]),
+        ];
+        let seen = text(&pair);
+        assert!(
+            seen.contains("! two instances speak for A\n") && seen.contains("▲ nobody takes C"),
+            "{seen}"
+        );
+    }
+}

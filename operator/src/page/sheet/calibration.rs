@@ -1,0 +1,92 @@
+//! The calibration in force, the one that waits, and what is subtracted.
+
+use std::time::{Duration, SystemTime};
+
+use isotherm_cli::grouped;
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_protocol::status::{ActiveCalibration, Output, Status};
+use ratatui::text::Span;
+
+use super::super::figure::{self, signed, since_s};
+use super::super::grid::{Column, Grid};
+use super::super::remark::schedule;
+use super::super::tone;
+use super::Section;
+
+/// Calibration, pending change, swaps.
+pub(super) fn section(status: &Status, columns: usize) -> Section {
+    let mut section = Section::new("Calibration");
+    match &status.calibration {
+        Some(calibration) => in_force(&mut section, calibration, columns),
+        None => section.field("revision", none(status.output), tone::WARNING, columns),
+    }
+    if let Some(pending) = &status.pending {
+        let digest = figure::digest(pending.digest, pending.revision.digest);
+        let slew = if pending.slew_s > 0.0 { format!(", over {} s", pending.slew_s) } else { String::new() };
+        let when = schedule(pending.schedule);
+        let words =
+            format!("revision {} ({digest}) {when}{slew}; {}", pending.revision.counter, pending.source);
+        section.field("waits", &words, tone::PLAIN, columns);
+    }
+    let swaps = &status.swaps;
+    let words = format!("{} accepted, {} refused", grouped(swaps.accepted), grouped(swaps.refused));
+    section.field("swaps", &words, tone::PLAIN, columns);
+    if let Some(refusal) = &swaps.last_refusal {
+        section.field("last refusal", refusal, tone::PLAIN, columns);
+    }
+    section
+}
+
+fn none(output: Output) -> &'static str {
+    match output {
+        Output::Held => "none: nothing is published, as configured",
+        Output::PassThrough | Output::Calibrated => "none: raw readings pass through, flagged",
+    }
+}
+
+fn in_force(section: &mut Section, calibration: &ActiveCalibration, columns: usize) {
+    let mut field = |name: &str, text: &str| section.field(name, text, tone::PLAIN, columns);
+    let digest = figure::digest(calibration.digest, calibration.revision.digest);
+    field("revision", &format!("{} ({digest})", calibration.revision.counter));
+    if !calibration.source.is_empty() {
+        field("from", &calibration.source);
+    }
+    match (calibration.created_unix_s.and_then(day), calibration.age_s) {
+        (Some(day), Some(age_s)) => field("made", &format!("{day}, {}", age(age_s))),
+        (Some(day), None) => field("made", &day),
+        (None, Some(age_s)) => field("made", &age(age_s)),
+        (None, None) => field("made", "not stated in the document"),
+    }
+    if let Some(overlay) = calibration.overlay {
+        field("overlay", &figure::digest(Some(overlay), [0; 8]));
+    }
+}
+
+fn age(age_s: i64) -> String {
+    let words = since_s(age_s);
+    if age_s < 0 { words } else { format!("{words} ago") }
+}
+
+/// The day of a time (s since 1970-01-01 UTC); `None` before that, and beyond the year 9999.
+fn day(unix_s: i64) -> Option<String> {
+    /// Start of the year 10 000.
+    const END_S: u64 = 253_402_300_800;
+    let unix_s = u64::try_from(unix_s).ok().filter(|unix_s| *unix_s < END_S)?;
+    let time = SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(unix_s))?;
+    Some(humantime::format_rfc3339_seconds(time).to_string().chars().take(10).collect())
+}
+
+/// What is subtracted at present, by case axis.
+pub(super) fn correction(status: &Status, columns: usize) -> Option<Section> {
+    let applied = status.applied?;
+    let rates = applied.angular_rate_rad_per_s.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
+    let forces = applied.specific_force_m_per_s2.map(|force| force / STANDARD_GRAVITY_M_PER_S2 * 1e3);
+    let row = |name: &'static str, values: [f64; 3]| {
+        let cells = values.into_iter().map(|value| Span::raw(signed(value)));
+        std::iter::once(Span::styled(name, tone::DIM)).chain(cells).collect()
+    };
+    let [x, y, z] = ["x", "y", "z"].map(|axis| Column::number(axis, 0, 9));
+    let layout = [Column::words("", 0, super::NAME - 2), x, y, z];
+    let grid = Grid::set(&layout, vec![row("°/h", rates), row("mg", forces)], columns.saturating_sub(2));
+    Some(Section { title: "Correction, subtracted in case axes", lines: grid.indented() })
+}

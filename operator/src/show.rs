@@ -1,0 +1,100 @@
+//! What the commands show: differences, problems, tables.
+
+use std::fmt::Write;
+
+use comfy_table::{CellAlignment, Table, TableComponent, presets};
+use isotherm_protocol::control::{CorrectionChange, Difference, Schedule};
+use isotherm_protocol::document::Problem;
+use isotherm_protocol::escape::escaped;
+
+/// A table with a line under its header; columns from `right` on are aligned to the right.
+pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, right: usize) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    for line in [
+        TableComponent::HeaderLines,
+        TableComponent::LeftHeaderIntersection,
+        TableComponent::MiddleHeaderIntersections,
+        TableComponent::RightHeaderIntersection,
+    ] {
+        table.set_style(line, '─');
+    }
+    table.set_header(header);
+    for row in rows {
+        table.add_row(row);
+    }
+    table.column_iter_mut().skip(right).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+}
+
+/// "1 problem", "3 problems".
+pub(super) fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// A problem under the name that the operator gave the file; without one, under the service's own. What is no matter of a
+/// file is told without a place.
+pub(super) fn problem(problem: &Problem, name: Option<&str>) -> String {
+    if problem.file.is_none() {
+        return escaped(&problem.message).into_owned();
+    }
+    let file = name.map(ToOwned::to_owned).or_else(|| problem.file.clone());
+    Problem { file, ..problem.clone() }.to_string()
+}
+
+/// A text cut to what fits in a column.
+pub(super) fn cut(text: &str, longest: usize) -> String {
+    if text.chars().count() > longest {
+        text.chars().take(longest.saturating_sub(1)).chain(['…']).collect()
+    } else {
+        text.to_owned()
+    }
+}
+
+/// When a change takes effect, in words.
+pub(super) fn schedule(schedule: Schedule, slew_s: f64) -> String {
+    let mut words = match schedule {
+        Schedule::NextTick => "from the next tick on".to_owned(),
+        Schedule::Sequence(sequence) => format!("from tick {sequence} on"),
+        Schedule::TimeNs(time_ns) => format!("from the first tick that ends at {time_ns} ns or later"),
+    };
+    if slew_s > 0.0 {
+        let _ = write!(words, ", over {} s", (slew_s * 1e3).round() / 1e3);
+    }
+    words
+}
+
+/// A difference: entries of the document line by line, and a table of what comes of them.
+pub(super) fn difference(difference: &Difference) -> String {
+    let mut text = String::new();
+    if difference.document.is_empty() {
+        text.push_str("No entry of the document differs.\n");
+    }
+    for change in &difference.document {
+        let _ = writeln!(text, "  {}", change.words());
+    }
+    if difference.temperatures.is_empty() {
+        text.push_str("The unit's temperatures are not known yet, so the effect is unknown.");
+    } else if difference.correction.is_empty() {
+        text.push_str("The correction at the present temperatures does not change.");
+    } else {
+        let rows = difference.correction.iter().map(correction_row);
+        let header = ["correction", "before", "after", "change", "unit"];
+        let _ = write!(text, "\n{}", table(header, rows.collect(), 1));
+    }
+    if !difference.temperatures.is_empty() {
+        let _ = write!(text, "\nat {}", difference.temperatures.join(", "));
+    }
+    text
+}
+
+fn correction_row(change: &CorrectionChange) -> Vec<String> {
+    let CorrectionChange { quantity, unit, before, after } = change;
+    vec![
+        quantity.clone(),
+        format!("{before:.6}"),
+        format!("{after:.6}"),
+        format!("{:+.6}", after - before),
+        unit.clone(),
+    ]
+}

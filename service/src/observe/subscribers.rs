@@ -1,0 +1,79 @@
+//! Subscribers that are behind: Zenoh drops what they have no room for, and tells nobody.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use isotherm_bus::receipt::{Behind, behind};
+use isotherm_protocol::status::Fault;
+use tokio::task::JoinHandle;
+use tokio::time::{MissedTickBehavior, interval};
+use zenoh::Session;
+
+use crate::receive::fault::standing;
+
+/// How often receipts are asked for.
+const INTERVAL: Duration = Duration::from_secs(2);
+/// Who has not taken within this what was published is behind.
+const LIMIT: Duration = Duration::from_secs(1);
+
+/// Who was behind, and how often.
+#[derive(Debug, Default)]
+pub(crate) struct Subscribers {
+    late: Mutex<Late>,
+}
+
+#[derive(Debug, Default)]
+struct Late {
+    receipts: u64,
+    latest: Option<Fault>,
+}
+
+impl Subscribers {
+    /// Asks for receipts for as long as the task lives.
+    pub(crate) fn watch(self: &Arc<Self>, session: &Session) -> JoinHandle<()> {
+        let (subscribers, session) = (Arc::clone(self), session.clone());
+        tokio::spawn(async move {
+            let mut told = BTreeSet::new();
+            let mut ticks = interval(INTERVAL);
+            ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+            while !session.is_closed() {
+                ticks.tick().await;
+                let late = behind(&session, LIMIT).await;
+                for of in late.iter().filter(|of| !told.contains(&of.session)) {
+                    tracing::warn!("{}", words(of));
+                }
+                told = late.iter().map(|of| of.session.clone()).collect();
+                subscribers.note(&late);
+            }
+        })
+    }
+
+    fn note(&self, behind: &[Behind]) {
+        let mut late = self.late.lock().unwrap_or_else(PoisonError::into_inner);
+        for of in behind {
+            late.receipts += 1;
+            late.latest = Some(standing("subscriber_behind", late.receipts, words(of)));
+        }
+    }
+
+    /// Receipts that came late, of all subscribers.
+    pub(crate) fn late_receipts(&self) -> u64 {
+        self.late.lock().unwrap_or_else(PoisonError::into_inner).receipts
+    }
+
+    /// The subscriber that was behind last, in words, with the number of all late receipts.
+    pub(crate) fn fault(&self) -> Option<Fault> {
+        self.late.lock().unwrap_or_else(PoisonError::into_inner).latest.clone()
+    }
+}
+
+fn words(behind: &Behind) -> String {
+    format!(
+        "subscriber {} at {} has not read everything within {} s; until it catches up, ticks are dropped for it: \
+         check its sequence numbers, its load and its link",
+        behind.session,
+        behind.at,
+        LIMIT.as_secs()
+    )
+}
