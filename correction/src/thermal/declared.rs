@@ -140,7 +140,7 @@ const PLAY: TermForm = TermForm::Each(Parameter {
     most: MAX_PLAYS,
 });
 const FORCE: TermForm = TermForm::PartOf(
-    "Drift by specific force along the case axes, default of each: 0; needs `[accel]`. Source: models §2, IEEE 528.",
+    "Drift by specific force along the case axes; needs `[accel]`. Source: models §2, IEEE 528.",
 );
 const REGRESSORS: TermForm = TermForm::Regressors(MAX_REGRESSORS);
 

@@ -42,7 +42,8 @@ impl<K: SensorKind> JsonSchema for Terms<K> {
 
 /// What a term is stated as.
 fn property<K: SensorKind>(generator: &mut SchemaGenerator, term: &Term) -> Json {
-    let units: Vec<_> = K::BIAS.iter().map(|bias| unit(term, *bias)).collect();
+    let mut units: Vec<_> = K::BIAS.iter().map(|bias| unit(term, *bias)).collect();
+    units.dedup();
     let curve = definition(generator, &units, &arguments(term));
     let list = |most: usize, items: Json| json!({ "type": "array", "items": items, "maxItems": most });
     match term.form {
