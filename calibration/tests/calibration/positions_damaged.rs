@@ -113,7 +113,7 @@ fn units_of_measure_and_columns_are_named_once() {
     });
     let half = half.unwrap_err();
     let [one] = &half[..] else { panic!("{half:?}") };
-    assert!(one.starts_with("accelerometers x, y and z: their scale factors are known to "), "{one}");
+    assert!(one.starts_with("accelerometers x, y and z: their scale factors are known only to "), "{one}");
     assert!(one.contains("does the unit of measure change between or within logs"), "{one}");
 }
 

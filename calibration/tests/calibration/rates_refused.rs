@@ -34,7 +34,7 @@ fn steps_that_are_not_those_of_the_log_write_nothing() {
     // Plateaus that turn are no rests.
     let few = refused(&["--axis", "x", "--rates", "36,-36"]);
     assert!(few.contains("none of the 2 stated steps: 11.0…19.0 s at (36.0"), "{few}");
-    assert!(few.contains("Found were 11.0…19.0 s") && few.contains("71.0…79.0 s at (-10"), "{few}");
+    assert!(few.contains("Found: 11.0…19.0 s") && few.contains("71.0…79.0 s at (-10"), "{few}");
     let slow = refused(&["--axis", "x", "--rates", "3.6,-3.6,10.8,-10.8"]);
     assert!(slow.contains(" times the stated rate") && slow.contains("0.5 to 2 times are allowed"), "{slow}");
     // Times that take a turn for a rest.

@@ -72,7 +72,8 @@ fn head(fleet: &Fleet, units: &[Unit<'_>], columns: usize, height: usize) -> Vec
     }
     let mut tally = page::tally(units, columns);
     if fleet.not_understood > 0 {
-        let words = format!("  ▲ {} statuses of another version", fleet.not_understood);
+        let statuses = if fleet.not_understood == 1 { "status" } else { "statuses" };
+        let words = format!("  ▲ {} {statuses} of another version", fleet.not_understood);
         tally.push_span(Span::styled(words, tone::WARNING));
     }
     lines.extend([tally, Line::default()]);
