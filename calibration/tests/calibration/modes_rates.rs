@@ -215,7 +215,7 @@ fn rates_are_fitted_written_and_reported() {
     let table = ["--axis", "x", "--axis", "y", "--axis", "z", "--rates", "36,-36,108,-108"];
     let logs: Vec<&str> = logs.iter().map(|path| text(path)).collect();
     let fit = [&["rates"][..], &logs, &table, &attitude].concat();
-    let said = succeeds(&[&fit[..], &["--out", text(&out)]].concat());
+    succeeds(&[&fit[..], &["--out", text(&out)]].concat());
     let document = Document::parse(&std::fs::read_to_string(&out).unwrap(), None).unwrap().document;
     let weight = document.gyro.sensor[0].increment_weight_rad_per_rad.unwrap();
     assert!((weight - 1.0015).abs() < 4e-4, "{weight}");
