@@ -280,7 +280,7 @@ fn tables_of_steps_are_read_or_refused_with_their_line() {
     assert_eq!(toml[0].axis.map(f64::to_bits), [0.0, 0.6, 0.8].map(f64::to_bits));
     for (name, text, expected) in [
         ("b.csv", "axis,rate\nz,1\n", "column \"rate\" is not one of"),
-        ("c.csv", "axis,rate_deg_per_s\nz,fast\n", "line 2: rate_deg_per_s is \"fast\", no number"),
+        ("c.csv", "axis,rate_deg_per_s\nz,fast\n", "line 2: rate_deg_per_s is \"fast\", not a number"),
         ("d.csv", "axis,rate_deg_per_s\nw,1\n", "step 1: axis \"w\" must be x, y, z"),
         (
             "e.toml",
