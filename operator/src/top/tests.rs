@@ -328,7 +328,7 @@ fn a_unit_that_takes_ticks_and_gives_none_is_a_fault() {
 fn a_status_of_another_version_is_told_of() {
     let mut bench = Bench::new(samples::fleet(1), 120, 24);
     bench.take(News::NotUnderstood);
-    assert!(bench.screen().contains("1 statuses not understood"), "{}", bench.screen());
+    assert!(bench.screen().contains("1 statuses of another version"), "{}", bench.screen());
 }
 
 /// `cargo test … -- --ignored screens`: writes what operators see to files, to be looked at.

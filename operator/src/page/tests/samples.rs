@@ -274,7 +274,7 @@ pub(crate) fn troubles() -> Vec<(&'static str, Status, Level, &'static str)> {
             "held",
             with(&|s| (s.output, s.calibration) = (Output::Held, None)),
             Level::Warning,
-            "nothing goes out",
+            "nothing is published",
         ),
         ("silent", with(&|s| s.input_rates = InputRates::default()), Level::Warning, "no raw ticks"),
         (
