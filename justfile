@@ -93,6 +93,10 @@ instructions:
 packages:
     .ci/run packages
 
+# Boot a Debian with that package in a container, and have systemd start, watch and stop the service (needs root and systemd-nspawn)
+boot:
+    packaging/boot
+
 # Build the programs without shared libraries, for containers
 static:
     packaging/static

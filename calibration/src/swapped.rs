@@ -179,7 +179,7 @@ mod tests {
         };
         let upside_down = of([0.1, -0.2, 9.8]).far().unwrap().to_string();
         assert!(
-            upside_down.contains("9.80 m/s²") && upside_down.contains("attitude that of another log"),
+            upside_down.contains("9.80 m/s²") && upside_down.contains("check attitude, signs"),
             "{upside_down}"
         );
         assert_eq!(of([-9.8, -0.2, 0.1]).far(), None, "swapped, which is told otherwise");

@@ -200,6 +200,6 @@ mod tests {
         over.write(&path, "again").unwrap().keep().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "again");
         let input = Place { overwrite: true, inputs: vec![path.clone()] };
-        assert!(input.sink(&path).unwrap_err().to_string().contains("would be written over"));
+        assert!(input.sink(&path).unwrap_err().to_string().contains("would be overwritten"));
     }
 }

@@ -157,7 +157,7 @@ fn documents_of_one_folder_that_name_one_unit_are_bad() {
     assert_eq!(output.status.code(), Some(78));
     let problems = lines(&output.stderr);
     assert_eq!(problems.len(), 2, "{problems:?}");
-    assert!(problems[0].starts_with(&format!("{a}:1:1: unit: unit ZLG-0001 is named by b.toml too")));
+    assert!(problems[0].starts_with(&format!("{a}:1:1: unit: unit ZLG-0001 is also named by b.toml")));
     assert!(lines(&output.stdout).is_empty());
     // One file given twice, and a candidate elsewhere, are no rivals.
     assert_eq!(check(&[&a, &a, &write(&other, "a.toml", &text)]).status.code(), Some(0));
@@ -200,7 +200,10 @@ fn what_is_nothing_or_no_text_is_bad() {
     let empty = write(&folder, "empty.toml", "# nothing\n");
     let output = check(&[&empty]);
     assert_eq!(output.status.code(), Some(78));
-    assert!(lines(&output.stderr)[0].starts_with(&format!("{empty}:1:1: holds no keys: say with --kind")));
+    assert!(
+        lines(&output.stderr)[0]
+            .starts_with(&format!("{empty}:1:1: has no keys: state its kind with --kind"))
+    );
     assert_eq!(check(&["--kind", "service", &empty]).status.code(), Some(0));
     assert_eq!(check(&["--kind", "calibration", &empty]).status.code(), Some(78));
 

@@ -145,7 +145,7 @@ fn check_tells_unsigned_unverified_and_wrong_apart() {
             format!("unit.toml:{line}:136: the signature line ends with CRLF"),
             "changed",
         ),
-        (format!("{signed}# ok\n"), format!("unit.toml:{}:1: something was put behind", line + 1), "changed"),
+        (format!("{signed}# ok\n"), format!("unit.toml:{}:1: something was put after", line + 1), "changed"),
         (
             format!("{signed}{signed}"),
             format!("unit.toml:{}:1: is a second signature line", 2 * line),
@@ -250,7 +250,7 @@ fn a_pair_of_keys_is_private_and_never_overwritten() {
     let (private, public) = (place.text("v1.2.key"), place.text("v1.2.pub"));
     let (code, _, err) = said(&place.run(&["keygen", "v1.2"]));
     assert_eq!(code, Some(1));
-    assert!(err.contains("v1.2.key exists and is left as it is"), "{err}");
+    assert!(err.contains("v1.2.key exists and is left unchanged"), "{err}");
     std::fs::remove_file(place.path("v1.2.key")).unwrap();
     assert_eq!(place.run(&["keygen", "v1.2"]).status.code(), Some(1), "half a pair is in the way too");
     assert_eq!(place.names(), ["trusted", "unit.toml", "v1.2.pub"]);
@@ -321,7 +321,7 @@ fn a_key_that_others_can_read_is_warned_about() {
     let (code, _, err) = said(&place.run(&["check", "unit.toml", "--trusted-keys", "trusted"]));
     assert_eq!(code, Some(0));
     assert!(
-        err.starts_with("trusted/anna.pub:1:1: says who is trusted, but everybody may write to it"),
+        err.starts_with("trusted/anna.pub:1:1: decides who is trusted, but everybody may write to it"),
         "{err}"
     );
 }
@@ -333,7 +333,7 @@ fn what_is_no_private_key_is_refused_by_name() {
     for (key, code, part) in [
         ("anna.pub", 78, "anna.pub:1:1: has a block \"PUBLIC KEY\", must be \"PRIVATE KEY\""),
         ("garbage.key", 78, "garbage.key:1:1: is damaged: "),
-        ("unit.toml", 78, "unit.toml:1:1: is no PEM text"),
+        ("unit.toml", 78, "unit.toml:1:1: is not PEM text"),
         ("missing.key", 1, "missing.key:1:1: cannot be read: "),
     ] {
         let (exit, out, err) = said(&place.run(&["sign", "unit.toml", "--key", key]));
@@ -360,7 +360,7 @@ fn every_bad_file_among_the_trusted_keys_is_named() {
         "trusted/anna.pub:1:1: is the same key as anna-again (",
         "trusted/gone.pub:1:1: cannot be read: ",
         "trusted/secret.pub:1:1: has a block \"PRIVATE KEY\", must be \"PUBLIC KEY\": this is the secret half",
-        "trusted/text.pub:1:1: is no PEM text",
+        "trusted/text.pub:1:1: is not PEM text",
     ]) {
         assert!(problem.starts_with(start), "{problem}\nnot {start}");
     }
@@ -381,7 +381,7 @@ fn a_private_key_among_the_trusted_ones_is_told_by_check_and_at_the_start() {
     place.write("service.toml", config);
     let told = |output: &Output, end: &str| {
         let stderr = String::from_utf8_lossy(&output.stderr);
-        let line = stderr.lines().find(|line| line.contains("bench.pem:1:1: holds a private key"));
+        let line = stderr.lines().find(|line| line.contains("bench.pem:1:1: is a private key"));
         assert!(line.is_some_and(|line| line.ends_with(end)), "{stderr}");
     };
     let output = place.run(&["check", "service.toml"]);

@@ -120,9 +120,9 @@ mod tests {
         for (name, overwrite, wanted) in [
             ("notes.txt", false, "exists"),
             ("no/such/x.toml", false, "first create the folder with mkdir -p "),
-            ("notes.txt/x.toml", false, "is no folder"),
+            ("notes.txt/x.toml", false, "is not a folder"),
             (".", true, "is a folder: give the name of a file in it"),
-            ("log.mcap", true, "would be written over"),
+            ("log.mcap", true, "would be overwritten"),
         ] {
             let (code, words) = refused(name, overwrite).unwrap();
             assert!(code == Exit::Usage && words.contains(wanted), "{name}: {words}");

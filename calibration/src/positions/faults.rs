@@ -188,7 +188,7 @@ mod tests {
             dead.starts_with("log, other: accelerometers x, y and z: one value in every tick, 0: "),
             "{dead}"
         );
-        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are no numbers"), "{none}");
+        assert!(none.starts_with("log, other: gyro y: 200 of 200 readings are not numbers"), "{none}");
         assert!(twice.starts_with("log, other: gyro z: the same in every tick as gyro x"), "{twice}");
     }
 }

@@ -159,7 +159,7 @@ mod tests {
             let words = accel(output, found, stated).unwrap();
             assert!(words.contains(name), "{words}");
         };
-        named(MetresPerSecondSquared, 0.102, 1.0, "in g that are taken for m/s²");
+        named(MetresPerSecondSquared, 0.102, 1.0, "in g taken as m/s²");
         named(MetresPerSecondSquared, 9.8, 1.0, "multiplied by g again");
         named(MetresPerSecondSquared, 102.0, 1.0, "in mg (or cm/s²)");
         named(MetresPerSecondSquared, 2.2, 1.0, "as for no usual unit of measure");
@@ -172,8 +172,8 @@ mod tests {
         );
         let gyros = |found: [f64; 3], stated| Beside::gyros(&found, &[stated; 3]).words();
         assert_eq!(gyros([1.309, -1.312, 1.311], 1.0), None);
-        assert!(gyros([0.0302; 3], 1.0).unwrap().contains("33.1 times what the document"));
-        assert!(gyros([0.0229; 3], 1.0).unwrap().contains("°/s that are taken for rad/s"));
+        assert!(gyros([0.0302; 3], 1.0).unwrap().contains("33.1 times those of the document"));
+        assert!(gyros([0.0229; 3], 1.0).unwrap().contains("°/s taken as rad/s"));
         assert!(
             gyros([6.5; 3], 1.3)
                 .unwrap()

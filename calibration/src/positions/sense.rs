@@ -33,7 +33,7 @@ pub(crate) fn found_along(kind: &str, sensors: &[Beside], which: &[usize]) -> St
         let [x, y, z] = [x, y, z].map(|c| fixed(c, 2));
         format!("of {kind} {} along ({x}, {y}, {z}), K = {}", name(*index), short(sensors[*index].scale))
     };
-    format!("Positive output is {}", which.iter().map(along).collect::<Vec<_>>().join("; "))
+    format!("Positive output {}", which.iter().map(along).collect::<Vec<_>>().join("; "))
 }
 
 /// Places of three sensors among the stated ones: whose stated axis each lies along, and whether the same way round. `None` where

@@ -132,7 +132,7 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
     }
     std::fs::write(&nothing, "").unwrap();
     let refused = fails(&["drift", &nothing], 1);
-    assert!(refused.contains("nothing.mcap is empty, it has 0 bytes"), "{refused}");
+    assert!(refused.contains("nothing.mcap is empty"), "{refused}");
 }
 
 #[test]
@@ -294,6 +294,6 @@ fn a_log_that_is_too_short_for_a_drift_says_so_in_its_first_line() {
     record(Path::new(&log), &scenario);
     let said = succeeds(&["drift", &log]);
     let first = said.lines().next().unwrap();
-    assert!(first.contains("a drift slower than this log of 0.222 h can tell"), "{first}");
+    assert!(first.contains("a drift slower than this log of 0.222 h can show"), "{first}");
     assert!(!first.contains("drift σ"), "{first}");
 }

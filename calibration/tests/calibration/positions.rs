@@ -162,7 +162,7 @@ fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
             "one repeated",
             vec![0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 2],
             13,
-            "more than once, all of them used: Z down a",
+            "repeated positions, all of them used: Z down a",
         ),
         ("another order", vec![0, 4, 2, 3, 1, 7, 5, 6, 11, 9, 10, 8], 12, ""),
         ("six", vec![0, 2, 3, 4, 5, 6], 6, "do not separate the stand's level from the axes"),

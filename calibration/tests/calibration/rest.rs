@@ -79,7 +79,7 @@ fn drift_leaves_single_readings_far_beyond_the_noise_out() {
     let spikes = log(folder.path(), spoil, |_| true);
     let document = shipped("FOG-0001.toml").display().to_string();
     let told = succeeds(&["drift", &spikes, "--calibration", &document]);
-    assert!(told.contains("; left out on all axes, since"), "{told}");
+    assert!(told.contains("; left out on all axes, because"), "{told}");
     let told = succeeds(&["drift", &spikes]);
     assert!(told.contains("gyro x: 9 single readings are far beyond the noise"), "{told}");
     assert!(told.contains("; left out: look"), "{told}");

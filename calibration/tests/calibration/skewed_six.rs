@@ -180,7 +180,7 @@ fn six_sensors_are_judged_and_a_hand_tumbled_unit_of_six_is_refused() {
     assert_eq!(report["verdicts"].as_array().unwrap().len(), 6, "three axes of each kind");
     let (code, _, errors) =
         words(&calibrate(&["tumble", &log, "--calibration", &base, "--gravity", "9.8154"]));
-    assert!(code == Some(1) && errors.contains("6 accelerometers: |f| = g is for three"), "{errors}");
+    assert!(code == Some(1) && errors.contains("6 accelerometers: |f| = g needs three"), "{errors}");
     assert!(errors.contains("positions"), "{errors}");
 }
 

@@ -106,7 +106,7 @@ fn both_on_a_table_are_fitted_and_one_document_takes_one() {
     assert_eq!(units(&json(&[&fit[..], &["--out", &path("new.toml")]].concat())), UNITS);
     let alone = json(&[&fit[..], &["--calibration", &path("new-FOG-0001.toml")]].concat());
     assert_eq!(alone["unit"], "FOG-0001");
-    assert!(alone["warnings"].to_string().contains("unit FOG-0002 too, which is left alone"), "{alone}");
+    assert!(alone["warnings"].to_string().contains("also have unit FOG-0002, which is left out"), "{alone}");
 }
 
 #[test]

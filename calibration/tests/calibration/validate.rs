@@ -192,7 +192,11 @@ fn what_cannot_be_judged_is_refused_in_words() {
     let mut dead = fibre_optic(5, "FOG-0001", 600.0);
     dead.failures.push(Failure { sensor: FailingSensor::Gyro(1), at_s: 0.0, fault: Fault::Stuck });
     record(Path::new(&path("dead.mcap")), &dead);
-    refused(&["validate", &good, &path("dead.mcap")], 1, "gyro y: it does not change: the sensor is dead");
+    refused(
+        &["validate", &good, &path("dead.mcap")],
+        1,
+        "gyro y: its reading is constant: the sensor is dead",
+    );
     refused(&["validate", &good, &path("none.mcap")], 1, "none.mcap");
     refused(&["validate", &good, &path("none.csv")], 1, "none.csv");
 }

@@ -79,7 +79,7 @@ fn what_cannot_be_reached_is_said_with_its_address_and_the_next_step() {
 
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = silent.local_addr().unwrap().to_string();
-    let parts = [&*format!("tcp/{address}: something listens there but does not answer as a service")];
+    let parts = [&*format!("tcp/{address}: something listens there but does not answer within")];
     refused(&["status", "--connect", &address, "--timeout", "0.5"], &[], 1, &parts);
 
     let parts = ["tcp/no.such.host.invalid:7447: the host name is not known"];

@@ -229,7 +229,7 @@ mod tests {
             ("x,1", "column sequence has \"x\""),
             ("1,2,3", "column ticks is missing"),
             (&row.replace("-1,", "2,"), "must be 1, -1 or empty"),
-            (&format!("{},9", row.trim_end()), "behind the last column"),
+            (&format!("{},9", row.trim_end()), "after the last column"),
             (&row.replace("0.5 0.5 0.5", "0.5"), "column angle_sigma_rad has 10 numbers, must be 12 or none"),
         ] {
             let error = read_tick(bad.trim_end()).unwrap_err();

@@ -244,7 +244,7 @@ fn surplus_cells_are_refused_unless_they_are_empty() {
     let fault = error(&header, b"t,x,y,T\n10,1,7,20,\n20,2,7,20,,5\n");
     assert_eq!((fault.line, fault.column), (3, 12), "{fault}");
     assert!(
-        fault.to_string().contains("column 6: \"5\" is too much, the header has only 4 columns"),
+        fault.to_string().contains("column 6: \"5\" is one too many, the header has only 4 columns"),
         "{fault}"
     );
     let spaces = mapping("delimiter = \"whitespace\"", STAMPS);

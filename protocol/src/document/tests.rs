@@ -127,7 +127,7 @@ fn units_become_si() {
 fn doubts_are_warnings() {
     for (from, to, key, message) in [
         ("smoothing_s = 20.0", "smoothing_s = 20.4", "temperature.filter.smoothing_s", "20 s is used"),
-        ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", which no sensor"),
+        ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", followed by no sensor"),
         ("channel = \"coil\"\n", "", "gyro.sensor[3].lag", "has no effect"),
         (
             "range_deg_c = [-65.0, 110.0]",

@@ -204,7 +204,7 @@ fn what_does_not_fit_the_base_is_told_at_once_with_its_place() {
         "{}",
         listed(&problems)
     );
-    assert!(problems[2].message.contains("is no gyro of the document; its gyros are: x, y, z, s"));
+    assert!(problems[2].message.contains("not a gyro of the document; its gyros are: x, y, z, s"));
 }
 
 /// An overlay that is broken in one place: text to replace, replacement, text on the line of the problem, key, part
@@ -225,7 +225,7 @@ const BROKEN: [Case; 19] = [
         "name = \"x\"",
         "name = \"x\"\nstatic_bias_change_deg_per_h = -0.02",
         "gyro[1].name",
-        "the name of gyro[0] too",
+        "also the name of gyro[0]",
     ),
     (
         "= 0.031",

@@ -269,6 +269,6 @@ mod tests {
         let error = batcher
             .gyro(OutputKind::Counts, GyroTick { sequence: 7, readings, ..GyroTick::default() })
             .unwrap_err();
-        assert_eq!(error.to_string(), "tick 7: its readings are no counts of 32 bits");
+        assert_eq!(error.to_string(), "tick 7: its readings are not counts of 32 bits");
     }
 }

@@ -190,7 +190,7 @@ fn converted_line_ends_are_called_so() {
     // The last line's end is the first to get lost.
     let words = refused(text.replace('\n', "\r\n").trim_end());
     assert!(
-        words.contains("changed after signing, its line ends were converted to CRLF; turn them back"),
+        words.contains("changed after signing, its line ends were converted to CRLF; convert them back"),
         "{words}"
     );
 
@@ -198,7 +198,7 @@ fn converted_line_ends_are_called_so() {
     assert!(is_by(&crlf, 1), "a text that has CRLF when it is signed");
     assert!(refused(&crlf.replace("\r\n", "\n")).contains("its line ends were converted from CRLF to LF"));
     let mixed = signed(&TEXT.replacen('\n', "\r\n", 1));
-    assert!(refused(&mixed.replace("\r\n", "\n")).contains("; take the document as it was signed"));
+    assert!(refused(&mixed.replace("\r\n", "\n")).contains("; restore the signed text"));
 }
 
 #[test]

@@ -95,7 +95,7 @@ mod tests {
         let status = |state, output| Status { state, output, ..Status::default() };
         let running = State::RunningWithReversal;
         let table = [
-            (None, "says nothing of the unit"),
+            (None, "has no status of the unit"),
             (Some(status(State::Standby, Output::Calibrated)), "is in standby"),
             (Some(status(State::SelfTest, Output::Calibrated)), "is in self-test"),
             (Some(status(running, Output::Held)), "uncalibrated = \"hold\""),

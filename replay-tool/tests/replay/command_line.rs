@@ -109,7 +109,7 @@ fn every_end_has_its_exit_code() {
         2,
         "must be max",
     );
-    check(&replay(path, &["simulate", "--preset", "none", "--out", "x.csv"]), 2, "there are zeeman-rest");
+    check(&replay(path, &["simulate", "--preset", "none", "--out", "x.csv"]), 2, "presets are zeeman-rest");
     check(
         &replay(path, &["play", "mems.csv", "mems.csv", "-m", "mems.mapping.toml", "-u", "a"]),
         2,

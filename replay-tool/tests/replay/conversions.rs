@@ -294,7 +294,7 @@ fn nothing_is_written_over_and_nothing_half_is_left() {
     let run = |args: &[&str]| replay(folder.path(), &[&["convert"], args].concat());
     check(&run(&["x.mcap", "--out", "x.csv"]), 2, "x.csv exists");
     check(&run(&["x.mcap", "--out", "y.csv"]), 2, "y.mapping.toml exists");
-    check(&run(&["x.mcap", "--out", "full", "--to", "parquet"]), 2, "the folder full has something in it");
+    check(&run(&["x.mcap", "--out", "full", "--to", "parquet"]), 2, "the folder full is not empty");
     check(&run(&["x.mcap", "--out", "x.csv", "--to", "ros2"]), 2, "another kind of output");
     check(&run(&["x.mcap", "--out", "x.mcap"]), 2, "a recording already");
     check(&run(&["x.mcap", "--out", "other"]), 2, "does not say what to convert to");

@@ -89,7 +89,12 @@ fn what_cannot_be_read_right_is_refused_with_line_and_column() {
         ),
         ("time standing still", ROWS.replace("\n30;", "\n20;"), 1, "time must increase"),
         ("a decimal comma", ROWS.replacen("-1.25", "-1,25", 1), 1, "log.csv:2:8: column 3 \"y\": \"-1,25\""),
-        ("a cell too many", ROWS.replacen("20.5", "20;5", 1), 1, "log.csv:2:19: column 6: \"5\" is too much"),
+        (
+            "a cell too many",
+            ROWS.replacen("20.5", "20;5", 1),
+            1,
+            "log.csv:2:19: column 6: \"5\" is one too many",
+        ),
     ];
     let semicolons = mapping("delimiter = \"semicolon\"", "");
     for (name, log, expected, words) in &table {

@@ -59,7 +59,7 @@ mod tests {
         assert!(read("[metrics]\nlisten = 9464").is_err());
         assert!(
             read("[metrics]\nport = 9464").unwrap_err()[0]
-                .contains("not yet used here: listen, allow_remote")
+                .contains("keys not used here: listen, allow_remote")
         );
     }
 }

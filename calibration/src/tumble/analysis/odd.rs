@@ -154,7 +154,7 @@ mod tests {
             assert!(said.starts_with(words), "{said}");
             assert!(!said.contains("-0.00") && !said.contains("?."), "{said}");
         };
-        let along = "A positive output is found of gyro x along (0.00, 1.00, 0.00), K = 1.31; of gyro y along (1.00, 0.02, 0.00), K = 1.31";
+        let along = "Positive output of gyro x along (0.00, 1.00, 0.00), K = 1.31; of gyro y along (1.00, 0.02, 0.00), K = 1.31";
         pointed_out(
             [y, x, z],
             &format!("gyros x and y look swapped: check the columns in the mapping. {along}"),

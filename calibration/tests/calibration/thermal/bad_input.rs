@@ -118,7 +118,7 @@ fn constant_temperature_is_refused() {
     // Volts of a thermometer, which nothing converts.
     refused(
         run(0..5400, |s| Second { deg_c: 1.5 + 0.01 * usual(s).deg_c, ..usual(s) }),
-        &["stays between 1.40 and 1.90, which are taken as °C", "volts", "--calibration", "right column"],
+        &["stays between 1.40 and 1.90, taken as °C", "volts", "--calibration", "right column"],
     );
 }
 
@@ -182,7 +182,7 @@ fn terms_that_are_kept_under_another_filter_are_told() {
         let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
         let made = fit(Some(&base), (&[zero()], &[]), &settings, Origin::default(), ()).unwrap();
         assert!(made.any_accepted && made.written.document.gyro.sensor[1].lag == base.gyro.sensor[1].lag);
-        made.report.warnings.iter().any(|words| words.starts_with("gyro y: refused, with terms from before"))
+        made.report.warnings.iter().any(|words| words.starts_with("gyro y: refused, and keeps rate terms"))
     };
     assert!(told(old_s + 30.0) && !told(old_s));
 }

@@ -129,7 +129,7 @@ async fn a_damaged_acceptance_is_told_with_what_is_in_force_in_its_place() {
         let status = until_service(&stand, |_| true).await;
         let words = told(&status, "audit_file").expect("told").to_owned();
         assert!(words.contains("unit ZLG-7: revision 3 was accepted"), "{words}");
-        assert!(words.contains("revision 2, an older one, is in force"), "{words}");
+        assert!(words.contains("the older revision 2 is in force"), "{words}");
         assert_eq!(stand.revisions(UNIT, 20).await, [2]);
         assert_accepted(&stand.swap(UNIT, &document(UNIT, 3.0), &plain()).await, 4);
         until_service(&stand, |status| told(status, "audit_file").is_none()).await;

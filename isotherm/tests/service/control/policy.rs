@@ -66,7 +66,7 @@ async fn a_document_older_than_the_one_in_force_is_warned_about_or_refused() {
     let older = ["created: is 2026-01-05: older than the document in force", "2999-01-01T00:00:00"];
     policy(set, 25.0, &document(UNIT, 2.0), &older).await;
     let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
-    policy(set, 25.0, &undated, &["created: is missing: whether the document is older"]).await;
+    policy(set, 25.0, &undated, &["created: is missing: the document may be older"]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -80,7 +80,7 @@ fn changes_are_told_by_key_value_and_size() {
         (
             "[3.18, 0.0161]",
             "[3.18]",
-            &["gyro.sensor[2].magnetic_bias.coefficients_deg_per_h[1]: gone, was 0.0161"],
+            &["gyro.sensor[2].magnetic_bias.coefficients_deg_per_h[1]: removed, was 0.0161"],
         ),
         (
             "[3.18, 0.0161]",
@@ -101,7 +101,7 @@ fn changes_are_told_by_key_value_and_size() {
                 "gyro.sensor[1].slow_meander.knots_deg_per_h[0][1]: new, 1.0",
                 "gyro.sensor[1].slow_meander.knots_deg_per_h[1][0]: new, 70.0",
                 "gyro.sensor[1].slow_meander.knots_deg_per_h[1][1]: new, 2.0",
-                "gyro.sensor[1].slow_meander.value_deg_per_h: gone, was -0.047",
+                "gyro.sensor[1].slow_meander.value_deg_per_h: removed, was -0.047",
             ],
         ),
     ] {

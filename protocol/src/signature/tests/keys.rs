@@ -67,7 +67,7 @@ fn what_is_no_key_says_what_it_is() {
             .contains("has a block \"ENCRYPTED PRIVATE KEY\", must be \"PRIVATE KEY\": remove")
     );
     assert!(private("-----BEGIN OPENSSH PRIVATE KEY-----\n").contains("openssl genpkey -algorithm ed25519"));
-    assert!(public(&RFC_PUBLIC.repeat(2)).starts_with("holds 2 PEM blocks, must hold one"));
+    assert!(public(&RFC_PUBLIC.repeat(2)).starts_with("has 2 PEM blocks, must have one"));
     let other = public(OTHER_ALGORITHM);
     assert!(other.starts_with("is a key of algorithm 1.2.840.10045.2.1, must be Ed25519"), "{other}");
     let other = private(&OTHER_ALGORITHM.replace("PUBLIC", "PRIVATE"));

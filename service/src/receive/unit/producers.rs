@@ -87,7 +87,7 @@ mod tests {
         for series in [1, 2, 1, 2, 1] {
             producers.heard(series, now);
         }
-        assert!(producers.look(&counters(400, 0)).unwrap().contains("series 2 and of series 1"));
+        assert!(producers.look(&counters(400, 0)).unwrap().contains("series 2 and 1"));
         assert_eq!(producers.look(&counters(800, 0)), None, "it is over");
         assert!(producers.look(&counters(1200, 200)).unwrap().contains("200 of 400"));
     }

@@ -44,7 +44,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "channels = [\"house\"]",
         "\"house\"",
         "gyro.orientation.thermal.channels[0]",
-        "is \"house\", which is no temperature channel",
+        "is \"house\", not a temperature channel",
     ),
     (
         "two gyros of one name",
@@ -52,7 +52,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "name = \"x\"",
         "name = \"x\"\nchannel = \"gyro1\"",
         "gyro.sensor[1].name",
-        "the name of gyro.sensor[0] too",
+        "also the name of gyro.sensor[0]",
     ),
     (
         "filter left out",
@@ -196,7 +196,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "name = \"half-wave x\"",
         "name = \"half-wave x\"\nrange_v = [41.0, 55.0]\n\n[[self_test.voltage]]\nname = \"half-wave z\"",
         "self_test.voltage[1].name",
-        "the name of self_test.voltage[0] too",
+        "also the name of self_test.voltage[0]",
     ),
     (
         "counter with the name of a voltage",
@@ -204,7 +204,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "name = \"half-wave y\"",
         "name = \"half-wave y\"\nmax",
         "self_test.counter[0].name",
-        "the name of self_test.voltage[1] too",
+        "also the name of self_test.voltage[1]",
     ),
     (
         "table for an array of tables",

@@ -33,7 +33,7 @@ pub(super) const CASES: [Case; 32] = [
         "channels = [\"rock\"]",
         "rock",
         "gyro.orientation.thermal.channels[0]",
-        "is \"rock\", which is no temperature channel",
+        "is \"rock\", not a temperature channel",
     ),
     (
         "two sensors of one name",
@@ -41,7 +41,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"x\"",
         "name = \"x\"\nchannel = \"block\"\nincrement_weight_arcsec_per_count = 0.9841",
         "gyro.sensor[1].name",
-        "the name of gyro.sensor[0] too",
+        "also the name of gyro.sensor[0]",
     ),
     (
         "filter left out",
@@ -233,7 +233,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"half-wave x\"",
         "name = \"half-wave x\"\nrange_v = [41.0, 55.0]\n\n[[self_test.counter]]",
         "self_test.voltage[1].name",
-        "the name of self_test.voltage[0] too",
+        "also the name of self_test.voltage[0]",
     ),
     (
         "counter with the name of a voltage",
@@ -241,7 +241,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"half-wave y\"",
         "name = \"half-wave y\"\nmax",
         "self_test.counter[0].name",
-        "the name of self_test.voltage[1] too",
+        "also the name of self_test.voltage[1]",
     ),
     (
         "table for an array of tables",

@@ -69,7 +69,7 @@ pub(super) const FAMILIES: &[Family] = &[
     Family::counter(
         ("isotherm_late_receipts", ""),
         &[],
-        "Times that a subscriber had not taken within 1 s what was published: meanwhile ticks are dropped for it; the status names it",
+        "Receipts that took over 1 s: meanwhile ticks are dropped for that subscriber; the status names it",
         |look, out| out.counter(&[], look.late_receipts),
     ),
     Family::gauge(

@@ -11,7 +11,7 @@ class UnitsPage {
     this.group = null;
     this.chips = make("div", { className: "chips", role: "group", "aria-label": "Show" });
     this.search = make("input", {
-      type: "search", placeholder: "Serial, state or reason", "aria-label": "Filter units", spellcheck: false,
+      type: "search", placeholder: "Filter by serial, state or reason", "aria-label": "Filter units", spellcheck: false,
       oninput: () => this.draw(),
     });
     this.body = make("tbody");
