@@ -115,7 +115,9 @@ impl Bar {
         self.since += 1;
         if self.since >= STRIDE {
             self.look();
-            message().into_iter().for_each(|message| self.say(message));
+            if let Some(message) = message() {
+                self.say(message);
+            }
         }
     }
 

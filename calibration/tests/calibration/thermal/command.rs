@@ -5,6 +5,7 @@ use std::process::{Command, Output};
 use std::time::SystemTime;
 
 use isotherm_calibration::document::written::Written;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Span;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
@@ -162,7 +163,7 @@ fn folders_recordings_and_several_units() {
         let (words, code) = said(at, &args);
         assert!(code == Some(wanted) && words.contains("gyro y: refused: every reading is 0"), "{words}");
         let gyros = Written::read(&at.join(&out)).unwrap().document.gyro.sensor;
-        assert_eq!([0, 1].map(|gyro| gyros[gyro].static_bias.is_some()), [true, false]);
+        assert_eq!([0, 1].map(|gyro| gyros[gyro].terms.curve(Feature::One).is_some()), [true, false]);
     }
 
     // Of several units one is not judged: it is fitted, and that is said.

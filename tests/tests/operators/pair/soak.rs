@@ -88,7 +88,7 @@ async fn a_pair_that_is_never_left_alone_does_not_grow() {
     let mut pauses = Vec::new();
     while begin.elapsed() < whole {
         // Undisturbed but for swaps, commands and those who watch.
-        stand.sink.take_latencies();
+        drop(stand.sink.take_latencies());
         let until = Instant::now() + INTERVAL;
         while Instant::now() < until {
             let index = usize::try_from(swaps).unwrap() % stand.judged;
