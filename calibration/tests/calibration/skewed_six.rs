@@ -48,7 +48,7 @@ fn document() -> Document {
     };
     document.gyro.sensor = NAMES.iter().enumerate().map(gyro).collect();
     let accel = document.accel.as_mut().unwrap();
-    accel.output = isotherm_protocol::document::AccelOutput::MetresPerSecondSquared;
+    accel.output = AccelOutput::MetresPerSecondSquared;
     accel.orientation.rows = rows;
     let one = || {
         Curve::new(Shape::Constant { value: 1.0 }).in_unit(AccelOutput::MetresPerSecondSquared.scale_unit())

@@ -232,7 +232,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let fit = fit.as_ref().unwrap();
         assert!(!sensor.terms.has(Feature::Meander));
-        let bias = format!("{:?}", sensor.static_bias.as_ref().unwrap().shape());
+        let bias = format!("{:?}", sensor.terms.curve(Feature::One).unwrap().shape());
         assert!(bias.contains("coefficients: [0.0, "), "{bias}");
         let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
         assert!(got.abs() > 100.0 * sigma);

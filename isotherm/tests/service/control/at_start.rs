@@ -33,7 +33,7 @@ async fn a_bad_document_is_told_at_every_start_and_a_strict_one_is_refused() {
         assert_eq!(refusals(&stand).await, 1, "it is written down once");
         stand.stop().await;
         let strict = Settings { strict_start: true, ..folders.settings() };
-        let session = open(&strict.session).await.unwrap();
+        let session = open(&strict.zenoh.session).await.unwrap();
         let error = start(strict, session).await.expect_err("refused");
         assert!(matches!(error, ServiceError::BadCalibrations { count: 1 }), "{error}");
         assert_eq!(error.exit() as u8, 78);
