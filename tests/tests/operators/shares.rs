@@ -16,7 +16,7 @@ use isotherm_simulator::presets::mems_chamber;
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::judged::{Sink, Source};
 use isotherm_tests::pair::{Pair, until};
-use isotherm_tests::process::{resources, run};
+use isotherm_tests::process::{Service, resources, run};
 use isotherm_tests::streams;
 use zenoh::Session;
 
@@ -120,7 +120,7 @@ async fn two_pairs_share_four_hundred_units_and_a_unit_that_nobody_takes_is_show
     }
     until_shared(&session, true).await;
 
-    let ids = pairs.iter().flat_map(|pair| pair.services.iter().flatten()).map(|service| service.id());
+    let ids = pairs.iter().flat_map(|pair| pair.services.iter().flatten()).map(Service::id);
     for used in ids.map(resources) {
         println!("{} units: {} kB, {:?} of computing", UNITS, used.resident_kb, used.cpu);
     }

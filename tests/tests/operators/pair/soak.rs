@@ -88,7 +88,7 @@ async fn a_pair_that_is_never_left_alone_does_not_grow() {
     let mut pauses = Vec::new();
     while begin.elapsed() < whole {
         // Undisturbed but for swaps, commands and those who watch.
-        stand.sink.take_latencies();
+        drop(stand.sink.take_latencies());
         let until = Instant::now() + INTERVAL;
         while Instant::now() < until {
             let index = usize::try_from(swaps).unwrap() % stand.judged;
@@ -116,11 +116,8 @@ async fn a_pair_that_is_never_left_alone_does_not_grow() {
             (failovers, next) = (failovers + 1, Instant::now() + FAILOVER);
         }
     }
-    let seen = watchers.into_iter().map(|watcher| {
-        watcher.abort();
-        watcher
-    });
-    for watcher in seen {
+    watchers.iter().for_each(tokio::task::JoinHandle::abort);
+    for watcher in watchers {
         assert!(watcher.await.is_err_and(|ended| ended.is_cancelled()), "a watcher ended by itself");
     }
     pauses.sort_unstable();
