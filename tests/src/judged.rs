@@ -218,8 +218,8 @@ impl Ledger {
         if !right {
             self.account.wrong += 1;
             let expected = wanted.as_ref().map(|it| (it.revision.counter, it.tick.flags, it.tick.missed));
-            let come = (revision.counter, tick.flags, tick.missed);
-            let words = || format!("sequence {}: {come:?} where {expected:?} was expected", tick.sequence);
+            let got = (revision.counter, tick.flags, tick.missed);
+            let words = || format!("sequence {}: {got:?} where {expected:?} was expected", tick.sequence);
             self.account.first_wrong.get_or_insert_with(words);
         }
         if !self.arbiter.wins(tick) {

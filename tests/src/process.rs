@@ -108,7 +108,9 @@ pub fn resources(id: u32) -> Resources {
 pub fn next_descriptor(id: u32) -> usize {
     let folder = PathBuf::from(format!("/proc/{id}/fd"));
     assert!(folder.exists(), "the process is there");
-    (0..).find(|number| std::fs::symlink_metadata(folder.join(number.to_string())).is_err()).unwrap_or(0)
+    (0..65_536)
+        .find(|number| std::fs::symlink_metadata(folder.join(number.to_string())).is_err())
+        .unwrap_or(0)
 }
 
 /// What a process uses.

@@ -30,8 +30,8 @@ pub(crate) const LEASE: Duration = Duration::from_millis(500);
 const TICK: Duration = Duration::from_millis(5);
 /// Ticks that come through before a fault counts as over.
 const AFTER: u64 = 50;
-/// How far ahead a swap is scheduled, in ticks.
-const AHEAD: u64 = 100;
+/// How far ahead a swap is scheduled, in ticks, where the disk is not slow.
+pub(crate) const AHEAD: u64 = 100;
 
 /// Where somebody connects to.
 #[derive(Debug)]
@@ -256,15 +256,15 @@ impl Line {
         books
     }
 
-    /// Puts another document in force for every unit, from a tick on that is still to come; the last answer.
-    pub(crate) async fn swap(&mut self, bias: f64) -> SwapReply {
+    /// Puts another document in force for every unit, from a tick on that is so many ahead; the last answer.
+    pub(crate) async fn swap(&mut self, bias: f64, ahead: u64) -> SwapReply {
         self.revision += 1;
         let units = self.sources.lock().await.len();
         let mut last = None;
         for index in 0..units {
             let mut sources = self.sources.lock().await;
             let source = &mut sources[index];
-            let (unit, at) = (source.unit().to_owned(), source.last + AHEAD);
+            let (unit, at) = (source.unit().to_owned(), source.last + ahead);
             let text = document(&unit, bias);
             source.swap(&text, self.revision, At::Sequence(at));
             drop(sources);

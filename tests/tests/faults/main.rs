@@ -5,12 +5,7 @@
 //! stands still and subscribers that hang (`logs`, `receipts`), a state folder that is damaged, removed or full (the service's own
 //! tests and docs/operations.md), one of two services (`operators`).
 
-#![expect(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "what does not hold ends the test"
-)]
+#![expect(clippy::expect_used, clippy::unwrap_used, reason = "what does not hold ends the test")]
 
 mod disturb;
 mod line;

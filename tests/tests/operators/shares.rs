@@ -6,17 +6,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use isotherm_bus::{SessionOptions, close, open};
-use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{self, RawStream, UnitId};
 use isotherm_protocol::pair::{PairReport, Role};
-use isotherm_protocol::raw::GyroBatch;
+use isotherm_protocol::raw::TemperatureBatch;
 use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::mems_chamber;
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::judged::{Sink, Source};
 use isotherm_tests::pair::{Pair, until};
-use isotherm_tests::process::{resources, run};
+use isotherm_tests::process::{Service, resources, run};
 use isotherm_tests::streams;
 use zenoh::Session;
 
@@ -89,8 +88,9 @@ async fn two_pairs_share_four_hundred_units_and_a_unit_that_nobody_takes_is_show
     let counting = counting.await.unwrap();
     // A unit of neither group.
     let stray = UnitId::new("C-000").unwrap();
-    let ticks = (0..10).map(|tick| streams::gyro(tick, &[0.1, 0.2, 0.3])).collect();
-    let frame = codec::encode(&GyroBatch { output: OutputKind::Mean, ticks }).unwrap();
+    // Temperatures alone are heard of units that an instance does not take.
+    let readings = vec![streams::temperature(0, 20.0)];
+    let frame = codec::encode(&TemperatureBatch { readings }).unwrap();
 
     let over = Arc::new(AtomicBool::new(false));
     let playing = tokio::spawn({
@@ -99,7 +99,7 @@ async fn two_pairs_share_four_hundred_units_and_a_unit_that_nobody_takes_is_show
             let mut times = tokio::time::interval(Duration::from_millis(100));
             while !over.load(Ordering::SeqCst) {
                 times.tick().await;
-                session.put(key::raw(&stray, RawStream::Gyro), frame.clone()).await.unwrap();
+                session.put(key::raw(&stray, RawStream::Temperature), frame.clone()).await.unwrap();
                 for source in &mut sources {
                     for _ in 0..BATCH {
                         source.tick().await;
@@ -120,7 +120,7 @@ async fn two_pairs_share_four_hundred_units_and_a_unit_that_nobody_takes_is_show
     }
     until_shared(&session, true).await;
 
-    let ids = pairs.iter().flat_map(|pair| pair.services.iter().flatten()).map(|service| service.id());
+    let ids = pairs.iter().flat_map(|pair| pair.services.iter().flatten()).map(Service::id);
     for used in ids.map(resources) {
         println!("{} units: {} kB, {:?} of computing", UNITS, used.resident_kb, used.cpu);
     }

@@ -116,11 +116,8 @@ async fn a_pair_that_is_never_left_alone_does_not_grow() {
             (failovers, next) = (failovers + 1, Instant::now() + FAILOVER);
         }
     }
-    let seen = watchers.into_iter().map(|watcher| {
-        watcher.abort();
-        watcher
-    });
-    for watcher in seen {
+    watchers.iter().for_each(tokio::task::JoinHandle::abort);
+    for watcher in watchers {
         assert!(watcher.await.is_err_and(|ended| ended.is_cancelled()), "a watcher ended by itself");
     }
     pauses.sort_unstable();
