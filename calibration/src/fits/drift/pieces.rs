@@ -103,8 +103,12 @@ impl Grid {
                 Ok(bad) => {
                     if bad > 0 {
                         grid.notes.push(format!(
-                            "{called}: {} not valid numbers and count as missing.",
-                            counted(bad, "reading is", "readings are")
+                            "{called}: {} as missing.",
+                            counted(
+                                bad,
+                                "reading is not a number and counts",
+                                "readings are not numbers and count"
+                            )
                         ));
                     }
                     grid.sensors.push(Sensor { name, pieces: cut(column, &gaps, bridge) });
@@ -305,13 +309,15 @@ mod tests {
         let grid = Grid::of(columns(times.clone(), vec![wave(1000), vec![7.0; 1000], some_bad])).unwrap();
         assert_eq!((grid.sensors.len(), grid.sensors[1].pieces.len()), (2, 1), "one bad reading is bridged");
         assert!(grid.refused[0].contains("gyro 1: every reading is 7"), "{:?}", grid.refused);
-        assert!(grid.notes.iter().any(|note| note.contains("1 reading is not valid numbers")));
+        assert!(
+            grid.notes.iter().any(|note| note.contains("1 reading is not a number and counts as missing"))
+        );
         let mut back = times.clone();
         back[10] = 0;
         for (times, values, words) in [
             (times[..63].to_vec(), vec![wave(63)], "at least 64"),
             (back, vec![wave(1000)], "time does not increase at tick 11"),
-            (times.clone(), vec![vec![f64::NAN; 1000]], "100.0 %"),
+            (times.clone(), vec![vec![f64::NAN; 1000]], "1000 of 1000 readings are not numbers"),
             (times, vec![vec![0.0; 1000]; 3], "the sensor is dead"),
         ] {
             let error = Grid::of(columns(times, values)).unwrap_err().to_string();

@@ -141,7 +141,7 @@ fn folders_recordings_and_several_units() {
     one_way.extend(["--accept-partial", "--out", "none.toml", "--html", "none.html"]);
     let (words, code) = said(at, &one_way);
     assert!(
-        code == Some(1) && words.contains("every sensor is refused: none.toml is not written"),
+        code == Some(1) && words.contains("every sensor is refused: nothing is written to none.toml"),
         "{words}"
     );
     assert!(!at.join("none.toml").exists() && at.join("none.html").exists());

@@ -150,10 +150,10 @@ pub(super) const CASES: [Case; 32] = [
     (
         "regressor of no channel",
         "increment_weight_error = { kind = \"polynomial\", reference_deg_c = 25.0, coefficients_ppm = [0.0, -6.1, 0.011], range_deg_c = [-40.0, 70.0] }",
-        "regressor = [{ channel = \"supply\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
-        "supply",
+        "regressor = [{ channel = \"mains\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
+        "mains",
         "gyro.sensor[3].regressor[0].channel",
-        "is \"supply\", not a channel; the channels are: block, coil, accel, board",
+        "is \"mains\", not a channel; the channels are: block, coil, accel, board",
     ),
     (
         "difference to no channel",
