@@ -38,6 +38,10 @@ pub(super) struct MotionMemory {
 
 /// What of a unit follows motion, under its calibration or one that a swap leads away from.
 #[derive(Debug, Clone, Copy, Default)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "terms that a unit has or has not, each asked for by its name"
+)]
 pub(super) struct Follows {
     /// Drift with the specific force.
     force: bool,
