@@ -54,7 +54,7 @@ fn property<K: SensorKind>(generator: &mut SchemaGenerator, term: &Term) -> Json
                 ("braking", "\"−\" curve, over the same argument: Ṫ·T̈ < 0. Source: 000."),
             ];
             let properties = branches.map(|(key, meaning)| (key.into(), described(meaning, curve.clone())));
-            table(properties.into_iter().collect(), &["run_up", "braking"])
+            table(properties, &["run_up", "braking"])
         }
         TermForm::Each(parameter) => {
             let [least, most] = parameter.range;
@@ -63,7 +63,7 @@ fn property<K: SensorKind>(generator: &mut SchemaGenerator, term: &Term) -> Json
                 (parameter.key.into(), described(parameter.meaning, number)),
                 ("gain".into(), described("g(T).", curve)),
             ];
-            list(parameter.most, table(properties.into_iter().collect(), &[parameter.key, "gain"]))
+            list(parameter.most, table(properties, &[parameter.key, "gain"]))
         }
         TermForm::Regressors(most) => {
             let mut regressor = Regressor::json_schema(generator);
@@ -78,7 +78,8 @@ fn property<K: SensorKind>(generator: &mut SchemaGenerator, term: &Term) -> Json
     }
 }
 
-fn table(properties: Map<String, Json>, required: &[&str]) -> Json {
+fn table<const N: usize>(properties: [(String, Json); N], required: &[&str]) -> Json {
+    let properties = Map::from_iter(properties);
     json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
 }
 
