@@ -26,7 +26,7 @@ pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
         if !topics.contains(&message.topic) {
             topics.insert(message.topic.clone());
         }
-        Ok(writer.write(message)?)
+        writer.write(message)
     })?;
     let rows = topics.iter().map(|topic| writer.messages(topic)).sum();
     writer.finish()?;

@@ -277,6 +277,6 @@ impl UnitBag {
             origin.extend(channel.map(|channel| ("channel".to_owned(), channel.to_owned())));
             origin
         };
-        Ok(bag.write(topic, log_ns, &message, origin)?)
+        bag.write(topic, log_ns, &message, origin)
     }
 }

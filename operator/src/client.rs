@@ -52,6 +52,7 @@ pub struct Client {
 
 impl Client {
     /// On a session that is open.
+    #[must_use]
     pub fn on(session: Session, timeout: Duration) -> Self {
         Self { session, timeout, tried: "this service".to_owned(), name: None }
     }
@@ -98,6 +99,9 @@ impl Client {
     }
 
     /// Every answer to a question, once somebody is there to answer it.
+    ///
+    /// # Errors
+    /// Where nobody answers in time, or with what cannot be read.
     pub async fn answers(
         &self,
         key: &str,
@@ -113,6 +117,9 @@ impl Client {
     }
 
     /// The first answer to a question, as text.
+    ///
+    /// # Errors
+    /// Where nobody answers in time, or with what cannot be read.
     pub async fn text(
         &self,
         key: &str,
@@ -151,6 +158,9 @@ impl Client {
     }
 
     /// Status of every unit, in the order of their serials.
+    ///
+    /// # Errors
+    /// Where nobody answers in time, or with what cannot be read.
     pub async fn statuses(&self) -> Result<Vec<Status>, ConsoleError> {
         let mut statuses: Vec<Status> = self.frames(key::ALL_STATUS).await?;
         statuses.sort_by(|a, b| (&a.unit, &a.instance).cmp(&(&b.unit, &b.instance)));
@@ -158,6 +168,9 @@ impl Client {
     }
 
     /// Status of every service instance.
+    ///
+    /// # Errors
+    /// Where nobody answers in time, or with what cannot be read.
     pub async fn services(&self) -> Result<Vec<ServiceStatus>, ConsoleError> {
         let mut services: Vec<ServiceStatus> = self.frames(key::ALL_SERVICE_STATUS).await?;
         services.sort_by(|a, b| a.instance.cmp(&b.instance));

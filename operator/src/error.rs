@@ -125,6 +125,7 @@ impl ConsoleError {
     }
 
     /// The exit code that this error stands for.
+    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Serial { .. } | Self::Unasked | Self::NoTerminal => Exit::Usage,

@@ -50,17 +50,20 @@ pub struct Unit<'a> {
 
 impl<'a> Unit<'a> {
     /// A unit of which only the status is known, and that it has just come.
+    #[must_use]
     pub fn now(status: &'a Status, now_unix_ms: i64) -> Self {
         let (age, lately) = (Duration::ZERO, Lately::default());
         Self { status, age, gone: None, now_unix_ms, lately, past: &[] }
     }
 
     /// What is to be noticed, the gravest first.
+    #[must_use]
     pub fn remarks(&self) -> Vec<remark::Remark> {
         remark::remarks(self)
     }
 
     /// How it is, taken all together.
+    #[must_use]
     pub fn level(&self) -> Level {
         remark::level(self, &self.remarks())
     }
@@ -91,11 +94,13 @@ pub struct Past {
 }
 
 /// Counters that stand in one column.
+#[must_use]
 pub fn duplicates(status: &Status) -> u64 {
     total(status, &["gyro_duplicates", "accel_duplicates"])
 }
 
 /// As [`duplicates`], of what came too late.
+#[must_use]
 pub fn late(status: &Status) -> u64 {
     total(status, &["gyro_late", "accel_late", "temperature_late", "references_late"])
 }

@@ -68,6 +68,7 @@ pub struct Report {
 
 impl Report {
     /// As the command prints it.
+    #[must_use]
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
@@ -118,6 +119,7 @@ fn select(report: &mut Report, serials: &[String], tried: &str) -> Result<(), Co
 }
 
 /// The present time by the clock of this machine (ms since 1970-01-01 UTC).
+#[must_use]
 pub fn unix_ms() -> i64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_millis()).unwrap_or(i64::MAX)

@@ -30,7 +30,7 @@ pub(super) struct Logs<'a> {
     /// How logs are read.
     pub(super) reading: &'a Reading,
     /// Logs.
-    pub(super) logs: &'a [PathBuf],
+    pub(super) files: &'a [PathBuf],
     /// Whether all files of a unit are one run; else each log is one.
     pub(super) together: bool,
     /// How logs to judge on are read.
@@ -111,7 +111,7 @@ impl<'a> Logs<'a> {
         let LogArgs { log, reading } = log;
         Self {
             reading,
-            logs: log,
+            files: log,
             together: false,
             judging: reading,
             judge: &[],
@@ -122,7 +122,7 @@ impl<'a> Logs<'a> {
 
     /// All that is read.
     pub(super) fn inputs(&self) -> Vec<&'a Path> {
-        self.logs.iter().chain(self.judge).map(PathBuf::as_path).chain(self.document).collect()
+        self.files.iter().chain(self.judge).map(PathBuf::as_path).chain(self.document).collect()
     }
 
     /// The units that there is something to do of: that of the document, else all that the logs have.
@@ -176,9 +176,9 @@ impl<'a> Logs<'a> {
 
     fn runs(&self, fallback: Option<&UnitId>) -> Result<Runs, Error> {
         if !self.together {
-            return self.reading.runs(self.logs, fallback);
+            return self.reading.runs(self.files, fallback);
         }
-        let one = self.reading.runs_in(self.logs, fallback)?.into_iter();
+        let one = self.reading.runs_in(self.files, fallback)?.into_iter();
         Ok(one.map(|(unit, run)| (unit, vec![run])).collect())
     }
 

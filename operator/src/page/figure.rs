@@ -121,6 +121,7 @@ pub(super) fn width(text: &str) -> usize {
 }
 
 /// The text in at most `width` columns; where something is cut off, `…` stands for it.
+#[must_use]
 pub fn fit(text: &str, width: usize) -> String {
     if text.width() <= width {
         return text.to_owned();

@@ -58,7 +58,7 @@ pub struct Grid {
 
 impl Grid {
     /// Sets the table in at most `columns` columns of the terminal.
-    pub(super) fn set(layout: &[Column], rows: Vec<Vec<Span<'static>>>, columns: usize) -> Self {
+    pub(super) fn set(layout: &[Column], rows: &[Vec<Span<'static>>], columns: usize) -> Self {
         let columns = u16::try_from(columns).unwrap_or(u16::MAX);
         // Of each column what it asks for, and what it could do with.
         let widths = layout.iter().enumerate().map(|(index, column)| {
@@ -101,14 +101,16 @@ impl Grid {
     /// As lines, the head first.
     pub fn lines(self) -> Vec<Line<'static>> {
         drawn(self.width, self.rows.saturating_add(1), |area, buffer| {
-            Widget::render(self.table, area, buffer)
+            Widget::render(self.table, area, buffer);
         })
     }
 
     /// The same, moved in from the left.
     pub(super) fn indented(self) -> Vec<Line<'static>> {
         let mut lines = self.lines();
-        lines.iter_mut().for_each(|line| line.spans.insert(0, Span::raw("  ")));
+        for line in &mut lines {
+            line.spans.insert(0, Span::raw("  "));
+        }
         lines
     }
 }
@@ -131,7 +133,7 @@ pub(super) fn drawn(width: u16, height: u16, draw: impl FnOnce(Rect, &mut Buffer
             let text: String = run.iter().map(|(symbol, _)| *symbol).collect();
             Span::styled(text, run.first().map(|(_, style)| *style).unwrap_or_default())
         });
-        Line::from_iter(spans)
+        spans.collect::<Line<'_>>()
     });
     rows.collect()
 }
@@ -150,7 +152,7 @@ mod tests {
         ];
         let row = ["ZLG-0001", "12", "3", "a note that is rather long"].map(Span::raw).to_vec();
         let shown = |columns| {
-            let lines = Grid::set(&layout, vec![row.clone()], columns).lines();
+            let lines = Grid::set(&layout, std::slice::from_ref(&row), columns).lines();
             assert!(lines.iter().all(|line| line.width() <= columns), "{columns}");
             lines.iter().map(|line| line.to_string().trim_end().to_owned()).collect::<Vec<_>>()
         };

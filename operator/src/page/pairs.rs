@@ -11,6 +11,7 @@ use super::{Level, tone};
 const NAMED: usize = 8;
 
 /// The lines of all instances; none of one alone that takes every unit.
+#[must_use]
 pub fn pairs(reports: &[PairReport], width: usize) -> Vec<Line<'static>> {
     let line = |(level, columns): (Level, Vec<String>)| {
         let (mark, style) = match level {
@@ -24,6 +25,7 @@ pub fn pairs(reports: &[PairReport], width: usize) -> Vec<Line<'static>> {
 }
 
 /// What there is to say of all instances, in columns, and how grave it is.
+#[must_use]
 pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
     let mut said = Vec::new();
     if reports.len() > 1 {
@@ -74,6 +76,7 @@ fn instance(report: &PairReport) -> Vec<String> {
 }
 
 /// Who does what for one unit: "north speaks, south standby"; nothing where there is one instance.
+#[must_use]
 pub fn of_unit(reports: &[PairReport], serial: &str) -> Option<Line<'static>> {
     let roles: Vec<_> = reports
         .iter()

@@ -33,6 +33,7 @@ pub enum Level {
 
 impl Level {
     /// Its colour.
+    #[must_use]
     pub fn style(self) -> Style {
         match self {
             Self::Fine | Self::Note => tone::PLAIN,
@@ -43,6 +44,7 @@ impl Level {
     }
 
     /// Its mark: what the colour says, without colour.
+    #[must_use]
     pub fn mark(self, state: State) -> (&'static str, Style) {
         match self {
             Self::Fault => ("!", self.style()),
@@ -64,6 +66,7 @@ pub struct Remark {
 }
 
 /// What a unit is doing, in one or two words: `±` stands for the reversal of the lasing mode.
+#[must_use]
 pub fn state_word(state: State) -> &'static str {
     match state {
         State::Standby => "standby",
@@ -75,11 +78,13 @@ pub fn state_word(state: State) -> &'static str {
 }
 
 /// Whether increments are to go out.
+#[must_use]
 pub fn is_running(state: State) -> bool {
     matches!(state, State::RunningWithReversal | State::RunningWithoutReversal)
 }
 
 /// Rates are not measured by services before 0.2, which do not name themselves either.
+#[must_use]
 pub fn knows_rates(status: &Status) -> bool {
     !status.instance.is_empty()
 }

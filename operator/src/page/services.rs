@@ -16,6 +16,7 @@ const NAMED: usize = 3;
 const INSTANCE: usize = 8;
 
 /// The lines of all instances; `gone` says of which nobody answers any more.
+#[must_use]
 pub fn services(services: &[ServiceStatus], gone: &[String], columns: usize) -> Vec<Line<'static>> {
     let lines = services.iter().flat_map(|service| {
         let is_gone = gone.contains(&service.instance);

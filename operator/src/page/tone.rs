@@ -21,6 +21,7 @@ pub const FAULT: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD
 /// Lines as text, with the terminal's codes for colours or without.
 ///
 /// Control characters are left out: what others wrote into a status must not reach the terminal as a command.
+#[must_use]
 pub fn text(lines: &[Line<'_>], colours: bool) -> String {
     let mut text = String::new();
     for line in lines {

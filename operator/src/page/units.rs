@@ -40,7 +40,7 @@ pub fn units(units: &[Unit<'_>], columns: usize) -> Grid {
     let note = Column::filling("note", 4, columns / NOTE_SHARE);
     let layout: Vec<Column> = COLUMNS.into_iter().chain([note]).collect();
     let rows: Vec<Vec<Span<'static>>> = units.iter().map(row).collect();
-    Grid::set(&layout, rows, columns)
+    Grid::set(&layout, &rows, columns)
 }
 
 fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
@@ -104,6 +104,7 @@ fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
 }
 
 /// The channel whose temperature stands in the line: the first that is stale or outside its range, else the first.
+#[must_use]
 pub fn channel_in_view(status: &Status) -> Option<&ChannelStatus> {
     let odd = |channel: &&ChannelStatus| {
         channel.stale || matches!(channel.place, Some(Place::Below | Place::Above))
@@ -112,6 +113,7 @@ pub fn channel_in_view(status: &Status) -> Option<&ChannelStatus> {
 }
 
 /// Where the temperatures lie, all of them together, and how it looks.
+#[must_use]
 pub fn range(status: &Status) -> (&'static str, Style) {
     let some = |is: &dyn Fn(&ChannelStatus) -> bool| status.channels.iter().any(is);
     if some(&|channel| channel.stale) {
@@ -146,6 +148,7 @@ fn applied_mg(status: &Status) -> String {
 }
 
 /// Length of a vector.
+#[must_use]
 pub fn length(vector: [f64; 3]) -> f64 {
     vector.iter().map(|value| value * value).sum::<f64>().sqrt()
 }

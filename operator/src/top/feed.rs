@@ -50,6 +50,9 @@ pub struct Feed {
 
 impl Feed {
     /// Subscribes, and asks for what was said before.
+    ///
+    /// # Errors
+    /// Where the session is closed, or nobody answers in time.
     pub async fn start(client: &Client) -> Result<Self, ConsoleError> {
         let (sender, news) = unbounded_channel();
         let units = frames(client, key::ALL_STATUS, &sender, |status| News::Unit(Box::new(status))).await?;

@@ -168,6 +168,7 @@ impl Fleet {
     }
 
     /// Every unit as it is `now`, by serial.
+    #[must_use]
     pub fn units(&self, now: Instant, now_unix_ms: i64) -> Vec<Unit<'_>> {
         self.units.iter().map(|(key, row)| self.one(key, row, now, now_unix_ms)).collect()
     }
@@ -187,6 +188,7 @@ impl Fleet {
     }
 
     /// Every service instance, and the names of those that are gone.
+    #[must_use]
     pub fn services(&self) -> (Vec<ServiceStatus>, Vec<String>) {
         let services = self.services.values().map(|service| service.status.clone()).collect();
         let gone = self.services.iter().filter(|(_, service)| service.gone.is_some());
@@ -194,6 +196,7 @@ impl Fleet {
     }
 
     /// The service instance of a unit.
+    #[must_use]
     pub fn service_of(&self, status: &Status) -> Option<&ServiceStatus> {
         self.services.get(&status.instance).map(|service| &service.status)
     }

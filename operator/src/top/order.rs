@@ -86,6 +86,7 @@ pub(super) fn arrange<'a>(
 }
 
 /// All of them, those that need somebody first.
+#[must_use]
 pub fn worst_first(units: Vec<Unit<'_>>) -> Vec<Unit<'_>> {
     arrange(units, Sort::State, false, "")
 }

@@ -64,7 +64,10 @@ fn existing(
     let Some(path) = path else { return };
     let whole = folder.join(path);
     if !is_there(&whole) {
-        r.refuse(key, format!("is {path:?}, must be an existing {what}; looked for {}", whole.display()));
+        r.refuse(
+            key,
+            format!("is \"{}\", must be an existing {what}; looked for {}", path.display(), whole.display()),
+        );
     }
 }
 

@@ -41,7 +41,9 @@ impl Term {
                 let lag = StatedTerm::with_parameter(Feature::Lag, time_constant_s, gain);
                 lags.splice(place..(place + 1).min(lags.len()), [lag]);
                 sensor.terms.remove(Feature::Lag);
-                lags.into_iter().for_each(|lag| sensor.put(lag));
+                for lag in lags {
+                    sensor.put(lag);
+                }
             }
         }
     }
@@ -49,7 +51,7 @@ impl Term {
 
 /// A polynomial with one more coefficient.
 fn with(before: Option<&Curve>, power: usize, coefficient: f64, range: [f64; 2]) -> Curve {
-    let mut coefficients = match before.map(|curve| curve.shape()) {
+    let mut coefficients = match before.map(Curve::shape) {
         Some(Shape::Polynomial { coefficients, .. }) => coefficients.clone(),
         _ => Vec::new(),
     };

@@ -251,7 +251,9 @@ fn hysteresis_of_biases_is_removed() {
     let state = |document: &mut Document| {
         for (sensor, g) in document.gyro.sensor.iter_mut().zip(gyro_per_k) {
             let halved = StatedTerm::with_parameter(Feature::Play, 3.0, Curve::new(constant(0.5 * g)));
-            [halved.clone(), halved].into_iter().for_each(|play| sensor.put(play));
+            for play in [halved.clone(), halved] {
+                sensor.put(play);
+            }
         }
         for (sensor, g) in document.accel.as_mut().unwrap().sensor.iter_mut().zip(accel_per_k) {
             // The simulated error is a force, the document's an output.

@@ -25,7 +25,9 @@ fn takes(known: &mut Fault, other: Fault) -> bool {
 /// Those with one fault are named together, and so are runs.
 #[must_use]
 pub fn dead(tracks: &[Track]) -> Vec<String> {
-    let mut faults: Vec<((&str, usize), Vec<usize>, Vec<&str>, Fault)> = Vec::new();
+    // Kind and number of sensors, the sensors, the runs, and what is wrong with them.
+    type Found<'a> = ((&'a str, usize), Vec<usize>, Vec<&'a str>, Fault);
+    let mut faults: Vec<Found<'_>> = Vec::new();
     for track in tracks {
         for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
             let kind = (kind, columns.len());

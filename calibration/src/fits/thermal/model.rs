@@ -162,7 +162,9 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
         _ => None,
     });
     for (feature, branches) in [(Feature::ThermalRate, rate), (Feature::ThermalAcceleration, acceleration)] {
-        branches.into_iter().for_each(|curves| sensor.put(StatedTerm::branched(feature, curves)));
+        if let Some(curves) = branches {
+            sensor.put(StatedTerm::branched(feature, curves));
+        }
     }
     lags(basis, found).for_each(|lag| sensor.put(lag));
     if let Some(error) = scale_error(found) {

@@ -87,6 +87,6 @@ pub(super) fn correction(status: &Status, columns: usize) -> Option<Section> {
     };
     let [x, y, z] = ["x", "y", "z"].map(|axis| Column::number(axis, 0, 9));
     let layout = [Column::words("", 0, super::NAME - 2), x, y, z];
-    let grid = Grid::set(&layout, vec![row("°/h", rates), row("mg", forces)], columns.saturating_sub(2));
+    let grid = Grid::set(&layout, &[row("°/h", rates), row("mg", forces)], columns.saturating_sub(2));
     Some(Section { title: "Correction, subtracted in case axes", lines: grid.indented() })
 }

@@ -30,7 +30,7 @@ pub(super) fn sensors(status: &Status, columns: usize) -> Option<Section> {
         number("stale", 6),
     ];
     let rows: Vec<_> = status.sensors.iter().map(row).collect();
-    let grid = Grid::set(&layout, rows, columns.saturating_sub(2));
+    let grid = Grid::set(&layout, &rows, columns.saturating_sub(2));
     Some(Section { title: "Sensors, in ticks since the start", lines: grid.indented() })
 }
 
@@ -81,7 +81,7 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
             Column::words("", 1, 10),
         ];
         let rows: Vec<_> = status.drift.iter().map(estimate).collect();
-        section.lines = Grid::set(&layout, rows, columns.saturating_sub(2)).indented();
+        section.lines = Grid::set(&layout, &rows, columns.saturating_sub(2)).indented();
     }
     let rest = match &status.rest {
         None => return Some(section),

@@ -35,7 +35,7 @@ pub(super) fn section(unit: &Unit<'_>, columns: usize) -> Option<Section> {
         Column::words("", 1, 6),
     ];
     let rows: Vec<_> = channels.iter().map(row).collect();
-    let grid = Grid::set(&layout, rows, columns.saturating_sub(2));
+    let grid = Grid::set(&layout, &rows, columns.saturating_sub(2));
     let used = usize::from(grid.width);
     let mut lines = grid.indented();
     courses(&mut lines, unit, columns.saturating_sub(used + 2));

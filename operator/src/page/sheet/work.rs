@@ -34,7 +34,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
             Column::words("ticks of each mode", 1, 10),
         ];
         let rows: Vec<_> = progress.gyros.iter().map(gyro).collect();
-        section.lines.extend(Grid::set(&layout, rows, columns.saturating_sub(2)).indented());
+        section.lines.extend(Grid::set(&layout, &rows, columns.saturating_sub(2)).indented());
         return Some(section);
     }
     let outcome = status.pre_launch_outcome.as_ref()?;
@@ -53,7 +53,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
                 Column::number("σ", 0, 6),
             ];
             let rows: Vec<_> = changes.iter().map(change).collect();
-            section.lines.extend(Grid::set(&layout, rows, columns.saturating_sub(2)).indented());
+            section.lines.extend(Grid::set(&layout, &rows, columns.saturating_sub(2)).indented());
         }
         PreLaunchVerdict::Refused(reasons) => {
             section.field("last one", "refused; the constants stay", tone::WARNING, columns);

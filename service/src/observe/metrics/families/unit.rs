@@ -217,7 +217,7 @@ pub(super) const FAMILIES: &[Family] = &[
         ("isotherm_unit_added_latency", "seconds"),
         &["unit"],
         "Time from receiving a raw message to having published the result",
-        |unit, look, out| latency(unit, look, out),
+        latency,
     ),
 ];
 
