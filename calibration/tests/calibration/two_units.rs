@@ -66,7 +66,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     let (code, said, errors) = words(&calibrate(&["drift", &log, "--calibration", &documents]));
     assert!(code == Some(1) && errors.contains("FOG-0002.toml does not exist"), "{errors}");
     assert!(said.contains("2 units: 3 of 3 sensors analysed, 1 of the units failed."), "{said}");
-    assert!(fails(&["drift", &log, "--out", &out], 2).contains("--out needs --calibration"));
+    assert!(fails(&["drift", &log, "--out", &out], 2).contains("give it with --calibration"));
 }
 
 #[test]

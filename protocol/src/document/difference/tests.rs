@@ -216,7 +216,7 @@ fn a_change_of_the_correction_is_told_per_sensor_and_in_case_axes() {
     assert!(found.iter().all(|change| !change.quantity.starts_with("gyro s ")));
     // In the other mode the magnetic bias has the other sign.
     let other = correction_change(side(&before), side(&after), at(25.0), Some(LasingMode::Minus));
-    assert!((other[0].before - (1.284 - 3.41 + 0.082 + trend)).abs() < 1e-9, "{:?}", other[0]);
+    assert!((other[0].before - (1.284 - 3.41 + 0.082 + trend + supply)).abs() < 1e-9, "{:?}", other[0]);
 }
 
 #[test]
