@@ -134,7 +134,7 @@ pub(crate) async fn start_on(
         None => None,
     };
     // First to hear the others: what they have published of a tick that comes now is to be known.
-    let (questions, _asker) = Asker::start(&session, &pair, &intake, inbox.clone());
+    let (questions, _tasks) = Asker::start(&session, &pair, &intake, inbox.clone());
     let watch = Watch::start(&session, &pair, &intake, questions).await?;
     let inputs = (&pair, settings.units.as_slice(), &pulse);
     let declared = Declared::new(&session, &intake, &status_publisher.bell(), &inbox, inputs).await?;

@@ -148,7 +148,7 @@ impl UnitActor {
             let (at, slew) = ((*at).into(), *slew);
             self.stream.schedule(unit::Change { calibration, revision: revision.counter, at, slew }, label)
         };
-        self.journal(|_| journal_writer::changed(change));
+        self.journal_order(|_| journal_writer::changed(change));
         replaced
     }
 
@@ -158,7 +158,7 @@ impl UnitActor {
     /// [`Refusal`]: the state is as before.
     pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
         let done = self.stream.command(command);
-        self.journal(|_| journal_writer::commanded(command, &done));
+        self.journal_order(|_| journal_writer::commanded(command, &done));
         // A self-test without a calibration changes no state, and yet has a report.
         self.status_due |= done.is_ok();
         self.look();
