@@ -9,6 +9,7 @@
 
 pub mod diff;
 pub mod merge;
+pub mod plain;
 pub mod provenance;
 pub mod show;
 pub mod written;

@@ -51,7 +51,6 @@ pub struct Coefficient {
 
 impl Coefficient {
     /// A coefficient with its standard error.
-    #[must_use]
     pub fn new(name: impl Into<String>, unit: impl Into<String>, value: f64, sigma: Option<f64>) -> Self {
         Self { name: name.into(), unit: unit.into(), value, sigma }
     }
@@ -86,13 +85,11 @@ pub struct FitReport {
 
 impl FitReport {
     /// A report with nothing in it but what was done to which unit.
-    #[must_use]
     pub fn new(title: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { title: title.into(), unit: unit.into(), ..Self::default() }
     }
 
     /// With the name of what its sizes are over.
-    #[must_use]
     pub fn counting(mut self, what: &'static str) -> Self {
         self.counted = Some(what);
         self
@@ -104,26 +101,22 @@ impl FitReport {
     }
 
     /// Every verdict, one sentence each, in one line.
-    #[must_use]
     pub fn headline(&self) -> String {
         verdict::sentences(&self.verdicts).join(" ")
     }
 
     /// Whether every sensor was accepted.
-    #[must_use]
     pub fn accepted(&self) -> bool {
         self.verdicts.iter().all(|verdict| verdict.accepted)
     }
 
     /// The refusals, for the end of a command.
-    #[must_use]
     pub fn refusals(&self) -> Vec<String> {
         let refused = self.verdicts.iter().filter(|verdict| !verdict.accepted);
         refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
     }
 
     /// What a terminal shows: the verdicts in the first lines, and what is to be looked at.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let warnings: Vec<String> = self.warnings.iter().map(|words| format!("warning: {words}")).collect();
         let rest = format!(
@@ -137,7 +130,6 @@ impl FitReport {
 
     /// Coefficients as a table; the first column numbers them as the chart does.
     fn coefficient_rows(&self) -> Table {
-        let head = ["", "coefficient", "value", "± σ", "value/σ", "unit"].map(str::to_owned).to_vec();
         let row = |(index, coefficient): (usize, &Coefficient)| {
             let Coefficient { name, unit, value, sigma } = coefficient;
             let known = sigma.filter(|sigma| sigma.is_finite());
@@ -152,7 +144,8 @@ impl FitReport {
                 unit.clone(),
             ]
         };
-        Table { head, rows: self.coefficients.iter().enumerate().map(row).collect() }
+        let head = ["", "coefficient", "value", "± σ", "value/σ", "unit"];
+        Table::of(head, self.coefficients.iter().enumerate().map(row))
     }
 }
 

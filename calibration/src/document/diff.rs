@@ -20,6 +20,7 @@ use crate::document::show::terms::{terms, tree};
 use crate::document::show::{places, range_of, steady};
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::norm;
 use crate::report::Sigmas;
 
 /// Standard errors beyond which an axis has turned.
@@ -173,7 +174,7 @@ impl Compared {
             .filter(|(_, sigma)| *sigma > 0.0)
             .map(|(change, sigma)| change.abs() / sigma)
             .fold(0.0, f64::max);
-        let length = change.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let length = norm(change);
         let turned_sigma = if length > 0.0 {
             change.iter().zip(sigma).map(|(x, s)| (x * s / length) * (x * s / length)).sum::<f64>().sqrt()
         } else {

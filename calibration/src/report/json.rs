@@ -10,7 +10,6 @@ use crate::size::Size;
 
 impl FitReport {
     /// Everything but the curves themselves, of which the sizes are there.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let coefficient =
             |c: &Coefficient| json!({ "name": c.name, "unit": c.unit, "value": c.value, "sigma": c.sigma });
@@ -42,7 +41,6 @@ impl FitReport {
 
 impl Verdict {
     /// As JSON.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         json!({
             "of": self.of,

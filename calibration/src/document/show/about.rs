@@ -78,7 +78,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         ]
     });
     let head = ["channel", "range, °C", "spike limit, °C", "conversion a0, a1, …"];
-    sheet.table("Temperature channels", &head, channels.collect());
+    sheet.table("Temperature channels", head, channels);
     let gyros = document.gyro.sensor.iter().map(|gyro| {
         let weight = match (gyro.increment_weight_arcsec_per_count, gyro.increment_weight_rad_per_rad) {
             (Some(weight), _) => Some(format!("{weight} ″/count")),
@@ -89,11 +89,11 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         });
         vec![gyro.name.clone(), or_dash(gyro.channel.clone()), or_dash(weight), or_dash(drift)]
     });
-    sheet.table("Gyros", &["gyro", "channel", "increment weight", "drift expected"], gyros.collect());
+    sheet.table("Gyros", ["gyro", "channel", "increment weight", "drift expected"], gyros);
     let accels = document.accel.iter().flat_map(|accel| &accel.sensor).map(|accel| {
         vec![accel.name.clone(), or_dash(accel.channel.clone()), or_dash(accel.board_channel.clone())]
     });
-    sheet.table("Accelerometers", &["accelerometer", "channel", "board channel"], accels.collect());
+    sheet.table("Accelerometers", ["accelerometer", "channel", "board channel"], accels);
     let names = document.gyro.sensor.iter().map(|sensor| format!("gyro {}", sensor.name)).collect();
     let mut rows = axes(names, &document.gyro.orientation);
     if let Some(accel) = &document.accel {
@@ -101,9 +101,9 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         rows.extend(axes(names, &accel.orientation));
     }
     let head = ["input axis", "x", "y", "z", "off its case axis, ″", "turns, ″/°C"];
-    sheet.table("Input axes in case axes", &head, rows);
+    sheet.table("Input axes in case axes", head, rows);
     let residuals = document.origin.iter().flat_map(|origin| &origin.residual);
-    sheet.table("Residuals as stated", &parts::HEAD, residuals.map(parts::of_residual).collect());
+    sheet.table("Residuals as stated", parts::HEAD, residuals.map(parts::of_residual));
     parts::tables(sheet, document);
 }
 

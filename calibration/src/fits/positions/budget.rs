@@ -7,6 +7,7 @@ use super::doubts::unseen;
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::solve::{Positions, Weights, guesses};
+use crate::numbers::{norm, real};
 use crate::report::figures::{counted, short, table};
 
 /// ″ in one radian.
@@ -60,20 +61,16 @@ pub const TYPICAL_ARCSEC_PER_DEG_C: [(&str, f64); 2] = [("quartz", 1.5), ("silic
 
 impl Budget {
     /// White noise of a mean over τ as an angle (″).
-    #[must_use]
     pub fn noise_arcsec(&self) -> f64 {
         ARCSEC_PER_RAD * (self.noise / self.seconds).sqrt() / self.scale_per_g
     }
 
     /// Error of one element of C by the stand and the noise (″): 004, equation 4.
-    #[must_use]
     pub fn stand_arcsec(&self) -> f64 {
-        let parts = [self.positioning_arcsec, self.run_out_arcsec, self.noise_arcsec()];
-        2.0 * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+        2.0 * norm([self.positioning_arcsec, self.run_out_arcsec, self.noise_arcsec()])
     }
 
     /// Largest plastic deformation of the housing (″): equation 6.
-    #[must_use]
     pub fn housing_arcsec(&self) -> f64 {
         let [housing, sensor] = self.expansion_ppm_per_deg_c;
         let [cold, hot] = self.temperature_deg_c;
@@ -81,28 +78,23 @@ impl Budget {
     }
 
     /// Error by the measured temperature for axes that turn with `rate` (″): equation 7.
-    #[must_use]
     pub fn temperature_arcsec(&self, rate_arcsec_per_deg_c: f64) -> f64 {
         self.temperature_error_deg_c * rate_arcsec_per_deg_c
     }
 
     /// What turns an axis between calibrations (″): hysteresis, housing, measured temperature; equation 5.
-    #[must_use]
     pub fn thermal_arcsec(&self) -> f64 {
         let measured = self.temperature_arcsec(self.axis_arcsec_per_deg_c);
         self.hysteresis_arcsec.hypot(self.housing_arcsec()).hypot(measured)
     }
 
     /// Root sum of squares with stand and noise (″).
-    #[must_use]
     pub fn total_arcsec(&self) -> f64 {
         self.stand_arcsec().hypot(self.thermal_arcsec())
     }
 
     /// Standard error of the elements of C that the least-squares fit of a plan will state, mean and largest (″); `None` where
     /// the plan does not determine them.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "six angles")]
     pub fn of_plan(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
         let taken: Vec<Taken> = plan
             .positions
@@ -125,13 +117,12 @@ impl Budget {
         let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
         let covariance = found.axes_covariance(plan, 0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
-        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();
+        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / real(sigma.len())).sqrt();
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
     }
 
     /// How well an axis is known by the plan's own fit, and with what the housing and the measured temperature add (″); `None` where
     /// the plan does not determine it.
-    #[must_use]
     pub fn known_by(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
         let [mean, _] = self.of_plan(plan, levelling_rad)?;
         Some([mean, mean.hypot(self.thermal_arcsec())])
@@ -157,7 +148,6 @@ impl Budget {
     }
 
     /// As text.
-    #[must_use]
     pub fn to_text(&self, plan: &Plan, levelling_rad: f64) -> String {
         let Table { head, rows } = self.rows();
         let typical = TYPICAL_ARCSEC_PER_DEG_C
@@ -184,7 +174,6 @@ impl Budget {
     }
 
     /// The budget as a table.
-    #[must_use]
     pub fn rows(&self) -> Table {
         let [housing, sensor] = self.expansion_ppm_per_deg_c;
         let [cold, hot] = self.temperature_deg_c;
@@ -216,11 +205,10 @@ impl Budget {
             ),
             row("total".into(), "with stand and noise".into(), self.total_arcsec()),
         ];
-        Table { head: ["", "", "″"].map(str::to_owned).to_vec(), rows }
+        Table::of(["", "", "″"], rows)
     }
 
     /// As JSON.
-    #[must_use]
     pub fn to_json(&self, plan: &Plan, levelling_rad: f64) -> Value {
         let typical: serde_json::Map<String, Value> = TYPICAL_ARCSEC_PER_DEG_C
             .iter()

@@ -18,6 +18,7 @@ use super::temperature::{
 };
 use super::times::Times;
 use super::track::Track;
+use crate::numbers::ends;
 use crate::report::figures::counted;
 
 /// How the positions are looked at.
@@ -100,8 +101,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     if let Some(words) = stuck(&channels, &axes, &own).filter(|_| !channels.is_empty()) {
         return Err(vec![words]);
     }
-    let (low, high) =
-        axes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let [low, high] = ends(axes.iter().copied());
     let reference = settings.reference_deg_c.unwrap_or_else(|| reference(low, high));
     let half = (0.5 * (high - low)).max(1.0);
     let scaled = |t: f64| (t - reference) / half;

@@ -24,7 +24,6 @@ pub struct Set<'a> {
 }
 
 /// Everything that is said.
-#[must_use]
 pub fn report(
     document: &Document,
     analysis: &Analysis,
@@ -65,13 +64,13 @@ pub fn report(
 
 /// By how much the axes turned from one visit of a temperature to the next.
 fn return_rows(analysis: &Analysis, names: &[String], runs: &[String]) -> Table {
-    let head = ["°C", "before", "after"].map(str::to_owned).into_iter().chain(names.iter().cloned());
+    let head = ["°C", "before", "after"].into_iter().chain(names.iter().map(String::as_str));
     let row = |back: &Return| {
         let logs = back.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
         let turns = back.turns.iter().map(|[turn, sigma]| format!("{turn:.1} ± {sigma:.1}"));
         std::iter::once(fixed(back.deg_c, 1)).chain(logs).chain(turns).collect()
     };
-    Table { head: head.collect(), rows: analysis.returns.iter().map(row).collect() }
+    Table::of(head, analysis.returns.iter().map(row))
 }
 
 /// Words where far too much is left of |f| − g: no set of coefficients holds for these logs.
@@ -211,8 +210,7 @@ fn coefficients(
 }
 
 fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
-    let head =
-        ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
+    let head = ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"];
     let row = |judgement: &Judgement| {
         let position = settings.plan.positions.get(judgement.position);
         let milli_g = |error: f64| fixed(error / settings.gravity * 1e3, 4);
@@ -226,14 +224,12 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
         row.push(milli_g(judgement.length[1]));
         row
     };
-    Table { head: head.to_vec(), rows: set.judged.iter().map(row).collect() }
+    Table::of(head, set.judged.iter().map(row))
 }
 
 fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Table {
     let shown = shown(analysis);
-    let head = std::iter::once("°C".to_owned())
-        .chain(shown.iter().map(|(index, i)| format!("{} along {}", names[*index], AXES[*i])))
-        .collect();
+    let elements = shown.iter().map(|(index, i)| format!("{} along {}", names[*index], AXES[*i]));
     let row = |(deg_c, fit): (&f64, &Option<Fit>)| {
         let cell = |(index, i): &(usize, usize)| {
             let Some(fit) = fit else { return "–".to_owned() };
@@ -243,5 +239,6 @@ fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Tab
         };
         std::iter::once(fixed(*deg_c, 2)).chain(shown.iter().map(cell)).collect()
     };
-    Table { head, rows: analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row).collect() }
+    let head = std::iter::once("°C".to_owned()).chain(elements);
+    Table::of(head, analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row))
 }

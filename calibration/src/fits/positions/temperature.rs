@@ -7,6 +7,7 @@ use isotherm_protocol::document::Document;
 use super::fit::Settings;
 use super::pose::Pose;
 use crate::axes::several;
+use crate::numbers::{ends, mean, once_each};
 use crate::report::figures::fixed;
 
 /// Distance of temperatures that are two (°C).
@@ -23,15 +24,8 @@ fn channels(document: &Document, settings: &Settings) -> Vec<String> {
 
 /// The accelerometers' own channels.
 fn of_accelerometers(document: &Document) -> Vec<String> {
-    let mut own: Vec<String> = Vec::new();
-    for channel in
-        document.accel.iter().flat_map(|accel| &accel.sensor).filter_map(|sensor| sensor.channel.as_ref())
-    {
-        if !own.contains(channel) {
-            own.push(channel.clone());
-        }
-    }
-    own
+    let sensors = document.accel.iter().flat_map(|accel| &accel.sensor);
+    once_each(sensors.filter_map(|sensor| sensor.channel.clone()))
 }
 
 /// Temperatures that something was taken at (°C).
@@ -45,13 +39,8 @@ pub struct Temperatures {
 
 impl Temperatures {
     /// Of some temperatures.
-    #[expect(clippy::cast_precision_loss, reason = "positions")]
     pub(super) fn of(deg_c: &[f64]) -> Self {
-        let ends = |[low, high]: [f64; 2], t: &f64| [low.min(*t), high.max(*t)];
-        Self {
-            mean: deg_c.iter().sum::<f64>() / deg_c.len() as f64,
-            range: deg_c.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends),
-        }
+        Self { mean: mean(deg_c), range: ends(deg_c.iter().copied()) }
     }
 }
 
@@ -219,7 +208,6 @@ pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f6
 }
 
 /// Temperatures that are far enough apart to be several: the number of each one's level, and the levels' means.
-#[expect(clippy::cast_precision_loss, reason = "positions")]
 pub(crate) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
     let mut order: Vec<usize> = (0..temperatures.len()).collect();
     order.sort_by(|a, b| temperatures[*a].total_cmp(&temperatures[*b]));
@@ -237,7 +225,7 @@ pub(crate) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
             group.push(t);
         }
     }
-    (level_of, groups.iter().map(|group| group.iter().sum::<f64>() / group.len() as f64).collect())
+    (level_of, groups.iter().map(|group| mean(group)).collect())
 }
 
 /// A reference in whole degrees: 20 °C where that is in the range, else its middle.

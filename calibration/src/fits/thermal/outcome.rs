@@ -8,7 +8,7 @@ use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
 use super::compare;
 use super::fit::{Fitted, Sensor};
-use super::found::Found;
+use super::joint::Found;
 use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
@@ -16,6 +16,7 @@ use crate::axes::output_name;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
+use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
 use crate::size::Size;
 
@@ -108,7 +109,7 @@ impl Outcome {
                     sample,
                     (&before.loaded, &written.loaded),
                     (&written.document, &rest),
-                    stand.window_s(window_s),
+                    Rows::valid(stand.window_s(window_s)),
                     &mut watch,
                 )?;
                 troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));

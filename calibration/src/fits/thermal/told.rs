@@ -5,7 +5,7 @@ use isotherm_protocol::document::{Document, Origin};
 
 use super::columns::Basis;
 use super::fit::Sensor;
-use super::found::Found;
+use super::joint::Found;
 use super::model::described;
 use super::outcome::Outcome;
 use super::scale::Kept;
@@ -175,5 +175,5 @@ fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
             ]);
         }
     }
-    (!rows.is_empty()).then(|| Table { head: head.map(str::to_owned).to_vec(), rows })
+    (!rows.is_empty()).then(|| Table::of(head, rows))
 }

@@ -80,7 +80,6 @@ fn gyros(
 
 /// The document that "before" stands for, and what that is in words: the one that was given; readings in m/s² as they are; or else one
 /// scale factor and one zero for all accelerometers, for readings in V or counts alone are no specific force.
-#[must_use]
 pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'static str) {
     let mut document = base.clone();
     let mean = |values: [f64; 3]| tidy(values.iter().sum::<f64>() / 3.0);
