@@ -13,3 +13,10 @@ pub mod plain;
 pub mod provenance;
 pub mod show;
 pub mod written;
+
+use isotherm_protocol::document::{AccelSensor, Document};
+
+/// The accelerometers of a document.
+pub fn accelerometers(document: &Document) -> &[AccelSensor] {
+    document.accel.as_ref().map_or(&[], |accel| &accel.sensor)
+}

@@ -27,6 +27,7 @@ pub mod verdict;
 pub(crate) mod words;
 
 use isotherm_pages::{Chart, Table};
+use serde_json::{Value, json};
 
 pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
@@ -37,7 +38,7 @@ pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 use figures::{counted, short};
 
 /// One fitted coefficient.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Coefficient {
     /// What it is, such as "gyro x thermal rate, run-up".
     pub name: String,
@@ -103,6 +104,16 @@ impl FitReport {
     /// Every verdict, one sentence each, in one line.
     pub fn headline(&self) -> String {
         verdict::sentences(&self.verdicts).join(" ")
+    }
+
+    /// The coefficients by name as documents keep them, with their standard errors, 0 where none is known; what is no number is left out.
+    pub fn coefficients_by_name(&self) -> serde_json::Map<String, Value> {
+        let numbers = self.coefficients.iter().filter(|c| c.value.is_finite());
+        let known =
+            numbers.filter_map(|c| Some((c, Some(c.sigma.unwrap_or(0.0)).filter(|s| s.is_finite())?)));
+        known
+            .map(|(c, sigma)| (c.name.clone(), json!({ "value": c.value, "sigma": sigma, "unit": c.unit })))
+            .collect()
     }
 
     /// Whether every sensor was accepted.

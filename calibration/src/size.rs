@@ -3,7 +3,7 @@
 use crate::numbers::{ends, real};
 
 /// Size of a set of numbers; those that are no number are left out.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Size {
     /// How many there are.
     pub count: usize,
@@ -12,6 +12,7 @@ pub struct Size {
     /// Root mean square.
     pub rms: f64,
     /// Standard deviation about the mean.
+    #[serde(rename = "standard_deviation")]
     pub deviation: f64,
     /// Largest less smallest.
     pub peak_to_peak: f64,

@@ -1,7 +1,5 @@
 //! `isotherm-calibrate positions`.
 
-mod planned;
-
 use std::path::PathBuf;
 
 use clap::{Arg, Args};
@@ -16,7 +14,7 @@ use super::units::Logs;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
-use crate::fits::positions::budget::ARCSEC_PER_RAD;
+use crate::fits::positions::budget::{ARCSEC_PER_RAD, Budget};
 use crate::fits::positions::document::{complete, range};
 use crate::fits::positions::fit::{Analysis, Settings, analyse, positions};
 use crate::fits::positions::judged::{Judgement, judge};
@@ -28,7 +26,6 @@ use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
 use crate::runs::Run;
-use planned::PlannedArgs;
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
 #[derive(Debug, Args)]
@@ -91,7 +88,7 @@ pub(super) struct PositionsArgs {
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
     accelerometer_unit: String,
     #[command(flatten)]
-    planned: PlannedArgs,
+    planned: Budget,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -138,7 +135,11 @@ impl PositionsArgs {
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
-        let budget = self.planned.budget(self.positioning, self.run_out);
+        let budget = Budget {
+            positioning_arcsec: self.positioning,
+            run_out_arcsec: self.run_out,
+            ..self.planned.clone()
+        };
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
         let json = || budget.to_json(plan, levelling_rad);
         emit(self.output.files().json, json, || budget.to_text(plan, levelling_rad))

@@ -11,6 +11,7 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use serde_json::{Value, json};
 
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::numbers::{hull, real};
@@ -165,7 +166,7 @@ fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
             });
         }
     }
-    for (index, accel) in written.document.accel.iter().flat_map(|accel| &accel.sensor).enumerate() {
+    for (index, accel) in accelerometers(&written.document).iter().enumerate() {
         row(format!("accelerometer {}, mg", accel.name), &|x| {
             let bias = *steady(written, x, 0.0).accel_bias.get(index)?;
             Some(SpecificForce::from_m_per_s2(bias).as_g() * 1e3)

@@ -159,7 +159,7 @@ impl From<&Verdict> for BatchRow {
         let [before, after] = verdict.deciding();
         let known = before.count > 0 || after.count > 0;
         let figure = |value: f64| if known { short(value) } else { "–".to_owned() };
-        let state = if verdict.accepted { "accepted" } else { "refused" };
+        let state = verdict.state();
         Self {
             cells: vec![
                 verdict.of.clone(),

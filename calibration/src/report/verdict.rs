@@ -140,6 +140,18 @@ impl Verdict {
         self
     }
 
+    /// "accepted" or "refused".
+    pub(super) const fn state(&self) -> &'static str {
+        if self.accepted { "accepted" } else { "refused" }
+    }
+
+    /// Before and after in each sample that has anything.
+    fn samples(&self) -> impl Iterator<Item = (Sample, [Size; 2])> {
+        let samples = [(Sample::In, Some(self.in_sample)), (Sample::Out, self.out_of_sample)];
+        let counts = |sizes: &[Size; 2]| sizes.iter().any(|size| size.count > 0);
+        samples.into_iter().filter_map(move |(sample, sizes)| Some((sample, sizes.filter(counts)?)))
+    }
+
     /// The sizes that decide: out of sample where they are known.
     pub fn deciding(&self) -> [Size; 2] {
         self.out_of_sample.unwrap_or(self.in_sample)
@@ -163,7 +175,7 @@ impl Verdict {
     /// Its sentence without the reason and without a full stop: "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted".
     pub fn sentence(&self) -> String {
         let [before, after] = self.deciding();
-        let state = if self.accepted { "accepted" } else { "refused" };
+        let state = self.state();
         if before.count == 0 && after.count == 0 {
             return format!("{}: {state}", self.of);
         }
@@ -232,13 +244,9 @@ pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
     let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""];
     let mut rows = Vec::new();
     for verdict in verdicts {
-        let samples = [("in sample", Some(verdict.in_sample)), ("out of sample", verdict.out_of_sample)];
-        for (sample, sizes) in samples {
-            let Some([before, after]) = sizes.filter(|sizes| sizes.iter().any(|size| size.count > 0)) else {
-                continue;
-            };
+        for (sample, [before, after]) in verdict.samples() {
+            let sample = if sample == Sample::In { "in sample" } else { "out of sample" };
             let factor = if after.rms > 0.0 { short(before.rms / after.rms) } else { "–".to_owned() };
-            let state = if verdict.accepted { "accepted" } else { "refused" };
             rows.push(vec![
                 format!("{}, {} {sample}", verdict.of, verdict.measure),
                 short(before.rms),
@@ -247,7 +255,7 @@ pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
                 short(before.peak_to_peak),
                 format!("→ {}", short(after.peak_to_peak)),
                 after.count.to_string(),
-                state.to_owned(),
+                verdict.state().to_owned(),
             ]);
         }
     }
@@ -263,10 +271,7 @@ pub fn residuals(verdicts: &[Verdict]) -> Vec<Residual> {
             "m/s²" => Measure::MetresPerSecondSquared,
             _ => continue,
         };
-        for (sample, sizes) in [(Sample::In, Some(verdict.in_sample)), (Sample::Out, verdict.out_of_sample)] {
-            let Some([before, after]) = sizes.filter(|sizes| sizes.iter().any(|size| size.count > 0)) else {
-                continue;
-            };
+        for (sample, [before, after]) in verdict.samples() {
             residuals.push(Residual {
                 of: verdict.of.replace(' ', "."),
                 sample,

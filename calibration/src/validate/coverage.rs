@@ -3,6 +3,7 @@
 use isotherm_correction::sample::SensorFlags;
 use isotherm_pages::Table;
 
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::numbers::real;
@@ -62,7 +63,7 @@ impl Coverage {
             invalid: 0,
         };
         let document = &written.document;
-        let accels = document.accel.iter().flat_map(|accel| &accel.sensor);
+        let accels = accelerometers(document).iter();
         Self {
             channels: calibration.channels().iter().enumerate().map(channel).collect(),
             gyros: document.gyro.sensor.iter().map(|gyro| sensor("gyro", &gyro.name)).collect(),

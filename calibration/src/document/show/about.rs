@@ -4,6 +4,7 @@ use isotherm_protocol::document::{Document, Orientation};
 
 use super::parts;
 use super::terms::Term;
+use crate::document::accelerometers;
 use crate::report::Sheet;
 use crate::report::figures::short;
 
@@ -14,8 +15,7 @@ pub(crate) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 pub(super) fn headline(name: &str, document: &Document) -> String {
     let names = |names: Vec<&str>| names.join(", ");
     let gyros = document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()).collect();
-    let accels: Vec<&str> =
-        document.accel.iter().flat_map(|accel| &accel.sensor).map(|sensor| sensor.name.as_str()).collect();
+    let accels: Vec<&str> = accelerometers(document).iter().map(|sensor| sensor.name.as_str()).collect();
     let accels = if accels.is_empty() {
         "no accelerometers".to_owned()
     } else {
@@ -90,7 +90,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         vec![gyro.name.clone(), or_dash(gyro.channel.clone()), or_dash(weight), or_dash(drift)]
     });
     sheet.table("Gyros", ["gyro", "channel", "increment weight", "drift expected"], gyros);
-    let accels = document.accel.iter().flat_map(|accel| &accel.sensor).map(|accel| {
+    let accels = accelerometers(document).iter().map(|accel| {
         vec![accel.name.clone(), or_dash(accel.channel.clone()), or_dash(accel.board_channel.clone())]
     });
     sheet.table("Accelerometers", ["accelerometer", "channel", "board channel"], accels);

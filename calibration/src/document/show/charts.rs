@@ -6,6 +6,7 @@ use isotherm_pages::{Axis, Chart, Content, Ink, Panel, Samples, Series};
 use super::about::ARCSEC;
 use super::terms::Term;
 use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::numbers::once_each;
 use crate::report::Sheet;
@@ -75,8 +76,7 @@ fn sums(written: &Written, range: [f64; 2]) -> Vec<Panel> {
         });
         Panel::of(format!("gyro {}", gyro.name), "°/h", HEIGHT, curves.collect())
     });
-    let accels = written.document.accel.iter().flat_map(|accel| &accel.sensor).enumerate();
-    let accels = accels.map(|(index, accel)| {
+    let accels = accelerometers(&written.document).iter().enumerate().map(|(index, accel)| {
         let bias = |x: &f64| {
             let bias = steady(written, *x, 0.0).accel_bias.get(index).copied().unwrap_or(f64::NAN);
             (*x, SpecificForce::from_m_per_s2(bias).as_g() * 1e3)

@@ -6,6 +6,7 @@ use toml::{Table, Value};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
+use crate::document::accelerometers;
 use crate::document::written::{Written, tidy};
 use crate::error::Error;
 use crate::finding::AccelKind;
@@ -56,7 +57,7 @@ pub struct Made {
 /// # Errors
 /// [`Error::Refused`] and [`Error::Found`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
-    let sensors = wanted.base.accel.as_ref().map_or(&[][..], |accel| &accel.sensor);
+    let sensors = accelerometers(wanted.base);
     if sensors.is_empty() {
         let words = "the document has no accelerometers: add [accel] with their channels and board_channel";
         return Err(Error::refused(words));
@@ -246,8 +247,8 @@ fn tell(
 
 impl Made {
     fn each(&self) -> impl Iterator<Item = (&AccelSensor, &Ratio)> {
-        let sensors = self.written.document.accel.iter().flat_map(|accel| &accel.sensor);
-        sensors.zip(&self.found).filter_map(|(sensor, found)| Some((sensor, found.as_ref().ok()?)))
+        let sensors = accelerometers(&self.written.document);
+        sensors.iter().zip(&self.found).filter_map(|(sensor, found)| Some((sensor, found.as_ref().ok()?)))
     }
 
     /// Standard errors of the ratios, by powers from 0.

@@ -334,11 +334,7 @@ impl Report {
             .iter()
             .map(|line| json!({ "period_h": line.period_h, "amplitude": line.amplitude, "stands_out": line.stands_out() }))
             .collect();
-        let others: Vec<Value> = sensor
-            .lines
-            .iter()
-            .map(|line| json!({ "frequency_hz": line.frequency_hz, "amplitude": line.amplitude, "ratio": line.ratio }))
-            .collect();
+
         let power =
             |value: Option<(f64, f64)>| value.map(|(value, error)| json!({ "value": value, "sigma": error }));
         let parameters = self.parameters.iter().find(|(name, _)| *name == sensor.name);
@@ -357,7 +353,7 @@ impl Report {
             "trend_per_h": power(sensor.slope),
             "second_order_per_h2": power(sensor.second_order.as_ref().and_then(|fit| fit.power(2))),
             "daily_lines": daily,
-            "lines": others,
+            "lines": sensor.lines,
             "extrapolation": sensor.extrapolation,
             "drift": parameters.map(|(_, parameters)| json!(parameters.drift)),
             "drift_notes": parameters.map(|(_, parameters)| json!(parameters.notes)),

@@ -35,7 +35,7 @@ pub struct Spectrum {
 }
 
 /// A line.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Line {
     /// Frequency (Hz).
     pub frequency_hz: f64,

@@ -99,7 +99,7 @@ impl Choice {
 }
 
 /// A row of 002's table 3: position errors of a voyage with the drift of a real gyro.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Voyaged {
     /// The gyro.
     pub gyro: &'static str,

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use isotherm_correction::drift::DriftParts;
 use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series, Table};
-use serde::Serialize;
+
 use serde_json::{Value, json};
 
 use super::ins::Errors;
@@ -30,19 +30,6 @@ pub struct Row {
     pub course: Course,
     /// Over many seeds; `None` for one drift.
     pub spread: Option<Spread>,
-}
-
-/// A row as JSON.
-#[derive(Debug, Serialize)]
-struct RowJson<'a> {
-    case: &'a str,
-    care: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    figures: Option<Figures>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    median: Option<Figures>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    within_95_percent: Option<Figures>,
 }
 
 /// What is said.
@@ -190,26 +177,19 @@ impl Report {
             .rows
             .iter()
             .map(|row| {
-                let figures = row.spread.is_none().then(|| row.course.figures());
-                let median = row.spread.as_ref().map(|spread| spread.median);
-                let within_95_percent = row.spread.as_ref().map(|spread| spread.within_95_percent);
-                let care = row.course.care.words();
-                let mut value = json!(RowJson { case: &row.case, care, figures, median, within_95_percent });
-                let points = row.course.points.iter();
-                let points: Vec<Value> = points
-                    .map(|(hours, errors)| {
-                        json!([
-                            hours,
-                            errors.heading_arcmin(),
-                            errors.position_m[0],
-                            errors.position_m[1],
-                            errors.radial_m()
-                        ])
-                    })
-                    .collect();
-                if let Some(object) = value.as_object_mut() {
-                    object.insert("points".to_owned(), json!(points));
+                let mut value = json!({ "case": row.case, "care": row.course.care.words() });
+                match &row.spread {
+                    None => value["figures"] = json!(row.course.figures()),
+                    Some(spread) => {
+                        value["median"] = json!(spread.median);
+                        value["within_95_percent"] = json!(spread.within_95_percent);
+                    }
                 }
+                let points = row.course.points.iter().map(|(hours, errors)| {
+                    let [north, east] = errors.position_m;
+                    [*hours, errors.heading_arcmin(), north, east, errors.radial_m()]
+                });
+                value["points"] = json!(points.collect::<Vec<_>>());
                 value
             })
             .collect();
@@ -222,7 +202,7 @@ impl Report {
             "rows": rows,
             "notes": self.notes,
             "models": self.choices,
-            "table_3": TABLE_3.map(|row| json!({ "gyro": row.gyro, "start": row.start, "existing_km": row.existing_km, "trend_km": row.trend_km })),
+            "table_3": TABLE_3,
         })
     }
 

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
-use crate::document::written::tidy;
+use crate::document::written::{matrix, numbers, tidy};
 use crate::numbers::unit;
 use crate::report::Sigmas;
 use crate::report::words::gyros as gyros_in_words;
@@ -203,8 +203,6 @@ pub fn details(made: &Made) -> Table {
 }
 
 fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, String>) -> Table {
-    let numbers =
-        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match fit {
@@ -214,10 +212,9 @@ fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, S
         Ok(fit) => {
             let names = fit.coefficients.iter().map(|one| format!("{}.{}", one.term.key(), one.power).into());
             table.insert("coefficient".into(), Value::Array(names.collect()));
-            table
-                .insert("sigma_deg_per_h".into(), numbers(&mut fit.coefficients.iter().map(|one| one.sigma)));
-            let rows = fit.covariance.row_iter().map(|row| numbers(&mut row.iter().copied()));
-            table.insert("covariance".into(), Value::Array(rows.collect()));
+            let sigmas = fit.coefficients.iter().map(|one| &one.sigma);
+            table.insert("sigma_deg_per_h".into(), numbers(sigmas));
+            table.insert("covariance".into(), matrix(&fit.covariance));
             table.insert(
                 "angle_random_walk_deg_per_sqrt_h".into(),
                 tidy(fit.noise.white.sqrt() / 60.0).into(),
@@ -237,7 +234,7 @@ fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, S
             let mut own = Table::new();
             own.insert("time_constant_sigma_s".into(), tidy(servo.transient.sigma_s).into());
             own.insert("frequency_loss_rms_hz".into(), tidy(servo.transient.loss_hz).into());
-            let sigmas = &mut servo.rest.coefficients.iter().map(|pair| pair[1]);
+            let sigmas = servo.rest.coefficients.iter().map(|[_, sigma]| sigma);
             own.insert("rest_frequency_sigma_hz".into(), numbers(sigmas));
             if let Some(delay_s) = servo.rest.delay_s {
                 own.insert("temperature_delay_s".into(), tidy(delay_s).into());

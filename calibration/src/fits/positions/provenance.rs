@@ -44,17 +44,7 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
 /// [`Error::Document`] where it cannot be written, which would be a mistake here.
 pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> Result<Table, Error> {
     let bent = analysis.quadratic.as_ref().is_some_and(|found| found.3 < 1e-3);
-    let coefficients: serde_json::Map<String, serde_json::Value> = report
-        .coefficients
-        .iter()
-        .map(|c| {
-            (
-                c.name.clone(),
-                json!({ "value": c.value, "sigma": c.sigma.unwrap_or(f64::NAN), "unit": c.unit }),
-            )
-        })
-        .filter(|(_, value)| value["sigma"].is_number() && value["value"].is_number())
-        .collect();
+
     let fit = &analysis.fit;
     let covariance = fit.axes_covariance(&settings.plan, 0) * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
     let covariance: Vec<Vec<f64>> = covariance
@@ -74,7 +64,7 @@ pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> 
         "quadratic_axes": bent,
         "verdict": report.headline(),
         "warnings": report.warnings,
-        "coefficients": coefficients,
+        "coefficients": report.coefficients_by_name(),
         // Two angles per accelerometer across its axis, at the reference.
         "axes_covariance_arcsec2": covariance,
         "relative_scale_sigma": scale_sigmas(analysis),

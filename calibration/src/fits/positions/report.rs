@@ -9,8 +9,10 @@ use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::judged::{Judgement, curves, lengths};
+use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
+use crate::document::accelerometers;
 use crate::report::figures::{counted, fixed, per_deg_c, short, six};
 use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
 
@@ -106,7 +108,7 @@ fn as_a_whole(verdicts: Vec<Verdict>) -> Vec<Verdict> {
 /// Names of the accelerometers.
 fn names(document: &Document, count: usize) -> Vec<String> {
     let of = |index: usize| {
-        let sensor = document.accel.as_ref().and_then(|accel| accel.sensor.get(index));
+        let sensor = accelerometers(document).get(index);
         sensor.map_or_else(|| index.to_string(), |sensor| sensor.name.clone())
     };
     (0..count).map(of).collect()
@@ -155,28 +157,24 @@ fn coefficients(
 ) -> Vec<Coefficient> {
     let fit = &analysis.fit;
     let output = output_unit(document);
+    let by_power = |power: usize| analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
     let mut all = Vec::new();
     let of_sensor = fit.degrees.of_sensor();
     let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
         let sigma = |offset: usize, scale: f64| {
-            Some(
-                fit.solution.sigma(index * of_sensor + offset)
-                    * super::model::SMALL
-                    * scale
-                    * analysis.widened,
-            )
+            Some(fit.solution.sigma(index * of_sensor + offset) * SMALL * scale * analysis.widened)
         };
         let guess = fit.guess[index].scale;
         for (power, k) in sensor.scale.iter().enumerate() {
-            let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
+            let factor = by_power(power);
             let value = k * factor / settings.gravity;
             let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
             let sigma = sigma(power, guess / settings.gravity * factor);
             all.push(Coefficient::new(format!("accelerometer {name} K{power}"), unit, value, sigma));
         }
         for (power, bias) in sensor.bias.iter().enumerate() {
-            let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
+            let factor = by_power(power);
             let unit = per_deg_c(output, power);
             let sigma = sigma(s + power, guess * factor);
             all.push(Coefficient::new(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma));
@@ -185,7 +183,7 @@ fn coefficients(
     let mut axes = |fit: &Fit, from: usize, what: &str| {
         for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
             for (power, row) in sensor.axis.iter().enumerate().skip(from) {
-                let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0)) * ARCSEC_PER_RAD;
+                let factor = by_power(power) * ARCSEC_PER_RAD;
                 let sigma = fit.axis_sigma(&settings.plan, index, power);
                 for i in across(sensor.axis[0]) {
                     all.push(Coefficient::new(

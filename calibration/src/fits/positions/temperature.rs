@@ -7,6 +7,7 @@ use isotherm_protocol::document::Document;
 use super::fit::Settings;
 use super::pose::Pose;
 use crate::axes::several;
+use crate::document::accelerometers;
 use crate::numbers::{ends, mean, once_each};
 use crate::report::figures::fixed;
 
@@ -24,8 +25,7 @@ fn channels(document: &Document, settings: &Settings) -> Vec<String> {
 
 /// The accelerometers' own channels.
 fn of_accelerometers(document: &Document) -> Vec<String> {
-    let sensors = document.accel.iter().flat_map(|accel| &accel.sensor);
-    once_each(sensors.filter_map(|sensor| sensor.channel.clone()))
+    once_each(accelerometers(document).iter().filter_map(|sensor| sensor.channel.clone()))
 }
 
 /// Temperatures that something was taken at (°C).
@@ -53,7 +53,7 @@ pub(super) fn own_deg_c(
     sensors: usize,
 ) -> Vec<Vec<f64>> {
     let of = |sensor: usize| -> Vec<f64> {
-        let channel = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor)?.channel.as_ref());
+        let channel = accelerometers(document).get(sensor).and_then(|sensor| sensor.channel.as_ref());
         let in_pose = |pose: &Pose| channel.and_then(|name| pose.temperature_deg_c.get(name).copied());
         let reads = poses.iter().any(|(pose, _)| in_pose(pose).is_some());
         let without = |axes: f64| if reads { axes } else { document.temperature.assumed_deg_c };
@@ -77,7 +77,7 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
         if range[1] - range[0] > LEVEL_GAP_DEG_C {
             continue;
         }
-        let channel = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor)?.channel.as_ref());
+        let channel = accelerometers(document).get(sensor).and_then(|sensor| sensor.channel.as_ref());
         let channel = channel.map_or("no channel".to_owned(), |channel| format!("channel {channel:?}"));
         match blind.iter_mut().find(|(of, ..)| *of == channel) {
             Some((_, sensors, [low, high])) => {
@@ -200,7 +200,7 @@ pub(super) fn slopes_deg_c(document: &Document, poses: &[Pose]) -> Option<f64> {
 /// r of the board of an accelerometer in a pose, by the document.
 pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f64 {
     let stated = || {
-        let sensor = document.accel.as_ref()?.sensor.get(sensor)?;
+        let sensor = accelerometers(document).get(sensor)?;
         let t = pose.temperature_deg_c.get(sensor.board_channel.as_ref()?)?;
         sensor.board_ratio_error.as_ref()?.shape().at(*t)
     };

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 use super::fit::Made;
 use super::model::GyroRates;
 use super::over_temperature::Level;
-use crate::document::written::tidy;
+use crate::document::written::{matrix, numbers, tidy};
 use crate::finding::Kind;
 use crate::numbers::unit;
 use crate::report::Sigmas;
@@ -89,8 +89,7 @@ pub fn details(made: &Made) -> Table {
 /// The axes at one temperature, with their standard errors.
 fn of_level(level: &Level) -> Value {
     let rows = |of: &dyn Fn(&GyroRates) -> [f64; 3]| {
-        let row = |found: &GyroRates| Value::Array(of(found).map(|x| tidy(x).into()).to_vec());
-        Value::Array(level.gyros.iter().map(row).collect())
+        Value::Array(level.gyros.iter().map(|found| numbers(&of(found))).collect())
     };
     let mut table = Table::new();
     table.insert("temperature_deg_c".into(), tidy(level.deg_c).into());
@@ -101,8 +100,6 @@ fn of_level(level: &Level) -> Value {
 }
 
 fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {
-    let numbers =
-        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match found {
@@ -122,15 +119,14 @@ fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {
             table.insert("bias_sigma_deg_per_h".into(), tidy(found.bias[1]).into());
             if found.axis.is_some() {
                 let sigmas = found.axis_sigma.map(|sigma| Angle::from_rad(sigma).as_arcsec());
-                table.insert("axis_sigma_arcsec".into(), numbers(&mut sigmas.into_iter()));
+                table.insert("axis_sigma_arcsec".into(), numbers(&sigmas));
             }
-            table.insert("nonlinearity_deg_per_h".into(), numbers(&mut found.left.iter().copied()));
+            table.insert("nonlinearity_deg_per_h".into(), numbers(&found.left));
             if found.chi_square.is_finite() {
                 table.insert("chi_square_per_freedom".into(), tidy(found.chi_square).into());
             }
             table.insert("angle_random_walk_deg_per_sqrt_h".into(), tidy(walk).into());
-            let rows = found.covariance.row_iter().map(|row| numbers(&mut row.iter().copied()));
-            table.insert("covariance".into(), Value::Array(rows.collect()));
+            table.insert("covariance".into(), matrix(&found.covariance));
         }
     }
     table

@@ -5,6 +5,7 @@ use isotherm_protocol::document::Document;
 
 use super::over_temperature::{Level, OverTemperature};
 use crate::axes::{AXES, main_axis};
+use crate::document::accelerometers;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::report::Sigmas;
 use crate::report::figures::fixed;
@@ -119,10 +120,7 @@ pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
 pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
     let elements = elements(over, document);
     let gyro = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
-    let accel = |index: usize| {
-        let sensors = document.accel.as_ref().map(|accel| &accel.sensor);
-        sensors.and_then(|sensors| sensors.get(index)).map_or("", |sensor| sensor.name.as_str())
-    };
+    let accel = |index: usize| accelerometers(document).get(index).map_or("", |sensor| sensor.name.as_str());
     let heads = elements.iter().map(|element| {
         let along = AXES[element.along];
         match element.accel {

@@ -9,6 +9,7 @@ use super::columns::Term;
 use super::outcome::{Outcome, axis_of};
 use super::stand::Stand;
 use crate::axes::output_name;
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::numbers::real;
@@ -161,8 +162,7 @@ impl Outcome {
 
     /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
     pub(super) fn take_simpler(&mut self, compared: &Compared) -> bool {
-        let sensors =
-            [self.base.accel.as_ref().map_or(0, |accel| accel.sensor.len()), self.base.gyro.sensor.len()];
+        let sensors = [accelerometers(&self.base).len(), self.base.gyro.sensor.len()];
         let mut changed = false;
         for (sensor, _, found) in &mut self.found {
             // Of more than three sensors none stands for an axis.

@@ -16,6 +16,7 @@ use super::sequential;
 use super::settings::{Method, Settings};
 use super::stand::Stand;
 use super::target::{rest, target};
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::figures::six;
@@ -184,7 +185,7 @@ fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
     };
     let gyros = bare.gyro.sensor.iter().enumerate();
     let gyros = gyros.filter_map(|(index, own)| sensor(true, index, &own.name, own.channel.as_ref()));
-    let accels = bare.accel.iter().flat_map(|accel| &accel.sensor).enumerate();
+    let accels = accelerometers(bare).iter().enumerate();
     let accels = accels.filter_map(|(index, own)| sensor(false, index, &own.name, own.channel.as_ref()));
     gyros.chain(accels).collect()
 }

@@ -12,6 +12,7 @@ use super::bare::along_axes;
 use super::checks::median_step_s;
 use super::noise::Thermometer;
 use super::thermometer::{noise_of, without_noise};
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::numbers::real;
@@ -60,7 +61,7 @@ impl Samples {
         watch: impl Watch,
     ) -> Result<Self, Error> {
         let gyro_count = bare.gyro.sensor.len();
-        let accel_count = bare.accel.as_ref().map_or(0, |accel| accel.sensor.len());
+        let accel_count = accelerometers(bare).len();
         // Patterns of turned sensors, then the same with a bias of one on every accelerometer.
         let patterns = gyro_count.max(accel_count).div_ceil(3);
         let biased = with_unit_bias(bare);

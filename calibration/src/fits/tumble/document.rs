@@ -100,9 +100,7 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'sta
             sensor.set(Feature::One, Curve::new(constant(mean(tumble.accel.bias))));
         }
     }
-    if let Ok(gyro) =
-        tumble.gyro.as_ref().map_err(|_| ()).and_then(|gyro| if given { Err(()) } else { Ok(gyro) })
-    {
+    if let (Ok(gyro), false) = (&tumble.gyro, given) {
         // Without the mean at rest the gyros would be judged by their bias, which nobody leaves in.
         for (sensor, rest) in document.gyro.sensor.iter_mut().zip(gyro.rest) {
             let rest = AngularRate::from_rad_per_s(rest).as_deg_per_h();

@@ -10,6 +10,7 @@ use super::acceleration::GyroDrift;
 use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
 use crate::axes::AXES;
+use crate::document::accelerometers;
 use crate::document::written::tidy;
 use crate::error::Error;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
@@ -18,7 +19,7 @@ use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
 use crate::numbers::{norm, unit};
 use crate::report::figures::{counted, fixed, short, six};
-use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
+use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict, output_unit};
 use crate::size::Size;
 
 /// Times by which the rms may grow in poses that the fit has not seen.
@@ -65,7 +66,7 @@ pub fn report(
 ) -> FitReport {
     let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit)
         .counting("poses, turns");
-    let accel = accelerometers(tumble, [&before.length, &after.length], settings.gravity);
+    let accel = of_accelerometers(tumble, [&before.length, &after.length], settings.gravity);
     let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
     let gyro = gyro.stated_as(Figure::Rms);
     let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);
@@ -104,7 +105,7 @@ pub fn report(
 }
 
 /// What came of the accelerometers: held-out poses decide.
-fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
+fn of_accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
     let sizes = [before, after].map(|values| Size::of(values));
     let outside = Size::of(&tumble.held_out);
     let verdict = Verdict::new("|f|−g", "m/s²", sizes).out_of_sample(Some([sizes[0], outside]));
@@ -191,11 +192,10 @@ fn at_rest(tumble: &Tumble) -> Option<String> {
 
 fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
     let accel = &tumble.accel;
-    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
-        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
-        isotherm_protocol::document::AccelOutput::Volts => "V or raw",
-        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
-    });
+    let output = match output_unit(document) {
+        "V" => "V or raw",
+        other => other,
+    };
     let mut all = Vec::new();
     for (axis, name) in AXES.iter().enumerate() {
         let of = |what: &str| format!("accelerometer {name} {what}");
@@ -251,13 +251,6 @@ fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
 /// # Errors
 /// [`Error::Document`] where it cannot be written, which would be a mistake here.
 pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Result<toml::Table, Error> {
-    let coefficients: serde_json::Map<String, serde_json::Value> = report
-        .coefficients
-        .iter()
-        .map(|c| {
-            (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(0.0), "unit": c.unit }))
-        })
-        .collect();
     let covariance: Vec<Vec<f64>> =
         tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
     let about = json!({
@@ -268,7 +261,7 @@ pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Resu
         "held_out_rms_m_per_s2": Size::of(&tumble.held_out).rms,
         "verdict": report.headline(),
         "warnings": report.warnings,
-        "coefficients": coefficients,
+        "coefficients": report.coefficients_by_name(),
         // Scale factors (relative), biases over K·g, angles xy, xz, yz (rad).
         "accelerometer_covariance": covariance,
     });
@@ -287,8 +280,7 @@ pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
         _ => 0.0,
     };
     let arcsec = |rad: f64| tidy(rad * ARCSEC_PER_RAD);
-    let sensors = document.accel.iter().flat_map(|accel| &accel.sensor);
-    for (axis, sensor) in sensors.enumerate().take(AXES.len()) {
+    for (axis, sensor) in accelerometers(document).iter().enumerate().take(AXES.len()) {
         let scale = tidy(accel.scale[axis].abs() * accel.sigma[axis]);
         sigmas.put("accel", &sensor.name, "scale_factor", vec![scale]);
         sigmas.put("accel", &sensor.name, "bias", vec![tidy(accel.sigma[3 + axis])]);
