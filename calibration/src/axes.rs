@@ -4,7 +4,6 @@
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The name of a sensor that has none of its own: x, y, z for three of a kind, numbers from 1 for others.
-#[must_use]
 pub fn sensor_name(index: usize, of: usize) -> String {
     match AXES.get(index).filter(|_| of == AXES.len()) {
         Some(axis) => (*axis).to_owned(),
@@ -13,14 +12,12 @@ pub fn sensor_name(index: usize, of: usize) -> String {
 }
 
 /// What the output along a case axis is called in reports: "gyro x", "accelerometer z".
-#[must_use]
 pub fn output_name(gyro: bool, axis: usize) -> String {
     let kind = if gyro { "gyro" } else { "accelerometer" };
     format!("{kind} {}", AXES.get(axis).copied().unwrap_or_default())
 }
 
 /// Sensors of a kind by their names: "gyro x", "gyros x and z", "gyros x, y and z".
-#[must_use]
 pub fn several(kind: &str, sensors: &[usize], of: usize) -> String {
     let names: Vec<String> = sensors.iter().map(|sensor| sensor_name(*sensor, of)).collect();
     match names.as_slice() {
@@ -31,7 +28,6 @@ pub fn several(kind: &str, sensors: &[usize], of: usize) -> String {
 }
 
 /// The case axis (0…2) that an input axis looks along more than along the others.
-#[must_use]
 pub fn main_axis(row: &[f64; 3]) -> usize {
     (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best })
 }

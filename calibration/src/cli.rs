@@ -78,7 +78,6 @@ fn run(cli: Cli) -> Result<Exit, Error> {
 }
 
 /// Runs the program and says how it ended.
-#[must_use]
 pub fn main() -> Exit {
     run(parse()).unwrap_or_else(|error| failed_lines(&error, error.exit()))
 }

@@ -9,6 +9,14 @@
 
 pub mod diff;
 pub mod merge;
+pub mod plain;
 pub mod provenance;
 pub mod show;
 pub mod written;
+
+use isotherm_protocol::document::{AccelSensor, Document};
+
+/// The accelerometers of a document.
+pub fn accelerometers(document: &Document) -> &[AccelSensor] {
+    document.accel.as_ref().map_or(&[], |accel| &accel.sensor)
+}

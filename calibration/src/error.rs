@@ -40,13 +40,21 @@ pub enum Error {
 
 impl Error {
     /// A file that could not be used.
-    #[must_use]
     pub fn file(path: &Path, action: &'static str, source: io::Error) -> Self {
         isotherm_log::error::Error::file(path, action, source).into()
     }
 
+    /// Data that do not allow what was asked for, for one reason.
+    pub fn refused(reason: impl Into<String>) -> Self {
+        Self::Refused(vec![reason.into()])
+    }
+
+    /// A document that cannot be made, for one reason.
+    pub fn document(why: &impl ToString) -> Self {
+        Self::Document(vec![why.to_string()])
+    }
+
     /// The same, with the logs that are cut short where that may be why.
-    #[must_use]
     pub fn beside(self, cuts: &[String]) -> Self {
         match self {
             Self::Refused(mut reasons) => {
@@ -72,7 +80,6 @@ impl Error {
     }
 
     /// The exit code that this error stands for.
-    #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
             Self::Log(error) => Exit::blaming(error.is_usage(), error.is_document()),

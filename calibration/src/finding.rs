@@ -211,13 +211,11 @@ pub enum Instead {
 
 impl Kind {
     /// In a log.
-    #[must_use]
     pub fn in_log(self, log: usize) -> Finding {
         Finding { place: Place { log: Some(log), ..Place::default() }, kind: self }
     }
 
     /// Of a gyro.
-    #[must_use]
     pub fn of_gyro(self, name: &str) -> Finding {
         Finding { place: Place { gyro: Some(name.to_owned()), ..Place::default() }, kind: self }
     }
@@ -225,7 +223,6 @@ impl Kind {
 
 impl AccelKind {
     /// Of an accelerometer.
-    #[must_use]
     pub fn of(self, name: &str) -> Finding {
         let place = Place { accel: Some(name.to_owned()), ..Place::default() };
         Finding { place, kind: Kind::Accel(self) }

@@ -8,13 +8,15 @@
 //! | [`runs`] | what a log has of one unit, to be corrected again and again; as columns, raw and corrected |
 //! | [`axes`] | case axes, and what sensors are called |
 //! | [`lsq`] | least squares: coefficients, covariance, cross-validation |
-//! | [`robust`], [`size`] | middle and scatter of numbers among which some may be wrong; mean, rms, deviation |
+//! | [`numbers`], [`robust`], [`size`] | counts, ends, lengths; middle and scatter of numbers among which some may be wrong; mean, rms, deviation |
 //! | [`finding`] | what can be wrong or is worth telling, and its words |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`document`] | a document on its way to a file; compared, merged, shown |
 //! | [`fits`] | a fit for each command |
 //! | [`validate`] | a document judged on other logs |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
+
+#![expect(clippy::must_use_candidate, clippy::return_self_not_must_use, reason = "a library of one program")]
 
 pub mod axes;
 pub mod cli;
@@ -25,6 +27,7 @@ pub mod fits;
 #[cfg(test)]
 mod fixture;
 pub mod lsq;
+pub mod numbers;
 pub mod report;
 pub mod robust;
 pub mod runs;

@@ -27,6 +27,7 @@ pub mod verdict;
 pub(crate) mod words;
 
 use isotherm_pages::{Chart, Table};
+use serde_json::{Value, json};
 
 pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
@@ -37,7 +38,7 @@ pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 use figures::{counted, short};
 
 /// One fitted coefficient.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Coefficient {
     /// What it is, such as "gyro x thermal rate, run-up".
     pub name: String,
@@ -51,7 +52,6 @@ pub struct Coefficient {
 
 impl Coefficient {
     /// A coefficient with its standard error.
-    #[must_use]
     pub fn new(name: impl Into<String>, unit: impl Into<String>, value: f64, sigma: Option<f64>) -> Self {
         Self { name: name.into(), unit: unit.into(), value, sigma }
     }
@@ -86,13 +86,11 @@ pub struct FitReport {
 
 impl FitReport {
     /// A report with nothing in it but what was done to which unit.
-    #[must_use]
     pub fn new(title: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { title: title.into(), unit: unit.into(), ..Self::default() }
     }
 
     /// With the name of what its sizes are over.
-    #[must_use]
     pub fn counting(mut self, what: &'static str) -> Self {
         self.counted = Some(what);
         self
@@ -104,26 +102,32 @@ impl FitReport {
     }
 
     /// Every verdict, one sentence each, in one line.
-    #[must_use]
     pub fn headline(&self) -> String {
         verdict::sentences(&self.verdicts).join(" ")
     }
 
+    /// The coefficients by name as documents keep them, with their standard errors, 0 where none is known; what is no number is left out.
+    pub fn coefficients_by_name(&self) -> serde_json::Map<String, Value> {
+        let numbers = self.coefficients.iter().filter(|c| c.value.is_finite());
+        let known =
+            numbers.filter_map(|c| Some((c, Some(c.sigma.unwrap_or(0.0)).filter(|s| s.is_finite())?)));
+        known
+            .map(|(c, sigma)| (c.name.clone(), json!({ "value": c.value, "sigma": sigma, "unit": c.unit })))
+            .collect()
+    }
+
     /// Whether every sensor was accepted.
-    #[must_use]
     pub fn accepted(&self) -> bool {
         self.verdicts.iter().all(|verdict| verdict.accepted)
     }
 
     /// The refusals, for the end of a command.
-    #[must_use]
     pub fn refusals(&self) -> Vec<String> {
         let refused = self.verdicts.iter().filter(|verdict| !verdict.accepted);
         refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
     }
 
     /// What a terminal shows: the verdicts in the first lines, and what is to be looked at.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let warnings: Vec<String> = self.warnings.iter().map(|words| format!("warning: {words}")).collect();
         let rest = format!(
@@ -137,7 +141,6 @@ impl FitReport {
 
     /// Coefficients as a table; the first column numbers them as the chart does.
     fn coefficient_rows(&self) -> Table {
-        let head = ["", "coefficient", "value", "± σ", "value/σ", "unit"].map(str::to_owned).to_vec();
         let row = |(index, coefficient): (usize, &Coefficient)| {
             let Coefficient { name, unit, value, sigma } = coefficient;
             let known = sigma.filter(|sigma| sigma.is_finite());
@@ -152,7 +155,8 @@ impl FitReport {
                 unit.clone(),
             ]
         };
-        Table { head, rows: self.coefficients.iter().enumerate().map(row).collect() }
+        let head = ["", "coefficient", "value", "± σ", "value/σ", "unit"];
+        Table::of(head, self.coefficients.iter().enumerate().map(row))
     }
 }
 

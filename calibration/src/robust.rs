@@ -1,18 +1,18 @@
 //! Middle and scatter of numbers among which some may be wrong.
 
+use crate::numbers::{mean, real};
+
 /// Standard deviation of a normal distribution, in medians of absolute deviations.
 pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Median of |a − b| of two normal numbers, in standard deviations of either.
 const STEP_PER_SIGMA: f64 = 0.953_9;
 
 /// The middle one, or the mean of the two middle ones; zero without any. What is no number is left out.
-#[must_use]
 pub fn median(values: &[f64]) -> f64 {
     median_if_any(values).unwrap_or(0.0)
 }
 
 /// The same, and `None` without any.
-#[must_use]
 pub fn median_if_any(values: &[f64]) -> Option<f64> {
     let mut good: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let count = good.len();
@@ -28,14 +28,12 @@ pub fn median_if_any(values: &[f64]) -> Option<f64> {
 }
 
 /// Standard deviation by the median of absolute deviations.
-#[must_use]
 pub fn scatter(values: &[f64]) -> f64 {
     let [_, scatter] = middle_and_scatter(values);
     scatter
 }
 
 /// The median, and the standard deviation by the median of absolute deviations from it.
-#[must_use]
 pub fn middle_and_scatter(values: &[f64]) -> [f64; 2] {
     let middle = median(values);
     let away: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
@@ -43,7 +41,6 @@ pub fn middle_and_scatter(values: &[f64]) -> [f64; 2] {
 }
 
 /// Standard deviation of white noise by the median step from value to value, whatever slow drift is below it.
-#[must_use]
 pub fn scatter_of_steps(values: &[f64]) -> f64 {
     let steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     median(&steps) / STEP_PER_SIGMA
@@ -54,7 +51,6 @@ const WINDOWS_PER_BLOCK: usize = 200;
 const LONGEST_BLOCK: usize = 10;
 
 /// Length of the blocks that so many windows are averaged over before something slow is looked for in them: white noise no longer hides it.
-#[must_use]
 pub fn block_length(windows: usize) -> usize {
     (windows / WINDOWS_PER_BLOCK).clamp(1, LONGEST_BLOCK)
 }
@@ -62,18 +58,16 @@ pub fn block_length(windows: usize) -> usize {
 /// Whether windows scatter about their mean as white noise does, block by block: neighbours then differ by as much as any two
 /// (von Neumann 1941: half the mean square step over the variance is 1 ± 1/√n). Windows that are no number are left out; fewer than
 /// twenty blocks tell nothing.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
 pub fn is_white(windows: &[f64]) -> bool {
     const FEWEST: usize = 20;
     const SIGMAS: f64 = 3.0;
     let good: Vec<f64> = windows.iter().copied().filter(|value| value.is_finite()).collect();
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+
     let blocks: Vec<f64> = good.chunks_exact(block_length(good.len())).map(mean).collect();
     let middle = mean(&blocks);
     let square: f64 = blocks.iter().map(|block| (block - middle) * (block - middle)).sum();
     let steps: f64 = blocks.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
-    blocks.len() >= FEWEST && 0.5 * steps / square > 1.0 - SIGMAS / (blocks.len() as f64).sqrt()
+    blocks.len() >= FEWEST && 0.5 * steps / square > 1.0 - SIGMAS / real(blocks.len()).sqrt()
 }
 
 #[cfg(test)]

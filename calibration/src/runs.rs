@@ -31,7 +31,7 @@ use isotherm_log::source::Log;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use crate::error::Error;
 use crate::report::figures::six;
@@ -101,14 +101,12 @@ pub type Troubles = Vec<String>;
 
 impl Run {
     /// The run of a unit in the files of a log; nothing is read yet.
-    #[must_use]
     pub fn new(name: String, unit: UnitId, files: LogFiles, part: &Part) -> Self {
         let part = Part { units: [unit.clone()].into(), ..part.clone() };
         Self::of(name, unit, Source::Files { files, part })
     }
 
     /// A run that is already in memory.
-    #[must_use]
     pub fn of_events(name: String, unit: UnitId, events: Vec<LogEvent>) -> Self {
         Self::of(name, unit, Source::Events(events.into()))
     }
@@ -118,13 +116,11 @@ impl Run {
     }
 
     /// The same, where folders were given that have its files.
-    #[must_use]
     pub fn given_as(self, given: Vec<PathBuf>) -> Self {
         Self { given, ..self }
     }
 
     /// The same with three of its gyros only, for corrections with a document of these three.
-    #[must_use]
     pub fn of_gyros(&self, gyros: [usize; 3]) -> Self {
         Self { gyros: Some(gyros), ..self.clone() }
     }
@@ -147,7 +143,6 @@ impl Run {
     }
 
     /// The files that it is read from; none where it is in memory.
-    #[must_use]
     pub fn files(&self) -> &[PathBuf] {
         match &self.source {
             Source::Files { files: LogFiles::Recordings(paths) | LogFiles::Text { paths, .. }, .. } => paths,
@@ -156,13 +151,11 @@ impl Run {
     }
 
     /// The files and folders that it was given as, which documents name; its files where nothing else is known.
-    #[must_use]
     pub fn logs(&self) -> &[PathBuf] {
         if self.given.is_empty() { self.files() } else { &self.given }
     }
 
     /// Whether it is from a file that another run is from, too.
-    #[must_use]
     pub fn shares_log(&self, other: &Self) -> bool {
         self.files().iter().any(|file| other.files().contains(file))
     }
@@ -177,11 +170,11 @@ impl Run {
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
             let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
             if usual_s > longest_s {
-                return Err(Error::Refused(vec![format!(
+                return Err(Error::refused(format!(
                     "{}: its {kind} ticks last {} s, at most {longest_s} s can be corrected: log more often",
                     self.name,
                     six(usual_s)
-                )]));
+                )));
             }
         }
         if series.gyros.is_empty() && series.accels.is_empty() {
@@ -248,7 +241,6 @@ impl Run {
     }
 
     /// That its recording was cut short, and where, once that was found by reading it.
-    #[must_use]
     pub fn cut_short(&self) -> Option<&str> {
         self.cut.words()
     }
@@ -302,7 +294,8 @@ impl Run {
                 Piece::Event(event) => each(Fed::Event(&self.taken(event))),
                 Piece::Message(message) => {
                     let Topic::Raw(_, input) = message.topic else { return Ok(()) };
-                    match events(input, &message.frame) {
+                    let has_ticks = matches!(input, RawStream::Gyro | RawStream::Accel);
+                    match has_ticks.then(|| readings(input, &message.frame)).flatten() {
                         Some(events) => events.iter().for_each(|event| each(Fed::Event(&self.taken(event)))),
                         None => each(Fed::Frame(input, &message.frame)),
                     }
@@ -327,19 +320,23 @@ impl Run {
     }
 }
 
-/// What a frame of raw readings holds, one by one; `None` where it holds something else, or cannot be read.
-fn events(input: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
-    match input {
+/// What a frame of raw readings holds, one by one; `None` where it cannot be read.
+fn readings(stream: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
+    Some(match stream {
         RawStream::Gyro => {
             let GyroBatch { output, ticks } = codec::decode(frame).ok()?;
-            Some(ticks.into_iter().map(|tick| LogEvent::Gyro { output, tick }).collect())
+            ticks.into_iter().map(|tick| LogEvent::Gyro { output, tick }).collect()
         }
         RawStream::Accel => {
             let AccelBatch { output, ticks } = codec::decode(frame).ok()?;
-            Some(ticks.into_iter().map(|tick| LogEvent::Accel { output, tick }).collect())
+            ticks.into_iter().map(|tick| LogEvent::Accel { output, tick }).collect()
         }
-        _ => None,
-    }
+        RawStream::Temperature => {
+            let TemperatureBatch { readings, .. } = codec::decode(frame).ok()?;
+            readings.into_iter().map(LogEvent::Temperature).collect()
+        }
+        RawStream::Health => Vec::new(),
+    })
 }
 
 /// The units that recordings have raw readings of, and where they are cut short.

@@ -1,7 +1,9 @@
 //! How large a set of numbers is.
 
+use crate::numbers::{ends, real};
+
 /// Size of a set of numbers; those that are no number are left out.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Size {
     /// How many there are.
     pub count: usize,
@@ -10,6 +12,7 @@ pub struct Size {
     /// Root mean square.
     pub rms: f64,
     /// Standard deviation about the mean.
+    #[serde(rename = "standard_deviation")]
     pub deviation: f64,
     /// Largest less smallest.
     pub peak_to_peak: f64,
@@ -17,19 +20,16 @@ pub struct Size {
 
 impl Size {
     /// Of some values; zero without any.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
     pub fn of(values: &[f64]) -> Self {
         let good = || values.iter().copied().filter(|value| value.is_finite());
         let count = good().count();
         if count == 0 {
             return Self::default();
         }
-        let mean = good().sum::<f64>() / count as f64;
+        let mean = good().sum::<f64>() / real(count);
         let about =
-            |centre: f64| (good().map(|x| (x - centre) * (x - centre)).sum::<f64>() / count as f64).sqrt();
-        let (low, high) =
-            good().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+            |centre: f64| (good().map(|x| (x - centre) * (x - centre)).sum::<f64>() / real(count)).sqrt();
+        let [low, high] = ends(good());
         Self { count, mean, rms: about(0.0), deviation: about(mean), peak_to_peak: high - low }
     }
 }

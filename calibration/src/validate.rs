@@ -17,12 +17,13 @@ use crate::document::written::Written;
 use crate::error::Error;
 use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::judging;
+use crate::numbers::{norm, real};
 use crate::report::figures::short;
 use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict};
 use crate::robust::is_white;
 use crate::runs::Watch;
 use crate::runs::swapped::{Shown, up};
-use crate::runs::table::{Rows, Table, Takes, is_one_g, usual_window_s};
+use crate::runs::table::{Rows, Table, is_one_g, usual_window_s};
 use crate::size::Size;
 use coverage::Coverage;
 pub use runs::JudgedLog;
@@ -67,10 +68,10 @@ pub fn validate(
     for log in logs {
         let run = &log.run;
         if run.unit.to_string() != document.unit {
-            return Err(Error::Refused(vec![format!(
+            return Err(Error::refused(format!(
                 "{} is of unit {}, {name} is for unit {}: give the log with its own document",
                 run.name, run.unit, document.unit
-            )]));
+            )));
         }
         let series = run.series(&mut watch)?;
         readings.push((judging(&run.name, &series, &Stand::default()), series.gyros.length_s()));
@@ -79,10 +80,9 @@ pub fn validate(
     let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));
     for (log, (faults, _)) in logs.iter().zip(readings) {
         let run = &log.run;
-        let rows = Rows { length_s: window_s, takes: Takes::Valid };
         let documents = [written.loaded.clone(), bare.clone()];
-        let mut tables = Table::together(run, &documents, rows, &mut watch)?.into_iter();
-        let mut next = || tables.next().unwrap_or_default().whole(0.999);
+        let mut tables = Table::together(run, &documents, Rows::valid(window_s), &mut watch)?.into_iter();
+        let mut next = || tables.next().unwrap_or_default();
         let (after, nominal) = (next(), next());
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = format!(
@@ -150,7 +150,7 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
     let mut doubts = Vec::new();
     let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
     if force.iter().all(|size| size.count > 0) {
-        let length = force.iter().map(|size| size.mean * size.mean).sum::<f64>().sqrt();
+        let length = norm(force.map(|size| size.mean));
         if !is_one_g(length) {
             doubts.push(format!(
                 "{name}: the mean specific force is {} m/s², gravity is 9.76 to 9.84: check the unit of the columns, \
@@ -162,8 +162,7 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
     for curve in curves {
         let of = &curve.of;
         let [before, _] = curve.sizes();
-        #[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
-        let share = before.count as f64 / curve.before.len().max(1) as f64;
+        let share = real(before.count) / real(curve.before.len().max(1));
         if share < WHOLE {
             doubts.push(format!(
                 "{name}: {of}: {:.0} % of the windows have gaps or flags and are left out",
@@ -204,12 +203,12 @@ fn at_rest(name: &str, means: &Table) -> Option<String> {
         }
     }
     let mean = [0, 1, 2].map(|axis| Size::of(means.force(axis)).mean);
-    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+
     let [a, b, c] = mean;
     let forces = means.force(0).iter().zip(means.force(1)).zip(means.force(2));
     let sines =
         forces.filter(|((x, y), z)| x.is_finite() && y.is_finite() && z.is_finite()).map(|((x, y), z)| {
-            length([b * z - c * y, c * x - a * z, a * y - b * x]) / (length(mean) * length([*x, *y, *z]))
+            norm([b * z - c * y, c * x - a * z, a * y - b * x]) / (norm(mean) * norm([*x, *y, *z]))
         });
     let largest = sines.filter(|sine| sine.is_finite()).fold(0.0, f64::max);
     if largest > REST_TILT {
@@ -226,7 +225,7 @@ fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error>
     let known = force.iter().all(|size| size.count > 0);
     let rate = place.earth_rate_in_case(known.then(|| force.map(|size| size.mean)));
     let Some(rate) = rate else {
-        return Err(Error::Refused(vec![format!(
+        return Err(Error::refused(format!(
             "{name}: the unit cannot be levelled: {}. Give --roll and --pitch, or remove --latitude and --heading: \
              then each mean is removed",
             if known {
@@ -234,7 +233,7 @@ fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error>
             } else {
                 "it has no accelerometers"
             }
-        )]));
+        )));
     };
     let rate = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
     Ok(Rest { rate_deg_per_h: Some(rate), ..Rest::default() })

@@ -22,6 +22,12 @@ impl Axis {
     pub fn of(label: &str, unit: &str) -> Self {
         Self { label: label.to_owned(), unit: unit.to_owned(), logarithmic: false }
     }
+
+    /// The same, logarithmic.
+    #[must_use]
+    pub fn logarithmic(self) -> Self {
+        Self { logarithmic: true, ..self }
+    }
 }
 
 /// Colours, by what they stand for.
@@ -119,6 +125,20 @@ pub struct Series {
     pub samples: Samples,
 }
 
+impl Series {
+    /// Points that are joined by lines.
+    #[must_use]
+    pub fn line(name: impl Into<String>, ink: Ink, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { name: name.into(), ink, form: Form::Line, samples: Samples::points(points) }
+    }
+
+    /// Points one by one.
+    #[must_use]
+    pub fn dots(name: impl Into<String>, ink: Ink, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { form: Form::Dots, ..Self::line(name, ink, points) }
+    }
+}
+
 /// Flags of many ticks, one bit each.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bits(pub Vec<u32>);
@@ -199,6 +219,21 @@ pub struct Panel {
     pub content: Content,
 }
 
+impl Panel {
+    /// Curves over a linear axis, so high (CSS pixels).
+    #[must_use]
+    pub fn of(title: impl Into<String>, unit: impl Into<String>, height: u32, curves: Vec<Series>) -> Self {
+        let content = Content::Series(curves);
+        Self { title: title.into(), unit: unit.into(), height, logarithmic: false, content }
+    }
+
+    /// The same over a logarithmic axis.
+    #[must_use]
+    pub fn logarithmic(self) -> Self {
+        Self { logarithmic: true, ..self }
+    }
+}
+
 /// Something that happened at one place of the axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
@@ -223,4 +258,12 @@ pub struct Chart {
     pub panels: Vec<Panel>,
     /// What happened on the way.
     pub marks: Vec<Mark>,
+}
+
+impl Chart {
+    /// Panels with nothing that happened on the way.
+    #[must_use]
+    pub fn of(caption: impl Into<String>, x: Axis, panels: Vec<Panel>) -> Self {
+        Self { caption: caption.into(), x, panels, marks: Vec::new() }
+    }
 }

@@ -8,28 +8,13 @@
 //! draws, for each column of pixels, the smallest and largest of what falls into it, so that no peak is lost at any zoom.
 //!
 //! ```
-//! use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series};
+//! use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series};
 //!
-//! let residual = Series {
-//!     name: "residual".into(),
-//!     ink: Ink::Corrected,
-//!     form: Form::Dots,
-//!     samples: Samples::points([(-40.0, 0.3), (20.0, -0.1), (60.0, 0.2)]),
-//! };
+//! let residual = Series::dots("residual", Ink::Corrected, [(-40.0, 0.3), (20.0, -0.1), (60.0, 0.2)]);
+//! let panel = Panel::of("bias", "°/h", 160, vec![residual]);
 //! let mut page = Page::new("Fit of the static bias");
 //! page.paragraph("Residuals of the fit against temperature.");
-//! page.chart(&Chart {
-//!     caption: "Residuals, gyro x.".into(),
-//!     x: Axis::of("temperature", "°C"),
-//!     panels: vec![Panel {
-//!         title: "bias".into(),
-//!         unit: "°/h".into(),
-//!         height: 160,
-//!         logarithmic: false,
-//!         content: Content::Series(vec![residual]),
-//!     }],
-//!     marks: Vec::new(),
-//! });
+//! page.chart(&Chart::of("Residuals, gyro x.", Axis::of("temperature", "°C"), vec![panel]));
 //! assert!(page.to_html().starts_with("<!doctype html>"));
 //! ```
 //!
@@ -69,6 +54,17 @@ pub struct Table {
     pub head: Vec<String>,
     /// Rows, each as long as the head.
     pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// Rows below their heads.
+    #[must_use]
+    pub fn of(
+        head: impl IntoIterator<Item = impl Into<String>>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) -> Self {
+        Self { head: head.into_iter().map(Into::into).collect(), rows: rows.into_iter().collect() }
+    }
 }
 
 /// A page that is being written from top to bottom.

@@ -63,9 +63,7 @@ impl BoardArgs {
                     .to_owned(),
             ));
         }
-        let Some(base) = &work.base else {
-            return Err(Error::Usage("--calibration is needed".to_owned()));
-        };
+        let base = work.base()?;
         let wanted = Wanted {
             runs: &work.runs,
             judges: &work.judges,

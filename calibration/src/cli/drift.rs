@@ -97,7 +97,8 @@ impl DriftArgs {
         let report = self.report(job)?;
         // Where every gyro is refused there is nothing new to say.
         let stated = self.output.files().out.is_some() && !report.parameters.is_empty();
-        let document = stated.then(|| self.document(job.work, &report)).transpose()?;
+        let base = job.work.base.as_ref().filter(|_| stated);
+        let document = base.map(|base| self.document(base, job.work, &report)).transpose()?;
         Ok(Done { report, document })
     }
 
@@ -159,10 +160,7 @@ impl DriftArgs {
     }
 
     /// The unit's document with the parameters in it.
-    fn document(&self, work: &Work, report: &Report) -> Result<Written, Error> {
-        let Some(base) = &work.base else {
-            return Err(Error::Usage("--out needs --calibration".to_owned()));
-        };
+    fn document(&self, base: &Written, work: &Work, report: &Report) -> Result<Written, Error> {
         let mut document = base.document.clone();
         // What the document says of the constant part holds, unless something else was stated.
         put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
@@ -184,7 +182,7 @@ impl DriftArgs {
             "notes": notes,
             "log": of_log.log,
         });
-        let about = toml::Value::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))?;
+        let about = toml::Value::try_from(about).map_err(|error| Error::document(&error))?;
         details.insert("drift".to_owned(), about);
         whole.details = Some(details);
         document.origin = Some(whole);

@@ -103,7 +103,7 @@ impl<'a> Task<'a> {
             &units,
             |ready| bar.at(ready as u64),
             |(unit, work)| {
-                let work = work.as_ref().map_err(|error| Error::Refused(vec![error.to_string()]))?;
+                let work = work.as_ref().map_err(|error| Error::refused(error.to_string()))?;
                 written(&Job { work, among: Some(unit.as_str()) })
             },
         );

@@ -192,9 +192,9 @@ impl ImpactArgs {
                 "leave the document out, or give one that states it for the gyros along x, y and z only"
             };
             let (path, count) = (path.display(), stated.len());
-            Error::Refused(vec![format!(
+            Error::refused(format!(
                 "{path} states a drift for {count} gyros, the platform has three: {advice}"
-            )])
+            ))
         })
     }
 

@@ -9,7 +9,7 @@ use super::driver::emit;
 use super::files::Files;
 use super::output::{a_date, date};
 use crate::document::merge::{Merged, Take, merge};
-use crate::document::written::Written;
+use crate::document::written::{Written, name_of};
 use crate::error::Error;
 
 /// Put parts of a calibration that different commands have made into one document
@@ -58,10 +58,6 @@ impl MergeArgs {
         let name = name_of(&self.out);
         emit(self.json, || merged.to_json(&name), || merged.sheet(&name).to_text())
     }
-}
-
-fn name_of(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Reads KEY=DOC.

@@ -14,6 +14,7 @@ use crate::error::Error;
 use crate::fits::modes::document::{details, sigmas};
 use crate::fits::modes::fit::{Wanted, make};
 use crate::fits::modes::model::Asked;
+use crate::numbers::hull;
 
 /// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
 #[derive(Debug, Args)]
@@ -71,7 +72,7 @@ impl ModesArgs {
 
     fn fit(&self, job: &Job<'_>, place: Option<Place>) -> Result<Fitted, Error> {
         let work = job.work;
-        let Some(base) = &work.base else { return Err(Error::Usage(NO_DOCUMENT.to_owned())) };
+        let base = work.base()?;
         let order = |order: Option<u8>| order.map(usize::from);
         let made = make(
             &Wanted {
@@ -96,7 +97,7 @@ impl ModesArgs {
             key: "modes",
             details: details(&made),
             sigmas: sigmas(&made),
-            range_deg_c: ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]),
+            range_deg_c: hull(ranges),
         };
         Ok(Fitted { report: made.report(), written: made.written, about })
     }

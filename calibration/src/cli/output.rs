@@ -91,8 +91,7 @@ impl About {
             // What the rest of the document rests on.
             let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
             let earlier = json!({ "tool": tool, "method": method, "log": before.log });
-            let earlier =
-                toml::Value::try_from(earlier).map_err(|error| Error::Document(vec![error.to_string()]))?;
+            let earlier = toml::Value::try_from(earlier).map_err(|error| Error::document(&error))?;
             details.insert("before".to_owned(), earlier);
         }
         details.insert(self.key.to_owned(), toml::Value::Table(self.details.clone()));

@@ -1,13 +1,9 @@
 //! `isotherm-calibrate positions`.
 
-mod planned;
-mod steps;
-
 use std::path::PathBuf;
 
 use clap::{Arg, Args};
 use isotherm_cli::Bar;
-use isotherm_protocol::document::AccelOutput;
 
 use super::driver::{Job, Task, emit};
 use super::limits::above_0;
@@ -17,19 +13,19 @@ use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
 use crate::document::written::Written;
 use crate::error::Error;
-use crate::fits::positions::budget::ARCSEC_PER_RAD;
+use crate::fits::positions::bare::of_run;
+use crate::fits::positions::budget::{ARCSEC_PER_RAD, Budget};
 use crate::fits::positions::document::{complete, range};
 use crate::fits::positions::fit::{Analysis, Settings, analyse, positions};
-use crate::fits::positions::judged::Judgement;
+use crate::fits::positions::judged::{Judgement, judge};
 use crate::fits::positions::plan::Plan;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::provenance::{before, details, sigmas};
 use crate::fits::positions::report::{Set, report};
 use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
+use crate::fits::positions::track::Track;
 use crate::runs::Run;
-use planned::PlannedArgs;
-use steps::{first_document, judged, tracks};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
 #[derive(Debug, Args)]
@@ -92,7 +88,7 @@ pub(super) struct PositionsArgs {
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
     accelerometer_unit: String,
     #[command(flatten)]
-    planned: PlannedArgs,
+    planned: Budget,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -139,7 +135,11 @@ impl PositionsArgs {
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
-        let budget = self.planned.budget(self.positioning, self.run_out);
+        let budget = Budget {
+            positioning_arcsec: self.positioning,
+            run_out_arcsec: self.run_out,
+            ..self.planned.clone()
+        };
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
         let json = || budget.to_json(plan, levelling_rad);
         emit(self.output.files().json, json, || budget.to_text(plan, levelling_rad))
@@ -174,24 +174,10 @@ impl PositionsArgs {
     ) -> Result<Fitted, Error> {
         let (work, bar) = (job.work, || job.bar());
         let runs = &work.runs;
-        let output = if self.accelerometer_unit == "V" {
-            AccelOutput::Volts
-        } else {
-            AccelOutput::MetresPerSecondSquared
-        };
-        let first;
-        let base = match &work.base {
-            Some(base) if base.document.accel.is_some() => base,
-            Some(_) => {
-                return Err(Error::Refused(vec![
-                    "the document has no accelerometers: add [accel] with their channels, nominal scale factors and axes".to_owned(),
-                ]));
-            }
-            None => {
-                first = Written::of(&first_document(runs, output, bar())?)?;
-                &first
-            }
-        };
+        let add = "add [accel] with their channels, nominal scale factors and axes";
+        let base = &*work.base_with_accelerometers(add, || {
+            Written::of(&of_run(work.run()?, &self.accelerometer_unit, bar())?)
+        })?;
         let tracks = tracks(runs, base, bar)?;
         let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;
         analysis.warnings.extend(about_gravity.cloned());
@@ -237,4 +223,23 @@ fn outside(
     }
     let (poses, _) = positions(&tracks(runs, base, bar)?, settings).map_err(Error::Refused)?;
     Ok(Some(judged(settings, analysis, &poses, runs, [before, after], bar)?))
+}
+
+/// Runs tick by tick, corrected with a document.
+fn tracks(runs: &[Run], written: &Written, bar: impl Fn() -> Bar + Copy) -> Result<Vec<Track>, Error> {
+    runs.iter().map(|run| Track::of(run, &written.loaded, bar())).collect()
+}
+
+/// Poses of runs, before and after.
+fn judged(
+    settings: &Settings,
+    analysis: &Analysis,
+    poses: &[(Pose, usize)],
+    runs: &[Run],
+    [before, after]: [&Written; 2],
+    bar: impl Fn() -> Bar + Copy,
+) -> Result<Vec<Judgement>, Error> {
+    let (before, after) = (tracks(runs, before, bar)?, tracks(runs, after, bar)?);
+    let errors = analysis.fit.stand.map(|(error, _)| error);
+    Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use isotherm_cli::Bar;
 use isotherm_correction::earth::Place;
 use isotherm_correction::sample::OutputKind;
-use isotherm_protocol::document::{Document, GyroOutput};
+use isotherm_protocol::document::{Document, GyroOutput, Temperature};
 
 use super::driver::{Job, Task};
 use super::limits::within;
@@ -14,8 +14,9 @@ use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
+use crate::document::plain::plain;
 use crate::error::Error;
-use crate::fits::rates::document::{details, nominal, sigmas};
+use crate::fits::rates::document::{details, sigmas};
 use crate::fits::rates::fit::{Wanted, make};
 use crate::fits::rates::steps::{Step, listed, read};
 use crate::runs::Run;
@@ -125,6 +126,9 @@ impl RatesArgs {
     }
 }
 
+/// Temperature of a unit whose document names no channel (°C).
+const ASSUMED_DEG_C: f64 = 20.0;
+
 /// A nominal document for a log of three gyros.
 fn without_document(run: &Run, bar: Bar) -> Result<Document, Error> {
     let mut output = None;
@@ -140,5 +144,6 @@ fn without_document(run: &Run, bar: Bar) -> Result<Document, Error> {
         )));
     }
     let output = if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
-    Ok(nominal(&run.unit.to_string(), output))
+    let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() };
+    Ok(plain(run.unit.as_str(), output, temperature, None))
 }

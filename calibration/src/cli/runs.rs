@@ -73,11 +73,11 @@ impl LogArgs {
             (Some((_, run)), None) => Ok(run),
             (Some((first, _)), Some(second)) => {
                 let others = units.keys().skip(1).fold(String::new(), |list, unit| format!("{list}, {unit}"));
-                Err(Error::Refused(vec![format!(
+                Err(Error::refused(format!(
                     "the log is of several units ({first}, {second}{others}): choose one with --unit"
-                )]))
+                )))
             }
-            (None, _) => Err(Error::Refused(vec!["the log has no raw readings".to_owned()])),
+            (None, _) => Err(Error::refused("the log has no raw readings")),
         }
     }
 }
@@ -154,7 +154,7 @@ impl Reading {
                     let mut log = Log::recordings(std::slice::from_ref(file))?;
                     let (units, cut) = units_of(&mut log, bar::reading())?;
                     if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
-                        return Err(Error::Refused(vec![format!("no raw readings can be read: {cut}")]));
+                        return Err(Error::refused(format!("no raw readings can be read: {cut}")));
                     }
                     for unit in units {
                         of_units.entry(unit).or_default().push(file.clone());
@@ -180,10 +180,10 @@ impl Reading {
             let about =
                 std::fs::metadata(path).map_err(|source| Error::file(path, "open the log", source))?;
             if about.is_file() && about.len() == 0 {
-                return Err(Error::Refused(vec![format!(
+                return Err(Error::refused(format!(
                     "{} is empty: was it recorded and copied completely?",
                     path.display()
-                )]));
+                )));
             }
         }
         let folder = logs.iter().find(|path| path.is_dir());

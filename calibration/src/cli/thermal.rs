@@ -4,7 +4,7 @@ mod stands;
 
 use std::path::Path;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use isotherm_correction::units::Span;
 
 use super::driver::{Done, Job, Task};
@@ -34,11 +34,11 @@ pub(super) struct ThermalArgs {
     #[command(flatten)]
     log: LogArgs,
     /// Method of the fit
-    #[arg(long, value_enum, default_value_t = MethodArg::Joint)]
-    method: MethodArg,
+    #[arg(long, value_enum, default_value_t = Method::Joint)]
+    method: Method,
     /// Choice of terms: cross-validation, or the largest model
-    #[arg(long, value_enum, default_value_t = TermsArg::Auto)]
-    terms: TermsArg,
+    #[arg(long, value_enum, default_value_t = Terms::Auto)]
+    terms: Terms,
     #[command(flatten)]
     judge: JudgeArgs,
     /// Start this long after each judging log's beginning (s)
@@ -65,25 +65,6 @@ pub(super) struct ThermalArgs {
     /// Smoothing of the temperature (s) (default: by cross-validation)
     #[arg(long, hide_short_help = true, value_name = "SECONDS")]
     smoothing: Option<f64>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum MethodArg {
-    /// Plateaus, then rate, then acceleration of temperature (paper 000)
-    Sequential,
-    /// Plateaus, then the rate alone
-    Rate,
-    /// All terms at once, shrunk by cross-validation
-    #[value(alias = "lag")]
-    Joint,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum TermsArg {
-    /// Cross-validation across thermal branches
-    Auto,
-    /// The largest model
-    All,
 }
 
 impl ThermalArgs {
@@ -154,12 +135,8 @@ impl ThermalArgs {
 
     fn settings(&self, work: &Work) -> Result<Settings, Error> {
         Ok(Settings {
-            method: match self.method {
-                MethodArg::Sequential => Method::Sequential,
-                MethodArg::Rate => Method::Rate,
-                MethodArg::Joint => Method::Joint,
-            },
-            terms: if self.terms == TermsArg::All { Terms::All } else { Terms::Auto },
+            method: self.method,
+            terms: self.terms,
             stands: self.stands.stands(work.runs.len(), work.judges.len())?,
             fit_window_s: self.fit_window,
             window_s: self.window,

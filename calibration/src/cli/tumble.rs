@@ -2,7 +2,6 @@
 
 use clap::Args;
 use isotherm_cli::Bar;
-use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::AccelOutput;
 
 use super::driver::{Job, Task};
@@ -13,7 +12,7 @@ use super::runs::{BaseArgs, LogArgs};
 use super::units::Logs;
 use crate::document::written::Written;
 use crate::error::Error;
-use crate::fits::positions::bare::bare;
+use crate::fits::positions::bare::of_run;
 use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::track::Track;
 use crate::fits::tumble::document::{before, complete};
@@ -74,19 +73,9 @@ impl TumbleArgs {
 
     fn fit(&self, job: &Job<'_>, (gravity, about_gravity): &(f64, Option<String>)) -> Result<Fitted, Error> {
         let (work, run, gravity) = (job.work, job.work.run()?, *gravity);
-        let first;
-        let base = match &work.base {
-            Some(base) if base.document.accel.is_some() => base,
-            Some(_) => {
-                return Err(Error::Refused(vec![
-                    "the document has no accelerometers: add [accel], or leave the document out".to_owned(),
-                ]));
-            }
-            None => {
-                first = self.first_document(run, job.bar())?;
-                &first
-            }
-        };
+        let base = &*work.base_with_accelerometers("add [accel], or leave the document out", || {
+            self.first_document(run, job.bar())
+        })?;
         let track = Track::of(run, &base.loaded, job.bar())?;
         let settings = Settings {
             gravity,
@@ -132,14 +121,8 @@ impl TumbleArgs {
 
     /// A document where there is none.
     fn first_document(&self, run: &Run, bar: Bar) -> Result<Written, Error> {
-        let series = run.series(bar)?;
-        let output = match (series.accels.output, self.accelerometer_unit.as_str()) {
-            (Some(OutputKind::Counts), _) => AccelOutput::Counts,
-            (_, "V") => AccelOutput::Volts,
-            _ => AccelOutput::MetresPerSecondSquared,
-        };
-        let mut document = bare(&series, output)?;
-        if output == AccelOutput::Volts {
+        let mut document = of_run(run, &self.accelerometer_unit, bar)?;
+        if document.accel.as_ref().is_some_and(|accel| accel.output == AccelOutput::Volts) {
             document.note = Some(
                 "V in this document is the accelerometers' reading in the log: volts, or counts of a converter with \
                  its zero at mid-scale, which is then part of the bias."

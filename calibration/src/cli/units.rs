@@ -1,5 +1,6 @@
 //! The units of a command's logs, and what each has to work on.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,7 @@ use isotherm_protocol::key::UnitId;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::once_each;
 use crate::runs::Run;
 use crate::runs::cut::Cut;
 
@@ -59,14 +61,8 @@ impl Work {
 
     /// Where its logs are cut short, as far as they have been read.
     pub(super) fn cuts(&self) -> Vec<String> {
-        let mut cuts: Vec<String> = Vec::new();
         let runs = self.runs.iter().chain(&self.judges).filter_map(Run::cut_short);
-        for words in runs.chain(self.cut.words()) {
-            if cuts.iter().all(|known| known != words) {
-                cuts.push(words.to_owned());
-            }
-        }
-        cuts
+        once_each(runs.chain(self.cut.words()).map(str::to_owned))
     }
 
     /// What is to be said of its logs once they have been read.
@@ -76,18 +72,31 @@ impl Work {
 
     /// The logs of its runs as they were given, each once.
     pub(super) fn logs(&self) -> Vec<PathBuf> {
-        let mut logs: Vec<PathBuf> = Vec::new();
-        for log in self.runs.iter().flat_map(Run::logs) {
-            if !logs.contains(log) {
-                logs.push(log.clone());
-            }
+        once_each(self.runs.iter().flat_map(Run::logs).cloned())
+    }
+
+    /// The document that it starts from, where none is fitted without.
+    pub(super) fn base(&self) -> Result<&Written, Error> {
+        self.base.as_ref().ok_or_else(|| Error::Usage("--calibration is needed".to_owned()))
+    }
+
+    /// The document that accelerometers are fitted into, or a first one where none is given; `add` says what to do about one
+    /// without accelerometers.
+    pub(super) fn base_with_accelerometers(
+        &self,
+        add: &str,
+        first: impl FnOnce() -> Result<Written, Error>,
+    ) -> Result<Cow<'_, Written>, Error> {
+        match &self.base {
+            Some(base) if base.document.accel.is_some() => Ok(Cow::Borrowed(base)),
+            Some(_) => Err(Error::refused(format!("the document has no accelerometers: {add}"))),
+            None => first().map(Cow::Owned),
         }
-        logs
     }
 
     /// Its only run, where all files of a unit are one.
     pub(super) fn run(&self) -> Result<&Run, Error> {
-        self.runs.first().ok_or_else(|| Error::Refused(vec![NOTHING.to_owned()]))
+        self.runs.first().ok_or_else(|| Error::refused(NOTHING))
     }
 }
 
@@ -148,7 +157,7 @@ impl<'a> Logs<'a> {
         }
         let of_units = self.runs(self.unnamed.as_ref())?;
         if of_units.is_empty() {
-            return Err(Error::Refused(vec![NOTHING.to_owned()]));
+            return Err(Error::refused(NOTHING));
         }
         let mut judging = self.judges(of_units.keys().next())?.unwrap_or_default();
         let several = of_units.len() > 1;
@@ -157,7 +166,7 @@ impl<'a> Logs<'a> {
             let judges = judging.remove(unit).unwrap_or_default();
             let unjudged = judges.is_empty() && !self.judge.is_empty();
             if unjudged && !several {
-                return Err(Error::Refused(vec![format!("--judge: the logs have nothing of unit {unit}")]));
+                return Err(Error::refused(format!("--judge: the logs have nothing of unit {unit}")));
             }
             let mut work = Work::new(base, runs, judges);
             if unjudged {
@@ -195,12 +204,12 @@ impl<'a> Logs<'a> {
         let others: Vec<String> = runs.keys().map(ToString::to_string).collect();
         match own {
             Some(own) => Ok((own, others)),
-            None if others.is_empty() => Err(Error::Refused(vec![NOTHING.to_owned()])),
-            None => Err(Error::Refused(vec![format!(
+            None if others.is_empty() => Err(Error::refused(NOTHING)),
+            None => Err(Error::refused(format!(
                 "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit if \
                  the serial has changed",
                 others.join(", ")
-            )])),
+            ))),
         }
     }
 }
@@ -209,19 +218,19 @@ impl<'a> Logs<'a> {
 fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
     let path = folder.join(format!("{unit}.toml"));
     if !path.exists() {
-        return Err(Error::Refused(vec![format!(
+        return Err(Error::refused(format!(
             "{} does not exist: the folder of --calibration needs a document of each unit; leave the unit out with \
              --unit",
             path.display()
-        )]));
+        )));
     }
     let written = Written::read(&path)?;
     if written.loaded.unit != *unit {
-        return Err(Error::Refused(vec![format!(
+        return Err(Error::refused(format!(
             "{} is of unit {}: correct its name or its unit",
             path.display(),
             written.loaded.unit
-        )]));
+        )));
     }
     Ok(written)
 }

@@ -11,6 +11,7 @@ use super::limits::above_0;
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use super::units::{Logs, Unit, Work};
+use crate::document::provenance::files_of;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::FitReport;
@@ -59,21 +60,21 @@ impl ValidateArgs {
         let fallback = only.as_ref().map(|only| &only.loaded.unit);
         let runs = self.log.reading.runs(&self.log.log, fallback)?;
         if runs.is_empty() {
-            return Err(Error::Refused(vec!["the logs have no raw readings".to_owned()]));
+            return Err(Error::refused("the logs have no raw readings"));
         }
         if only.is_some() && runs.len() > 1 {
             let units: Vec<String> = runs.keys().map(ToString::to_string).collect();
-            return Err(Error::Refused(vec![format!(
+            return Err(Error::refused(format!(
                 "the logs are of several units ({}): choose one with --unit, or give a folder with a document for each",
                 units.join(", ")
-            )]));
+            )));
         }
         let mut only = only;
         let units = runs.into_iter().map(|(unit, runs)| {
             let document = only.take().or_else(|| documents.remove(unit.as_str())).ok_or_else(|| {
-                Error::Refused(vec![format!(
+                Error::refused(format!(
                     "no document of the folder is for unit {unit}: put one there, or leave the unit out with --unit"
-                )])
+                ))
             });
             let work = document.map(|document| Work::new(Some(document), runs, Vec::new()));
             (unit, work)
@@ -83,24 +84,18 @@ impl ValidateArgs {
 
     /// The documents of the folder, by serial.
     fn folder(&self) -> Result<BTreeMap<String, Written>, Error> {
-        let read = |source| Error::file(&self.document, "read the folder", source);
-        let mut paths = Vec::new();
-        for entry in std::fs::read_dir(&self.document).map_err(read)? {
-            let path = entry.map_err(read)?.path();
-            if path.extension().is_some_and(|extension| extension == "toml") {
-                paths.push(path);
-            }
-        }
+        let mut paths = files_of(&self.document)?;
+        paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
         paths.sort();
         let mut documents: BTreeMap<String, Written> = BTreeMap::new();
         for path in &paths {
             let written = Written::read(path)?;
             let unit = written.document.unit.clone();
             if let Some(other) = documents.get(&unit) {
-                return Err(Error::Refused(vec![format!(
+                return Err(Error::refused(format!(
                     "{} and {} are both for unit {unit}: choose the one to judge",
                     other.name, written.name
-                )]));
+                )));
             }
             documents.insert(unit, written);
         }
@@ -111,7 +106,7 @@ impl ValidateArgs {
 /// A unit's runs with its document.
 fn judged(job: &Job<'_>, wanted: Wanted) -> Result<Done<FitReport>, Error> {
     let work = job.work;
-    let Some(base) = &work.base else { return Err(Error::Usage("no document is given".to_owned())) };
+    let base = work.base()?;
     let logs = work.runs.iter().map(|run| JudgedLog::new(run.clone(), &base.document));
     let logs = logs.collect::<Result<Vec<_>, _>>()?;
     let mut report = validate(base, &logs, wanted, job.bar())?;

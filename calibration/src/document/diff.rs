@@ -20,6 +20,7 @@ use crate::document::show::terms::{terms, tree};
 use crate::document::show::{places, range_of, steady};
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::norm;
 use crate::report::Sigmas;
 
 /// Standard errors beyond which an axis has turned.
@@ -145,26 +146,21 @@ impl Compared {
         &self,
         of: &str,
         (kind, sensor): (&str, &str),
-        [i, j]: [usize; 2],
+        [first, second]: [usize; 2],
         rows: impl Fn(&Steady) -> &[[f64; 3]],
     ) -> AxisChange {
         let both = |[before, after]: &[Steady; 2]| {
             let row =
                 |steady: &Steady, place: usize| rows(steady).get(place).copied().unwrap_or([f64::NAN; 3]);
-            (row(before, i), row(after, j))
+            (row(before, first), row(after, second))
         };
         let (old, new) = both(&self.reference);
-        let mut change = [0.0; 3];
-        for ((change, old), new) in change.iter_mut().zip(old).zip(new) {
-            *change = Angle::from_rad(new - old).as_arcsec();
-        }
+        let change = [0, 1, 2].map(|i| Angle::from_rad(new[i] - old[i]).as_arcsec());
         let stated = self.sigmas.each_ref().map(|sigmas| self.row_sigma(sigmas, kind, sensor));
-        let mut sigma = [0.0; 3];
-        if let [Some(a), Some(b)] = stated {
-            for ((sigma, a), b) in sigma.iter_mut().zip(a).zip(b) {
-                *sigma = libm::hypot(a, b);
-            }
-        }
+        let sigma = match stated {
+            [Some(a), Some(b)] => [0, 1, 2].map(|i| libm::hypot(a[i], b[i])),
+            _ => [0.0; 3],
+        };
         let known = stated.iter().all(Option::is_some) && sigma.iter().any(|sigma| *sigma > 0.0);
         let turned = angle(old, new);
         let significance = change
@@ -173,7 +169,7 @@ impl Compared {
             .filter(|(_, sigma)| *sigma > 0.0)
             .map(|(change, sigma)| change.abs() / sigma)
             .fold(0.0, f64::max);
-        let length = change.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let length = norm(change);
         let turned_sigma = if length > 0.0 {
             change.iter().zip(sigma).map(|(x, s)| (x * s / length) * (x * s / length)).sum::<f64>().sqrt()
         } else {
@@ -214,10 +210,9 @@ impl Compared {
 
     fn accel(&self, name: &str, places: [usize; 2], same_output: bool, values: &mut Vec<ValueChange>) {
         let milli_g = |force: f64| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
-        let scales = self.reference.each_ref().map(|steady| &steady.accel_scale);
         let scale = [0, 1].map(|side| {
-            let (scales, place) = if side == 0 { (scales[0], places[0]) } else { (scales[1], places[1]) };
-            scales.get(place).copied().unwrap_or(f64::NAN)
+            let scales = &self.reference[side].accel_scale;
+            scales.get(places[side]).copied().unwrap_or(f64::NAN)
         });
         // A standard error of the output is one of the specific force by the scale factor.
         let sigma = self.first_sigma("accel", name, "bias", scale.map(|scale| milli_g(1.0 / scale)));

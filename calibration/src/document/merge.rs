@@ -11,16 +11,17 @@ mod origin;
 mod sections;
 #[cfg(test)]
 mod tests;
-mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use isotherm_protocol::document::Document;
+use serde_json::{Value as Json, json};
 use toml::Value;
 
 use crate::document::show::terms::tree;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::report::Sheet;
 use check::{check, same_unit};
 use sections::{Sections, build, group, sections};
 
@@ -216,5 +217,41 @@ fn conflict(key: &str, said: &[(String, Option<Value>)], chosen: Option<&Take>) 
             names.join(" and "),
             said.first().map_or("", |(name, _)| name)
         ),
+    }
+}
+
+impl Merged {
+    /// What was done, as text.
+    pub fn sheet(&self, name: &str) -> Sheet {
+        let documents: BTreeSet<&String> = self.taken.iter().map(|(_, from)| from).collect();
+        let mut sheet = Sheet {
+            title: format!("Merge of {name}"),
+            headline: format!(
+                "{name}: {} sections of {} documents, no conflict{}.",
+                self.taken.len(),
+                documents.len(),
+                if self.gone.is_empty() { String::new() } else { format!(", {} left out", self.gone.len()) }
+            ),
+            ..Sheet::default()
+        };
+        sheet.notes = self.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
+        let row = |(key, from): &(String, String)| vec![key.clone(), from.clone()];
+        sheet.table("Taken", ["section", "from"], self.taken.iter().map(row));
+        let heading = "Left out, because the part does without";
+        sheet.table(heading, ["section", "by"], self.gone.iter().map(row));
+        sheet
+    }
+
+    /// What was done, as JSON.
+    pub fn to_json(&self, name: &str) -> Json {
+        let map = |pairs: &[(String, String)]| -> serde_json::Map<String, Json> {
+            pairs.iter().map(|(key, from)| (key.clone(), json!(from))).collect()
+        };
+        json!({
+            "verdict": self.sheet(name).headline,
+            "taken": map(&self.taken),
+            "left_out": map(&self.gone),
+            "warnings": self.warnings,
+        })
     }
 }

@@ -9,6 +9,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Log, Origin};
 use sha2::{Digest as _, Sha256};
 
+use crate::document::written::name_of;
 use crate::error::Error;
 
 /// Name and version of this program, as documents state it.
@@ -60,7 +61,7 @@ fn of_folder(folder: &Path) -> Result<Digest, Error> {
     files.sort();
     let mut hash = Sha256::new();
     for file in &files {
-        let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = name_of(file);
         hash.update(format!("{}  {name}\n", of_file(file)?));
     }
     Ok(Digest::from(<[u8; 32]>::from(hash.finalize())))
@@ -86,9 +87,7 @@ pub(crate) fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 pub fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = files_of(folder)?;
     files.retain(|path| is_recording(path));
-    files.sort_by_cached_key(|path| {
-        pieces(&path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default())
-    });
+    files.sort_by_cached_key(|path| pieces(&name_of(path)));
     Ok(files)
 }
 
@@ -113,7 +112,6 @@ fn pieces(name: &str) -> Vec<(String, u128)> {
 }
 
 /// The command line as it was given, for the document.
-#[must_use]
 pub fn command_line() -> String {
     let mut words = std::env::args();
     let _ = words.next();

@@ -11,8 +11,10 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use serde_json::{Value, json};
 
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::{hull, real};
 use crate::report::Sheet;
 use crate::report::figures::{alike, short};
 use terms::{Term, terms, tree};
@@ -36,7 +38,6 @@ pub struct Shown {
 
 impl Shown {
     /// Everything as JSON: the document, and its terms as points.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         self.json.clone()
     }
@@ -63,13 +64,13 @@ pub fn show(written: &Written) -> Result<Shown, Error> {
         );
         vec![title(term), term.words.clone(), term.unit.clone(), range]
     });
-    sheet.table("Terms", &["term", "formula", "unit", "fitted over"], formulas.collect());
+    sheet.table("Terms", ["term", "formula", "unit", "fitted over"], formulas);
     over_temperature(&mut sheet, &terms, range);
     sums(&mut sheet, written, range);
     charts::charts(&mut sheet, written, &terms, range);
     let json = json!({
         "verdict": sheet.headline,
-        "document": serde_json::to_value(document).map_err(|error| Error::Document(vec![error.to_string()]))?,
+        "document": serde_json::to_value(document).map_err(|error| Error::document(&error))?,
         "warnings": written.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "terms": terms.iter().map(|term| term_json(term, range)).collect::<Vec<_>>(),
     });
@@ -90,15 +91,13 @@ pub(crate) fn spoken(name: &str) -> String {
 /// The range of temperature that all terms over it reach over together.
 pub(crate) fn range_of(terms: &[Term]) -> [f64; 2] {
     let ranges = terms.iter().filter(|term| term.argument == "°C").filter_map(|term| term.range);
-    let all = ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
-    all.filter(|[low, high]| high > low).unwrap_or(USUAL)
+    hull(ranges).filter(|[low, high]| high > low).unwrap_or(USUAL)
 }
 
 /// So many places from one end to the other.
-#[expect(clippy::cast_precision_loss, reason = "few places")]
 pub(crate) fn places([low, high]: [f64; 2], count: usize) -> Vec<f64> {
-    let step = (high - low) / (count.max(2) - 1) as f64;
-    (0..count).map(|index| low + step * index as f64).collect()
+    let step = (high - low) / real(count.max(2) - 1);
+    (0..count).map(|index| low + step * real(index)).collect()
 }
 
 fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
@@ -111,12 +110,10 @@ fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
         let range = if argument == "°C" {
             range
         } else {
-            let ranges = mine().filter_map(|term| term.range);
-            ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]).unwrap_or_default()
+            hull(mine().filter_map(|term| term.range)).unwrap_or_default()
         };
         let at = places(range, COLUMNS);
-        let mut head = vec![String::new()];
-        head.extend(at.iter().map(|x| format!("{} {argument}", short(*x))));
+        let head = heads(&at, argument);
         let row = |term: &Term| {
             let values: Vec<(f64, bool)> = at.iter().map(|x| term.at(*x)).collect();
             let words = alike(&values.iter().map(|(value, _)| *value).collect::<Vec<_>>(), RANGE_DIGITS);
@@ -126,14 +123,19 @@ fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
             let cells = words.into_iter().zip(&values).map(cell);
             std::iter::once(format!("{}, {}", title(term), term.unit)).chain(cells).collect()
         };
-        let head: Vec<&str> = head.iter().map(String::as_str).collect();
         let heading = match argument {
             "°C" => "Over temperature (in brackets: clamped, outside the fitted range)",
             "°C/s" => "Over the temperature's rate",
             _ => "Over the temperature's acceleration",
         };
-        sheet.table(heading, &head, mine().map(row).collect());
+        sheet.table(heading, head, mine().map(row));
     }
+}
+
+/// Heads of a table over places of an argument; the first column names the rows.
+fn heads(at: &[f64], argument: &str) -> Vec<String> {
+    let of = at.iter().map(|x| format!("{} {argument}", short(*x)));
+    std::iter::once(String::new()).chain(of).collect()
 }
 
 /// The correction at one temperature of all channels, on a ramp.
@@ -148,8 +150,6 @@ pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f6
 /// The sums of all terms.
 fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
     let at = places(range, COLUMNS);
-    let mut head = vec![String::new()];
-    head.extend(at.iter().map(|x| format!("{} °C", short(*x))));
     let mut rows = Vec::new();
     let mut row = |name: String, of: &dyn Fn(f64) -> Option<f64>| {
         let values: Vec<f64> = at.iter().map(|x| of(*x).unwrap_or(f64::NAN)).collect();
@@ -166,14 +166,13 @@ fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
             });
         }
     }
-    for (index, accel) in written.document.accel.iter().flat_map(|accel| &accel.sensor).enumerate() {
+    for (index, accel) in accelerometers(&written.document).iter().enumerate() {
         row(format!("accelerometer {}, mg", accel.name), &|x| {
             let bias = *steady(written, x, 0.0).accel_bias.get(index)?;
             Some(SpecificForce::from_m_per_s2(bias).as_g() * 1e3)
         });
     }
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    sheet.table(&format!("Bias in all, lags settled{}", lasing_mode(written)), &head, rows);
+    sheet.table(&format!("Bias in all, lags settled{}", lasing_mode(written)), heads(&at, "°C"), rows);
 }
 
 /// The lasing mode that a sum is in, of a unit that reverses it.

@@ -8,6 +8,9 @@ use isotherm_log::file::{read_small_text, write_whole};
 use isotherm_log::offline::{Loaded, unit_id};
 use isotherm_protocol::document::{Document, Parsed, Problem};
 
+use nalgebra::DMatrix;
+use toml::Value;
+
 use crate::error::Error;
 
 /// Line that lets editors check a document.
@@ -34,7 +37,7 @@ impl Written {
     /// # Errors
     /// [`Error::Document`] with every problem that its reader has with it.
     pub fn of(document: &Document) -> Result<Self, Error> {
-        let body = document.to_toml().map_err(|error| Error::Document(vec![error.to_string()]))?;
+        let body = document.to_toml().map_err(|error| Error::document(&error))?;
         let text = format!("{SCHEMA_LINE}{body}");
         let parsed = Document::parse(&text, None).map_err(|found| Error::Document(words(&found)))?;
         Self::from_parts(String::new(), text, parsed)
@@ -64,8 +67,7 @@ impl Written {
         let text = read_small_text(path, "read the calibration document")?;
         let parsed = Document::parse(&text, Some(&path.display().to_string()))
             .map_err(|found| isotherm_log::error::Error::Calibration(words(&found)))?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Self::from_parts(name, text, parsed)
+        Self::from_parts(name_of(path), text, parsed)
     }
 
     fn from_parts(name: String, text: String, parsed: Parsed) -> Result<Self, Error> {
@@ -90,9 +92,18 @@ impl Written {
 }
 
 /// A number as documents state it: without the dust of unit conversions, in twelve digits.
-#[must_use]
 pub fn tidy(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+}
+
+/// Numbers as documents state them.
+pub fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> Value {
+    Value::Array(values.into_iter().map(|value| tidy(*value).into()).collect())
+}
+
+/// The rows of a matrix as documents state them.
+pub fn matrix(matrix: &DMatrix<f64>) -> Value {
+    Value::Array(matrix.row_iter().map(|row| numbers(&row)).collect())
 }
 
 /// Writes a file; one that is there only where that is allowed.
@@ -101,6 +112,11 @@ pub fn tidy(value: f64) -> f64 {
 /// [`Error::Log`] where that cannot be done.
 pub fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), Error> {
     write_whole(path, bytes, overwrite).map_err(|source| Error::file(path, "write", source))
+}
+
+/// The name of a file without its folder.
+pub fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn words(problems: &[Problem]) -> Vec<String> {

@@ -8,7 +8,6 @@
 //! | [`orders`], [`model`] | orders by cross-validation; one gyro's coefficients |
 //! | `seen`, `units`, `steps`, `temperatures` | what a log shows of dead gyros, other units of measure, motion, thermometers |
 //! | [`checks`] | what a log must have |
-//! | [`judge`] | drift in running mode, before and after |
 //! | [`mod@fit`], [`document`] | the whole procedure; the document |
 
 pub mod cells;
@@ -16,7 +15,6 @@ pub mod checks;
 pub mod dither;
 pub mod document;
 pub mod fit;
-pub mod judge;
 pub mod model;
 pub mod orders;
 mod prepare;

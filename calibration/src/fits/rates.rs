@@ -18,7 +18,6 @@ pub mod document;
 pub mod earth;
 mod figure;
 pub mod fit;
-mod judge;
 pub mod matching;
 mod measure;
 pub mod model;

@@ -16,7 +16,6 @@
 //! | [`model`] | which terms a sensor has, and their place in the document |
 //! | [`scale`] | what gravity or a rate table tells of the scale factors |
 //! | `compare` | a document beside a mean and cubics, on judging runs |
-//! | [`passes`] | whether passes through the same temperatures show the same |
 //! | [`sequential`], `joint` | 000's procedure; all terms at once |
 //! | [`ladder`], [`select`] | which models there are; cross-validation |
 //! | [`noise`] | what the noise of a thermometer adds to the output |
@@ -29,14 +28,12 @@ pub mod columns;
 mod compare;
 mod filter;
 pub mod fit;
-mod found;
 mod joint;
 mod known;
 pub mod ladder;
 pub mod model;
 pub mod noise;
 mod outcome;
-pub mod passes;
 pub mod samples;
 pub mod scale;
 pub mod select;

@@ -16,7 +16,6 @@ pub struct Blocks {
 
 impl Blocks {
     /// Of rows of which each belongs to a block, numbered from 0.
-    #[must_use]
     pub fn of(design: &DMatrix<f64>, values: &DVector<f64>, block: &[usize]) -> Self {
         let count = block.iter().max().map_or(0, |last| last + 1);
         let mut members = vec![Vec::new(); count];
@@ -35,25 +34,21 @@ impl Blocks {
     }
 
     /// Number of blocks.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Rows of a block.
-    #[must_use]
     pub fn rows(&self, block: usize) -> usize {
         self.rows.get(block).copied().unwrap_or(0)
     }
 
     /// The fit of some columns to all blocks but one; `None` where those do not determine it.
-    #[must_use]
     pub fn without(&self, left_out: usize, columns: &[usize], weak: Weak) -> Option<Linear> {
         let others = || self.triangles.iter().enumerate().filter(|(block, _)| *block != left_out);
         let rows: usize = others().map(|(_, triangle)| triangle.nrows()).sum();
@@ -74,7 +69,6 @@ impl Blocks {
     }
 
     /// Sum of the squares that coefficients of some columns leave in a block.
-    #[must_use]
     pub fn left_in(&self, block: usize, columns: &[usize], coefficients: &DVector<f64>) -> f64 {
         let Some(triangle) = self.triangles.get(block) else { return 0.0 };
         let left = |row: usize| {

@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::linear::{self, Linear, SINGULAR, Weak};
 use super::search::{golden, simplex};
+use crate::numbers::real;
 
 /// Variance of the fraction of a count.
 const FRACTION_VARIANCE: f64 = 1.0 / 12.0;
@@ -84,19 +85,16 @@ pub struct Solution {
 
 impl Data {
     /// How many means.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.value.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.value.is_empty()
     }
 
     /// Makes the noise white.
-    #[must_use]
     pub fn whitened(&self, noise: Noise) -> White {
         let (count, width) = (self.len(), self.columns.len());
         let mut columns = DMatrix::zeros(count, width);
@@ -152,7 +150,6 @@ impl Data {
     }
 
     /// Coefficients under a noise; `None` where the columns do not tell each other apart.
-    #[must_use]
     pub fn solve(&self, noise: Noise) -> Option<Solution> {
         let White { value, columns, log_variance } = self.whitened(noise);
         let linear = linear::solve(&columns, &value, Weak::Refuse(SINGULAR)).ok()?;
@@ -167,7 +164,6 @@ impl Data {
     }
 
     /// The most likely noise. A Markov drift is taken where the means show one.
-    #[must_use]
     pub fn noise(&self) -> Noise {
         let guess = self.plain_variance().max(f64::MIN_POSITIVE);
         let white = |log: f64| Noise { white: guess * libm::exp(log), markov: None };
@@ -197,7 +193,6 @@ impl Data {
 
     /// The noise with its parameters at their limits, two standard deviations of their estimates: all variances larger, and
     /// for a Markov drift, in its place, that drift larger, slower, or faster.
-    #[must_use]
     pub fn limits(&self, noise: Noise) -> Vec<Noise> {
         let mut limits = vec![self.limit(noise, |factor| Noise {
             white: noise.white * factor,
@@ -228,7 +223,6 @@ impl Data {
     }
 
     /// Covariance of the coefficients, each as uncertain as the limits of the noise leave it.
-    #[must_use]
     pub fn covariance(&self, noise: Noise) -> Option<DMatrix<f64>> {
         let own = self.solve(noise)?.covariance;
         let mut wider = own.diagonal();
@@ -254,16 +248,8 @@ impl Data {
     }
 
     /// The same without some of the columns.
-    #[must_use]
     pub fn with_columns(&self, wanted: &[usize]) -> Self {
         let columns = wanted.iter().filter_map(|&index| self.columns.get(index).cloned()).collect();
         Self { columns, ..self.clone() }
     }
-}
-
-/// A count as a number.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "cells of a log are far below 2⁵³")]
-pub fn real(count: usize) -> f64 {
-    count as f64
 }

@@ -54,7 +54,6 @@ pub struct Shrink<'a> {
 impl Folds {
     /// Of columns and values with weights, each row in a piece, numbered from 0. Rows with a weight of zero, or with what is no number,
     /// take no part. `is_judged` says which rows judge; up to `block` of them in sequence judge by their mean.
-    #[must_use]
     pub fn of(
         columns: &[&[f64]],
         (values, weights): (&[f64], &[f64]),
@@ -130,7 +129,6 @@ impl Folds {
 
     /// Root mean square of what a model of some columns leaves on pieces that it did not see, the noise that it adds itself included;
     /// `None` where too little can be judged.
-    #[must_use]
     pub fn score(&self, columns: &[usize], shrink: Shrink<'_>) -> Option<f64> {
         let (mut square, mut weight, mut noise, mut count) = (0.0, 0.0, 0.0, 0.0);
         for (piece, judged) in self.pieces.iter().zip(&self.judged) {
@@ -165,7 +163,6 @@ impl Folds {
     }
 
     /// Rows that hold the coefficients of some columns, as they are, to zero, for rows whose weights have the sum of one.
-    #[must_use]
     pub fn holding(&self, columns: &[usize], shrink: Shrink<'_>) -> Option<DMatrix<f64>> {
         let root = self.penalty(columns, shrink).cholesky()?.l().transpose();
         Some(DMatrix::from_fn(columns.len(), columns.len(), |i, j| root[(i, j)] * self.scale[columns[j]][0]))

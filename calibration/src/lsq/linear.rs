@@ -41,13 +41,11 @@ pub struct Linear {
 
 impl Linear {
     /// Standard error of a coefficient, for rows of variance one.
-    #[must_use]
     pub fn sigma(&self, index: usize) -> f64 {
         self.inverse.get((index, index)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
     }
 
     /// Sum of the squared residuals.
-    #[must_use]
     pub fn chi_square(&self) -> f64 {
         self.residual.norm_squared()
     }
@@ -147,14 +145,12 @@ pub fn inverse(design: &DMatrix<f64>) -> Result<DMatrix<f64>, Undetermined> {
 }
 
 /// Smallest over largest singular value of a design as it stands: how well its rows spread.
-#[must_use]
 pub fn spread(design: &DMatrix<f64>) -> f64 {
     let singular = design.singular_values();
     if design.nrows() < design.ncols() { 0.0 } else { singular.min() / singular.max() }
 }
 
 /// L⁻¹ of a covariance V = L·Lᵀ: what makes rows of that covariance independent and of variance one; `None` where it is none.
-#[must_use]
 pub fn whitening(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let count = covariance.nrows();
     // To unit diagonal first: variances may span many powers of ten.
@@ -165,7 +161,6 @@ pub fn whitening(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// χ² of numbers against zero under their covariance: xᵀ·V⁻¹·x; `None` where V is no covariance.
-#[must_use]
 pub fn chi_square(numbers: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
     Some((whitening(covariance)? * numbers).norm_squared())
 }

@@ -7,7 +7,6 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Coefficients of 1, t and t² about the middle, and the standard deviation of the first over that of a point; `None` where the points do
 /// not determine them. Points are pairs of a time since the middle and a value; those at the half width and beyond count for nothing.
-#[must_use]
 pub fn parabola(points: impl Iterator<Item = [f64; 2]>, half_width: f64) -> Option<([f64; 3], f64)> {
     let (mut normal, mut right, mut squares) = (Matrix3::zeros(), Vector3::zeros(), Matrix3::zeros());
     let mut count = 0;

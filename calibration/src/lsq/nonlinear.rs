@@ -10,6 +10,7 @@ use nalgebra_0_34 as minpack;
 use nalgebra_0_34::{Dyn, storage::Owned};
 
 use super::linear::{self, Undetermined};
+use crate::numbers::real;
 
 /// Step of the differences.
 const STEP: f64 = 1e-6;
@@ -41,7 +42,6 @@ pub enum NoSolution {
 impl NoSolution {
     /// In plain words: what `of` ("the poses") do not determine by the name of the parameter, and what more is needed; or what to
     /// look at where nothing was found.
-    #[must_use]
     pub fn words(&self, of: &str, name: impl Fn(usize) -> String, more: &str, look: &str) -> String {
         match self {
             Self::NotDetermined(index) => format!("{of} do not determine {}: {more}", name(*index)),
@@ -53,16 +53,13 @@ impl NoSolution {
 
 impl Solution {
     /// Standard error of a parameter.
-    #[must_use]
     pub fn sigma(&self, index: usize) -> f64 {
         self.covariance.get((index, index)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
     }
 
     /// χ² per degree of freedom; `None` without any.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "residuals of some hundred positions")]
     pub fn per_degree(&self) -> Option<f64> {
-        (self.degrees > 0).then(|| self.chi_square / self.degrees as f64)
+        (self.degrees > 0).then(|| self.chi_square / real(self.degrees))
     }
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::{self, Weak};
+use crate::numbers::real;
 use crate::robust::median_if_any;
 
 /// Share of a column's own weight that the ridge adds: it only holds what the data leave open.
@@ -38,7 +39,6 @@ pub struct Solution {
 /// Coefficients with which the columns add up best to the target, each row with its weight; rows whose target or
 /// column is no number, or whose weight is zero, take no part. Spikes lose their weight. Rows of `holding`, for weights with the sum
 /// of one, hold coefficients to zero. `None` without enough rows.
-#[must_use]
 pub fn solve(
     columns: &[&[f64]],
     target: &[f64],
@@ -64,7 +64,6 @@ pub fn solve(
 }
 
 /// One weighted solution.
-#[must_use]
 pub fn once(
     columns: &[&[f64]],
     target: &[f64],
@@ -83,8 +82,7 @@ pub fn once(
             columns.fold(target[row], |rest, (column, c)| rest - c * column[row])
         })
         .collect();
-    #[expect(clippy::cast_precision_loss, reason = "rows of a fit are far below 2⁵³")]
-    let free = (rows.good.len() - count) as f64;
+    let free = real(rows.good.len() - count);
     let square = found.residual.rows(0, rows.good.len()).norm_squared();
     let variance = square / free * inflation(&residual, &rows.good);
     let sigmas = (0..count).map(|index| variance.sqrt() * found.sigma(index)).collect();

@@ -53,7 +53,6 @@ pub struct BatchTable {
 
 impl BatchTable {
     /// An empty one for reports of a kind.
-    #[must_use]
     pub fn of<R: UnitReport>() -> Self {
         Self { columns: R::COLUMNS, done: R::DONE, units: Vec::new() }
     }
@@ -64,7 +63,6 @@ impl BatchTable {
     }
 
     /// Sensors accepted, sensors refused, units that came to nothing.
-    #[must_use]
     pub fn counts(&self) -> [usize; 3] {
         let rows = || self.units.iter().filter_map(|(_, came)| came.as_ref().ok()).flatten();
         let accepted = rows().filter(|row| row.accepted).count();
@@ -73,7 +71,6 @@ impl BatchTable {
     }
 
     /// What came of all of them, in one line.
-    #[must_use]
     pub fn headline(&self) -> String {
         let [accepted, refused, failed] = self.counts();
         let count = self.units.len();
@@ -83,9 +80,8 @@ impl BatchTable {
     }
 
     /// As a table.
-    #[must_use]
     pub fn rows(&self) -> Table {
-        let head = ["unit"].iter().chain(self.columns).chain(&[""]);
+        let head = ["unit"].iter().chain(self.columns).chain(&[""]).copied();
         let mut rows = Vec::new();
         for (unit, came) in &self.units {
             match came {
@@ -103,18 +99,16 @@ impl BatchTable {
                 }
             }
         }
-        Table { head: head.map(|word| (*word).to_owned()).collect(), rows }
+        Table::of(head, rows)
     }
 
     /// As text, its line first.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let Table { head, rows } = self.rows();
         format!("{}\n{}\n", self.headline(), table(&head, &rows))
     }
 
     /// As JSON.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let unit = |(unit, came): &(String, Result<Vec<BatchRow>, String>)| match came {
             Ok(rows) => {
@@ -126,7 +120,6 @@ impl BatchTable {
     }
 
     /// As a page.
-    #[must_use]
     pub fn to_html(&self, title: &str) -> String {
         let mut page = Page::new(title);
         page.headline(&self.headline());
@@ -166,7 +159,7 @@ impl From<&Verdict> for BatchRow {
         let [before, after] = verdict.deciding();
         let known = before.count > 0 || after.count > 0;
         let figure = |value: f64| if known { short(value) } else { "–".to_owned() };
-        let state = if verdict.accepted { "accepted" } else { "refused" };
+        let state = verdict.state();
         Self {
             cells: vec![
                 verdict.of.clone(),
@@ -218,7 +211,6 @@ pub fn in_parallel<T: Sync, R: Send>(
 }
 
 /// The name of a unit's own file in a batch: "fit.html" of unit A is "fit-A.html".
-#[must_use]
 pub fn of_unit(path: &Path, unit: &str) -> PathBuf {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let name = match path.extension() {

@@ -8,7 +8,8 @@ use isotherm_protocol::document::{AccelOutput, Document, Sample};
 use super::verdict::Verdict;
 use crate::axes::output_name;
 use crate::error::Error;
-use crate::runs::table::{Rows, Table, Takes};
+use crate::numbers::real;
+use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Troubles, Watch};
 use crate::size::Size;
 
@@ -65,12 +66,11 @@ pub fn judge(
     sample: Sample,
     (before, after): (&Loaded, &Loaded),
     (document, rest): (&Document, &Rest),
-    window_s: f64,
+    rows: Rows,
     watch: impl Watch,
 ) -> Result<Judged, Error> {
-    let rows = Rows { length_s: window_s, takes: Takes::Valid };
     let mut tables = Table::together(run, &[after.clone(), before.clone()], rows, watch)?.into_iter();
-    let mut next = || tables.next().unwrap_or_default().whole(0.999);
+    let mut next = || tables.next().unwrap_or_default();
     let (after, before) = (next(), next());
     let mut troubles = after.troubles.clone();
     troubles.extend(before.troubles.iter().filter(|words| !after.troubles.contains(words)).cloned());
@@ -80,7 +80,6 @@ pub fn judge(
 
 impl Curve {
     /// The curves of two corrections of the same run; the document tells which temperature channel an axis follows.
-    #[must_use]
     pub fn of_tables(
         run: &str,
         sample: Sample,
@@ -117,14 +116,12 @@ impl Curve {
     }
 
     /// Sizes before and after.
-    #[must_use]
     pub fn sizes(&self) -> [Size; 2] {
         [Size::of(&self.before), Size::of(&self.after)]
     }
 
     /// One verdict for each sensor of some curves, in the order of their first appearance, over all runs in and out of
     /// sample together, as [`Verdict::of_values`].
-    #[must_use]
     pub fn verdicts(curves: &[Self]) -> Vec<Verdict> {
         let mut names: Vec<&Self> = Vec::new();
         for curve in curves {
@@ -148,7 +145,6 @@ impl Curve {
 }
 
 /// Both where both are numbers, less what a unit without error would put out of each, or less the mean of each; `None` without any.
-#[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
 fn common([before, after]: [&[f64]; 2], truth: Option<[f64; 2]>) -> Option<[Vec<f64>; 2]> {
     let pairs: Vec<(f64, f64)> = before
         .iter()
@@ -159,13 +155,12 @@ fn common([before, after]: [&[f64]; 2], truth: Option<[f64; 2]>) -> Option<[Vec<
     if good.is_empty() {
         return None;
     }
-    let mean = |of: fn(&(f64, f64)) -> f64| good.iter().map(|pair| of(pair)).sum::<f64>() / good.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| good.iter().map(|pair| of(pair)).sum::<f64>() / real(good.len());
     let [before, after] = truth.unwrap_or_else(|| [mean(|pair| pair.0), mean(|pair| pair.1)]);
     Some([pairs.iter().map(|(a, _)| a - before).collect(), pairs.iter().map(|(_, b)| b - after).collect()])
 }
 
 /// Unit of measure of the accelerometers' output, which their biases have too; empty for a unit without accelerometers.
-#[must_use]
 pub fn output_unit(document: &Document) -> &'static str {
     document.accel.as_ref().map_or("", |accel| match accel.output {
         AccelOutput::Counts => "counts/s",
@@ -175,7 +170,6 @@ pub fn output_unit(document: &Document) -> &'static str {
 }
 
 /// The channel that the sensor follows which looks along a case axis more than the others do.
-#[must_use]
 pub fn channel_of(document: &Document, gyro: bool, axis: usize) -> Option<String> {
     let along = |rows: &[[f64; 3]]| {
         let part = |row: &[f64; 3]| row.get(axis).copied().unwrap_or(0.0).abs();

@@ -1,12 +1,12 @@
 //! Figures as text: digits, tables.
 
+use crate::numbers::ends;
 use comfy_table::{CellAlignment, Table, presets};
 
 /// Most significant digits of a figure among others: more are in `--json`.
 const MOST_DIGITS: f64 = 8.0;
 
 /// Three significant digits.
-#[must_use]
 pub fn short(value: f64) -> String {
     significant(value, 3.0)
 }
@@ -30,7 +30,6 @@ fn significant(value: f64, digits: f64) -> String {
 }
 
 /// So many places behind the point; zero has no sign.
-#[must_use]
 pub fn fixed(value: f64, places: usize) -> String {
     let words = format!("{value:.places$}");
     match words.strip_prefix('-') {
@@ -40,7 +39,6 @@ pub fn fixed(value: f64, places: usize) -> String {
 }
 
 /// Six significant digits, without the zeros at the end: what people state, such as g or a coefficient.
-#[must_use]
 pub fn six(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
     if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) {
@@ -52,10 +50,8 @@ pub fn six(value: f64) -> String {
 
 /// Numbers that are read beside each other: three significant digits, and as many more as give the distance from the smallest to
 /// the largest `digits`. Those that are all the same have up to six.
-#[must_use]
 pub fn alike(values: &[f64], digits: f64) -> Vec<String> {
-    let finite = || values.iter().copied().filter(|value| value.is_finite());
-    let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+    let [low, high] = ends(values.iter().copied().filter(|value| value.is_finite()));
     let size = low.abs().max(high.abs());
     let distance = high - low;
     if distance.is_nan() || distance <= 1e-9 * size {
@@ -70,13 +66,11 @@ pub fn alike(values: &[f64], digits: f64) -> Vec<String> {
 }
 
 /// A count and what is counted: "1 gap", "3 gaps".
-#[must_use]
 pub fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }
 
 /// A power as a superscript; nothing for the first.
-#[must_use]
 pub fn superscript(power: usize) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     if power == 1 {
@@ -86,13 +80,11 @@ pub fn superscript(power: usize) -> String {
 }
 
 /// A unit of measure per power of a degree: "°/h", "°/h/°C", "°/h/°C²".
-#[must_use]
 pub fn per_deg_c(unit: &str, power: usize) -> String {
     if power == 0 { unit.to_owned() } else { format!("{unit}/°C{}", superscript(power)) }
 }
 
 /// A number with its limits, to as many digits as tell them apart.
-#[must_use]
 pub fn within(value: f64, [low, high]: [f64; 2]) -> String {
     let words = alike(&[value, low, high], 2.0);
     match words.as_slice() {
@@ -102,7 +94,6 @@ pub fn within(value: f64, [low, high]: [f64; 2]) -> String {
 }
 
 /// A table as text, numbers to the right.
-#[must_use]
 pub fn table(head: &[String], rows: &[Vec<String>]) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING).set_header(head).add_rows(rows);

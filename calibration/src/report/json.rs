@@ -5,15 +5,12 @@ use isotherm_protocol::document::Sample;
 use serde_json::{Value, json};
 
 use super::verdict::Verdict;
-use super::{Coefficient, Curve, FitReport};
+use super::{Curve, FitReport};
 use crate::size::Size;
 
 impl FitReport {
     /// Everything but the curves themselves, of which the sizes are there.
-    #[must_use]
     pub fn to_json(&self) -> Value {
-        let coefficient =
-            |c: &Coefficient| json!({ "name": c.name, "unit": c.unit, "value": c.value, "sigma": c.sigma });
         let curve = |curve: &Curve| {
             json!({
                 "of": curve.of,
@@ -32,7 +29,7 @@ impl FitReport {
             "verdicts": self.verdicts.iter().map(Verdict::to_json).collect::<Vec<_>>(),
             "warnings": self.warnings,
             "notes": self.notes,
-            "coefficients": self.coefficients.iter().map(coefficient).collect::<Vec<_>>(),
+            "coefficients": self.coefficients,
             "validation": self.validation.as_ref().map(of_table),
             "residuals": self.residuals.iter().map(curve).collect::<Vec<_>>(),
             "tables": self.tables.iter().map(further).collect::<serde_json::Map<_, _>>(),
@@ -42,7 +39,6 @@ impl FitReport {
 
 impl Verdict {
     /// As JSON.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         json!({
             "of": self.of,
@@ -58,16 +54,7 @@ impl Verdict {
 }
 
 fn sizes([before, after]: [Size; 2]) -> Value {
-    let size = |size: Size| {
-        json!({
-            "count": size.count,
-            "mean": size.mean,
-            "rms": size.rms,
-            "standard_deviation": size.deviation,
-            "peak_to_peak": size.peak_to_peak,
-        })
-    };
-    json!({ "before": size(before), "after": size(after) })
+    json!({ "before": before, "after": after })
 }
 
 fn of_table(table: &Table) -> Value {

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Mark, Page, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Mark, Page, Panel, Series, Table};
 use isotherm_protocol::document::Sample;
 
 use super::{Coefficient, Curve, FitReport, Verdict, stated};
 use crate::fits::drift::spectrum::Spectrum;
+use crate::numbers::{ends, once_each, real};
 
 /// Most points of a curve on the page; of more, the smallest and the largest of each group are there.
 const POINTS: usize = 4096;
@@ -21,7 +22,6 @@ const BAR: f64 = 1.96;
 
 impl FitReport {
     /// The report as a page that needs nothing beside it.
-    #[must_use]
     pub fn to_html(&self) -> String {
         let mut page = Page::new(&format!("{}, unit {}", self.title, self.unit));
         let verdict = |verdict: &Verdict| (verdict.sentence(), verdict.reason.clone());
@@ -67,20 +67,13 @@ impl FitReport {
                 .iter()
                 .map(|curve| {
                     let over = |values: &[f64]| thin(curve.time_s.iter().copied(), values);
-                    panel(
-                        &curve.of,
-                        &curve.measure,
-                        pair(over(&curve.before), over(&curve.after), Form::Line),
-                    )
+                    let both = pair(over(&curve.before), over(&curve.after), Series::line);
+                    Panel::of(&curve.of, &curve.measure, HEIGHT, both)
                 })
                 .collect();
             panels.extend(temperatures(&curves));
-            page.chart(&Chart {
-                caption: format!("{}, {}: error before and after.", run.0, sample_words(run.1)),
-                x: Axis::of("time since the run's beginning", "s"),
-                panels,
-                marks: Vec::new(),
-            });
+            let caption = format!("{}, {}: error before and after.", run.0, sample_words(run.1));
+            page.chart(&Chart::of(caption, Axis::of("time since the run's beginning", "s"), panels));
         }
     }
 
@@ -88,8 +81,7 @@ impl FitReport {
         let spread = |outside: bool| {
             let own = self.residuals.iter().filter(|curve| (curve.sample == Sample::Out) == outside);
             let all = own.flat_map(|curve| &curve.temperature_deg_c).filter(|t| t.is_finite());
-            let [low, high] =
-                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
+            let [low, high] = ends(all.copied());
             high - low
         };
         if [false, true].into_iter().any(|outside| spread(outside) >= LEAST_DEG_C) {
@@ -103,12 +95,7 @@ impl FitReport {
                 .filter(known)
                 .filter(|curve| (curve.sample == Sample::Out) == outside)
                 .collect();
-            let mut names: Vec<(&str, &str)> = Vec::new();
-            for curve in &curves {
-                if !names.iter().any(|(of, _)| *of == curve.of) {
-                    names.push((&curve.of, &curve.measure));
-                }
-            }
+            let names = once_each(curves.iter().map(|curve| (curve.of.as_str(), curve.measure.as_str())));
             if names.is_empty() {
                 continue;
             }
@@ -119,14 +106,11 @@ impl FitReport {
                     before.extend(over(&curve.before));
                     after.extend(over(&curve.after));
                 }
-                panel(of, measure, pair(before, after, Form::Dots))
+                Panel::of(of, measure, HEIGHT, pair(before, after, Series::dots))
             };
-            page.chart(&Chart {
-                caption: format!("All runs {}: error before and after.", sample_words(outside)),
-                x: Axis::of("temperature", "°C"),
-                panels: names.into_iter().map(panel_of).collect(),
-                marks: Vec::new(),
-            });
+            let caption = format!("All runs {}: error before and after.", sample_words(outside));
+            let panels = names.into_iter().map(panel_of).collect();
+            page.chart(&Chart::of(caption, Axis::of("temperature", "°C"), panels));
         }
     }
 }
@@ -148,19 +132,13 @@ fn sample_words(outside: bool) -> &'static str {
     if outside { "out of sample" } else { "in sample" }
 }
 
-fn panel(title: &str, unit: &str, content: Vec<Series>) -> Panel {
-    let content = Content::Series(content);
-    Panel { title: title.to_owned(), unit: unit.to_owned(), height: HEIGHT, logarithmic: false, content }
-}
-
-fn pair(before: Vec<(f64, f64)>, after: Vec<(f64, f64)>, form: Form) -> Vec<Series> {
-    let series = |name: &str, ink, points| Series {
-        name: name.to_owned(),
-        ink,
-        form,
-        samples: Samples::points(points),
-    };
-    vec![series("before", Ink::Raw, before), series("after", Ink::Corrected, after)]
+/// Curves before and after, as a constructor of series draws them.
+fn pair(
+    before: Vec<(f64, f64)>,
+    after: Vec<(f64, f64)>,
+    drawn: fn(&'static str, Ink, Vec<(f64, f64)>) -> Series,
+) -> Vec<Series> {
+    vec![drawn("before", Ink::Raw, before), drawn("after", Ink::Corrected, after)]
 }
 
 /// The different temperatures of a run's curves.
@@ -172,14 +150,12 @@ fn temperatures(curves: &[&Curve]) -> Option<Panel> {
             shown.push(curve);
         }
     }
-    let series = |(curve, ink): (&&Curve, Ink)| Series {
-        name: if shown.len() > 1 { format!("of {}", curve.of) } else { "temperature".to_owned() },
-        ink,
-        form: Form::Line,
-        samples: Samples::points(thin(curve.time_s.iter().copied(), &curve.temperature_deg_c)),
+    let series = |(curve, ink): (&&Curve, Ink)| {
+        let name = if shown.len() > 1 { format!("of {}", curve.of) } else { "temperature".to_owned() };
+        Series::line(name, ink, thin(curve.time_s.iter().copied(), &curve.temperature_deg_c))
     };
     let series: Vec<Series> = shown.iter().zip(Ink::several()).map(series).collect();
-    (!series.is_empty()).then(|| Panel { height: LOW, ..panel("temperature", "°C", series) })
+    (!series.is_empty()).then(|| Panel::of("temperature", "°C", LOW, series))
 }
 
 /// Points, or the smallest and the largest of each group of them where they are many.
@@ -201,14 +177,8 @@ fn thin(places: impl Iterator<Item = f64>, values: &[f64]) -> Vec<(f64, f64)> {
 
 /// Coefficients with error bars, those of one unit of measure in one panel; `None` where none has a standard error.
 fn coefficients(all: &[Coefficient]) -> Option<Chart> {
-    let mut units: Vec<&str> = Vec::new();
-    for coefficient in all {
-        if !units.contains(&coefficient.unit.as_str()) {
-            units.push(&coefficient.unit);
-        }
-    }
-    #[expect(clippy::cast_precision_loss, reason = "there are few")]
-    let place = |index: usize| (index + 1) as f64;
+    let units = once_each(all.iter().map(|coefficient| coefficient.unit.as_str()));
+    let place = |index: usize| real(index + 1);
     let of_unit = |unit: &str| {
         let mine = || all.iter().enumerate().filter(move |(_, coefficient)| coefficient.unit == unit);
         let values = mine().map(|(index, coefficient)| (place(index), coefficient.value));
@@ -218,20 +188,15 @@ fn coefficients(all: &[Coefficient]) -> Option<Chart> {
             Some([(place(index), low), (place(index), high), (place(index), f64::NAN)])
         });
         let zero = [(place(0), 0.0), (place(all.len().saturating_sub(1)), 0.0)];
-        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
-            name: name.to_owned(),
-            ink,
-            form,
-            samples: Samples::points(points),
-        };
+
         let content = vec![
-            series("zero", Ink::Faint, Form::Line, zero.to_vec()),
-            series("95 %", Ink::Alert, Form::Line, bars.flatten().collect()),
-            series("value", Ink::Corrected, Form::Dots, values.collect()),
+            Series::line("zero", Ink::Faint, zero),
+            Series::line("95 %", Ink::Alert, bars.flatten()),
+            Series::dots("value", Ink::Corrected, values),
         ];
         // The unit of measure says it all.
         let title = if unit.is_empty() { "without unit" } else { "" };
-        Panel { height: LOW, ..panel(title, unit, content) }
+        Panel::of(title, unit, LOW, content)
     };
     let mark = |(index, c): (usize, &Coefficient)| Mark {
         x: place(index),
@@ -244,11 +209,11 @@ fn coefficients(all: &[Coefficient]) -> Option<Chart> {
         },
         ink: Ink::Faint,
     };
+    let caption = "Coefficients by their number in the table; bars hold 95 %.";
+    let panels = units.into_iter().map(of_unit).collect();
     all.iter().any(|coefficient| coefficient.sigma.is_some()).then(|| Chart {
-        caption: "Coefficients by their number in the table; bars hold 95 %.".to_owned(),
-        x: Axis::of("number of the coefficient", ""),
-        panels: units.into_iter().map(of_unit).collect(),
         marks: all.iter().enumerate().map(mark).collect(),
+        ..Chart::of(caption, Axis::of("number of the coefficient", ""), panels)
     })
 }
 
@@ -276,20 +241,16 @@ fn spectrum(curves: &[Curve]) -> Option<Chart> {
             Some(spectrum.points().map(|(hz, density)| (hz, density.sqrt())).collect::<Vec<_>>())
         };
         let unit = format!("{}/√Hz", named.measure);
-        let content = pair(of(|curve| &curve.before)?, of(|curve| &curve.after)?, Form::Line);
-        Some(Panel { logarithmic: true, ..panel(&named.of, &unit, content) })
+        let content = pair(of(|curve| &curve.before)?, of(|curve| &curve.after)?, Series::line);
+        Some(Panel::of(&named.of, unit, HEIGHT, content).logarithmic())
     };
     let panels: Vec<Panel> = names.into_iter().filter_map(panel_of).collect();
-    (!panels.is_empty()).then(|| Chart {
-        caption: format!(
-            "Square root of the power spectral density of the window means, {}: a slope to the left is left by \
-             temperature, a level is noise.",
-            sample_words(outside)
-        ),
-        x: Axis { label: "frequency".to_owned(), unit: "Hz".to_owned(), logarithmic: true },
-        panels,
-        marks: Vec::new(),
-    })
+    let caption = format!(
+        "Square root of the power spectral density of the window means, {}: a slope to the left is left by \
+         temperature, a level is noise.",
+        sample_words(outside)
+    );
+    (!panels.is_empty()).then(|| Chart::of(caption, Axis::of("frequency", "Hz").logarithmic(), panels))
 }
 
 /// Stretches without a gap.

@@ -22,15 +22,26 @@ pub struct Sheet {
 
 impl Sheet {
     /// Adds a table, if there is anything in it.
-    pub fn table(&mut self, heading: &str, head: &[&str], rows: Vec<Vec<String>>) {
-        if !rows.is_empty() {
-            let head = head.iter().map(|word| (*word).to_owned()).collect();
-            self.tables.push((heading.to_owned(), Table { head, rows }));
+    pub fn table(
+        &mut self,
+        heading: &str,
+        head: impl IntoIterator<Item = impl Into<String>>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) {
+        let table = Table::of(head, rows);
+        if !table.rows.is_empty() {
+            self.tables.push((heading.to_owned(), table));
+        }
+    }
+
+    /// Adds a chart, if there is anything in it.
+    pub fn chart(&mut self, heading: &str, chart: Chart) {
+        if !chart.panels.is_empty() {
+            self.charts.push((heading.to_owned(), chart));
         }
     }
 
     /// As text.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = format!("{}\n", self.headline);
         if !self.notes.is_empty() {
@@ -46,7 +57,6 @@ impl Sheet {
     }
 
     /// As a page.
-    #[must_use]
     pub fn to_html(&self) -> String {
         let mut page = Page::new(&self.title);
         page.headline(&self.headline);

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::numbers::real;
 use isotherm_protocol::document::Document;
 use toml::{Table, Value};
 
@@ -18,7 +19,6 @@ pub struct Sigmas(BTreeMap<(String, String, String), Vec<f64>>);
 
 impl Sigmas {
     /// Those that a document states.
-    #[must_use]
     pub fn of(document: &Document) -> Self {
         let details = document.origin.as_ref().and_then(|origin| origin.details.as_ref());
         let kinds = details.and_then(|details| details.get(KEY)?.as_table());
@@ -26,13 +26,7 @@ impl Sigmas {
         for (kind, sensors) in kinds.into_iter().flatten() {
             for (sensor, terms) in sensors.as_table().into_iter().flatten() {
                 for (term, values) in terms.as_table().into_iter().flatten() {
-                    let number = |value: &Value| {
-                        #[expect(
-                            clippy::cast_precision_loss,
-                            reason = "a whole number that someone wrote by hand"
-                        )]
-                        value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
-                    };
+                    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(real));
                     let values = values.as_array().map(|values| values.iter().filter_map(number).collect());
                     if let Some(values) = values {
                         sigmas.put(kind, sensor, term, values);
@@ -50,7 +44,6 @@ impl Sigmas {
     }
 
     /// Standard errors of one term; `None` where they are not known.
-    #[must_use]
     pub fn get(&self, kind: &str, sensor: &str, term: &str) -> Option<&[f64]> {
         self.0.get(&(kind.to_owned(), sensor.to_owned(), term.to_owned())).map(Vec::as_slice)
     }

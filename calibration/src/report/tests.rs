@@ -5,6 +5,7 @@ use isotherm_protocol::document::{Document, Sample};
 use super::*;
 use crate::document::written::Written;
 use crate::fixture::simulated;
+use crate::runs::table::Rows;
 use crate::size::Size;
 
 fn size(peak_to_peak: f64) -> Size {
@@ -115,7 +116,7 @@ fn judging_a_run_shows_what_the_terms_do() {
     let before = Written::of(&after.document.nominal()).unwrap();
     let judged = |rest: Rest| {
         let pair = (&before.loaded, &after.loaded);
-        judge(&run, Sample::Out, pair, (&after.document, &rest), 5.0, ()).unwrap()
+        judge(&run, Sample::Out, pair, (&after.document, &rest), Rows::valid(5.0), ()).unwrap()
     };
     let means = judged(Rest::default());
     let names: Vec<&str> = means.curves.iter().map(|curve| curve.of.as_str()).collect();

@@ -4,6 +4,7 @@ use isotherm_pages::Table;
 use isotherm_protocol::document::{Measure, Residual, Sample};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::size::Size;
 
@@ -21,7 +22,6 @@ pub enum Figure {
 
 impl Figure {
     /// The figure of a size.
-    #[must_use]
     pub fn of(self, size: &Size) -> f64 {
         match self {
             Self::PeakToPeak => size.peak_to_peak,
@@ -31,7 +31,6 @@ impl Figure {
     }
 
     /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::PeakToPeak => "peak to peak",
@@ -62,7 +61,6 @@ pub struct Verdict {
 
 impl Verdict {
     /// An accepted sensor, its sentence in peak to peak.
-    #[must_use]
     pub fn new(of: impl Into<String>, measure: impl Into<String>, in_sample: [Size; 2]) -> Self {
         Self {
             of: of.into(),
@@ -77,7 +75,6 @@ impl Verdict {
 
     /// Of the values before and after, in and out of sample: refused where what is left in the deciding sample has grown by more
     /// than noise. This is how all commands judge.
-    #[must_use]
     pub fn of_values(
         of: impl Into<String>,
         measure: impl Into<String>,
@@ -93,8 +90,7 @@ impl Verdict {
     /// Refused where few of so many windows are whole: the others may say something else.
     fn unless_few(self, all: usize) -> Self {
         let [Size { count, .. }, _] = self.deciding();
-        #[expect(clippy::cast_precision_loss, reason = "windows of a log are far below 2⁵³")]
-        let few = (count as f64) < LEAST_SHARE * all as f64;
+        let few = real(count) < LEAST_SHARE * real(all);
         if !few {
             return self;
         }
@@ -120,49 +116,54 @@ impl Verdict {
     }
 
     /// With sizes out of sample.
-    #[must_use]
     pub fn out_of_sample(mut self, sizes: Option<[Size; 2]>) -> Self {
         self.out_of_sample = sizes;
         self
     }
 
     /// With another figure in its sentence.
-    #[must_use]
     pub fn stated_as(mut self, figure: Figure) -> Self {
         self.figure = figure;
         self
     }
 
     /// With a remark.
-    #[must_use]
     pub fn remark(mut self, reason: impl Into<String>) -> Self {
         self.reason = reason.into();
         self
     }
 
     /// Refused.
-    #[must_use]
     pub fn refused(mut self, reason: impl Into<String>) -> Self {
         self.accepted = false;
         self.reason = reason.into();
         self
     }
 
+    /// "accepted" or "refused".
+    pub(super) const fn state(&self) -> &'static str {
+        if self.accepted { "accepted" } else { "refused" }
+    }
+
+    /// Before and after in each sample that has anything.
+    fn samples(&self) -> impl Iterator<Item = (Sample, [Size; 2])> {
+        let samples = [(Sample::In, Some(self.in_sample)), (Sample::Out, self.out_of_sample)];
+        let counts = |sizes: &[Size; 2]| sizes.iter().any(|size| size.count > 0);
+        samples.into_iter().filter_map(move |(sample, sizes)| Some((sample, sizes.filter(counts)?)))
+    }
+
     /// The sizes that decide: out of sample where they are known.
-    #[must_use]
     pub fn deciding(&self) -> [Size; 2] {
         self.out_of_sample.unwrap_or(self.in_sample)
     }
 
     /// How many times smaller the rms has become in the deciding sample; `None` where nothing is known or left.
-    #[must_use]
     pub fn factor(&self) -> Option<f64> {
         let [before, after] = self.deciding();
         (after.count > 0 && after.rms > 0.0).then(|| before.rms / after.rms)
     }
 
     /// Its sentence with the reason, without a full stop.
-    #[must_use]
     pub fn words(&self) -> String {
         match (self.accepted, self.reason.is_empty()) {
             (_, true) => self.sentence(),
@@ -172,10 +173,9 @@ impl Verdict {
     }
 
     /// Its sentence without the reason and without a full stop: "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted".
-    #[must_use]
     pub fn sentence(&self) -> String {
         let [before, after] = self.deciding();
-        let state = if self.accepted { "accepted" } else { "refused" };
+        let state = self.state();
         if before.count == 0 && after.count == 0 {
             return format!("{}: {state}", self.of);
         }
@@ -220,8 +220,7 @@ fn worse(before: &[f64], after: &[f64]) -> Worse {
     }
     let change = sum(|before, after| (after - before).powi(2)).sqrt();
     let along = sum(|before, after| after * (after - before)) / change;
-    #[expect(clippy::cast_precision_loss, reason = "values of a log are far below 2⁵³")]
-    let others = both().count().saturating_sub(1) as f64;
+    let others = real(both().count().saturating_sub(1));
     let noise = ((left - along * along).max(0.0) / others).sqrt();
     let by_chance = StudentsT::new(0.0, 1.0, others).map_or(0.0, |law| law.sf(along / noise));
     let doubled = left > LARGEST_GROWTH * LARGEST_GROWTH * squares;
@@ -242,16 +241,12 @@ pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
 
 /// All sizes as a table; `counted` is what they are over.
 pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
-    let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""].map(str::to_owned);
+    let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""];
     let mut rows = Vec::new();
     for verdict in verdicts {
-        let samples = [("in sample", Some(verdict.in_sample)), ("out of sample", verdict.out_of_sample)];
-        for (sample, sizes) in samples {
-            let Some([before, after]) = sizes.filter(|sizes| sizes.iter().any(|size| size.count > 0)) else {
-                continue;
-            };
+        for (sample, [before, after]) in verdict.samples() {
+            let sample = if sample == Sample::In { "in sample" } else { "out of sample" };
             let factor = if after.rms > 0.0 { short(before.rms / after.rms) } else { "–".to_owned() };
-            let state = if verdict.accepted { "accepted" } else { "refused" };
             rows.push(vec![
                 format!("{}, {} {sample}", verdict.of, verdict.measure),
                 short(before.rms),
@@ -260,15 +255,14 @@ pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
                 short(before.peak_to_peak),
                 format!("→ {}", short(after.peak_to_peak)),
                 after.count.to_string(),
-                state.to_owned(),
+                verdict.state().to_owned(),
             ]);
         }
     }
-    Table { head: head.to_vec(), rows }
+    Table::of(head, rows)
 }
 
 /// What the document states of its residuals: the sizes of all verdicts in °/h or m/s²; others have no entry in a document.
-#[must_use]
 pub fn residuals(verdicts: &[Verdict]) -> Vec<Residual> {
     let mut residuals = Vec::new();
     for verdict in verdicts {
@@ -277,10 +271,7 @@ pub fn residuals(verdicts: &[Verdict]) -> Vec<Residual> {
             "m/s²" => Measure::MetresPerSecondSquared,
             _ => continue,
         };
-        for (sample, sizes) in [(Sample::In, Some(verdict.in_sample)), (Sample::Out, verdict.out_of_sample)] {
-            let Some([before, after]) = sizes.filter(|sizes| sizes.iter().any(|size| size.count > 0)) else {
-                continue;
-            };
+        for (sample, [before, after]) in verdict.samples() {
             residuals.push(Residual {
                 of: verdict.of.replace(' ', "."),
                 sample,

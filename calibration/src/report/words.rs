@@ -8,7 +8,6 @@ const LINES: usize = 12;
 const LEAST_TOLD: usize = 2;
 
 /// What was found, what is to be looked at, as much of it as there is room for, and where the rest is.
-#[must_use]
 pub(crate) fn dozen(found: &[String], told: &[String], rest: &str) -> String {
     let room = LINES.saturating_sub(found.len() + 1).max(LEAST_TOLD);
     let lines: Vec<&str> = found.iter().chain(told.iter().take(room)).map(String::as_str).collect();
@@ -20,13 +19,11 @@ pub(crate) fn dozen(found: &[String], told: &[String], rest: &str) -> String {
 }
 
 /// Sentences of gyros, each with the names of all that it holds of, in the order of the first.
-#[must_use]
 pub(crate) fn together(told: &[(&str, String)]) -> Vec<String> {
     grouped(told).into_iter().map(|(words, names)| format!("{}: {words}", gyros(&names))).collect()
 }
 
 /// Sentences of logs, each with the names of all that it holds of; of many only the first.
-#[must_use]
 pub(crate) fn of_logs(told: &[(&str, String)]) -> Vec<String> {
     const MOST: usize = 4;
     let logs = |names: &[&str]| match names.get(..MOST) {
@@ -40,7 +37,6 @@ pub(crate) fn of_logs(told: &[(&str, String)]) -> Vec<String> {
 }
 
 /// Sentences with the names of all that they hold of, in the order of the first.
-#[must_use]
 pub(crate) fn grouped<'a>(told: &'a [(&'a str, String)]) -> Vec<(&'a str, Vec<&'a str>)> {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, words) in told {
@@ -53,7 +49,6 @@ pub(crate) fn grouped<'a>(told: &'a [(&'a str, String)]) -> Vec<(&'a str, Vec<&'
 }
 
 /// "gyro x", "gyros x, y".
-#[must_use]
 pub(crate) fn gyros(names: &[&str]) -> String {
     format!("{} {}", if names.len() == 1 { "gyro" } else { "gyros" }, names.join(", "))
 }

@@ -43,7 +43,6 @@ impl Cut {
     }
 
     /// The sentence for it.
-    #[must_use]
     pub fn words(&self) -> Option<&str> {
         self.0.get().map(String::as_str)
     }

@@ -1,6 +1,7 @@
 //! Columns of readings that nothing can be made of, whatever is to be made of them.
 
 use crate::axes::sensor_name;
+use crate::numbers::real;
 use crate::report::figures::six;
 
 /// Share of readings that may be no number.
@@ -19,18 +20,15 @@ pub enum Fault {
 
 impl Fault {
     /// Of a column by itself.
-    #[must_use]
     pub fn of(column: &[f64]) -> Option<Self> {
         let missing = missing(column);
-        #[expect(clippy::cast_precision_loss, reason = "ticks of a run")]
-        if missing as f64 > LARGEST_MISSING * column.len() as f64 {
+        if real(missing) > LARGEST_MISSING * real(column.len()) {
             return Some(Self::Missing([missing, column.len()]));
         }
         dead(column).map(Self::Dead)
     }
 
     /// Of one column beside those before it.
-    #[must_use]
     pub fn among(columns: &[Vec<f64>], index: usize) -> Option<Self> {
         let column = columns.get(index)?;
         let equal = |other: &Vec<f64>| {
@@ -40,7 +38,6 @@ impl Fault {
     }
 
     /// In words; the sensor is one of so many of a kind.
-    #[must_use]
     pub fn words(self, kind: &str, of: usize) -> String {
         match self {
             Self::Dead(value) => format!(
@@ -61,13 +58,11 @@ impl Fault {
 }
 
 /// How many readings are not numbers.
-#[must_use]
 pub fn missing(column: &[f64]) -> usize {
     column.iter().filter(|reading| !reading.is_finite()).count()
 }
 
 /// The one reading that a column has; `None` where it changes, or has none.
-#[must_use]
 pub fn dead(column: &[f64]) -> Option<f64> {
     let mut good = column.iter().filter(|reading| reading.is_finite());
     let first = good.next()?;

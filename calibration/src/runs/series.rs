@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::codec;
-use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
+use isotherm_protocol::key::UnitId;
+
+use super::readings;
 
 use crate::error::Error;
+use crate::numbers::seconds;
 
 /// Ticks of one kind of sensor, as columns of equal length.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,11 +38,9 @@ pub struct Channel {
 
 impl Channel {
     /// Times since the first reading (s).
-    #[must_use]
     pub fn since_s(&self) -> Vec<f64> {
         let first = self.time_ns.first().copied().unwrap_or_default();
-        #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
-        let since_s = |time: &i64| time.saturating_sub(first) as f64 * 1e-9;
+        let since_s = |time: &i64| seconds(time.saturating_sub(first));
         self.time_ns.iter().map(since_s).collect()
     }
 }
@@ -65,7 +64,6 @@ pub struct Series {
 
 impl Series {
     /// Nothing of a unit yet.
-    #[must_use]
     pub fn empty(unit: UnitId) -> Self {
         Self {
             unit,
@@ -83,9 +81,11 @@ impl Series {
     /// [`Error::Refused`] where ticks are of another instrument than those before.
     pub fn take_message(&mut self, message: &Message) -> Result<(), Error> {
         let Topic::Raw(_, stream) = &message.topic else { return Ok(()) };
-        let readable = self.take(*stream, &message.frame)?;
-        self.bad_frames += u64::from(!readable);
-        Ok(())
+        let Some(readings) = readings(*stream, &message.frame) else {
+            self.bad_frames += 1;
+            return Ok(());
+        };
+        readings.iter().try_for_each(|event| self.take_event(event))
     }
 
     /// Takes one event.
@@ -99,26 +99,6 @@ impl Series {
             LogEvent::Temperature(reading) => self.temperature(reading),
         }
         Ok(())
-    }
-
-    /// Takes one frame; `false` where it cannot be read.
-    fn take(&mut self, stream: RawStream, frame: &[u8]) -> Result<bool, Error> {
-        match stream {
-            RawStream::Gyro => {
-                let Ok(batch) = codec::decode::<GyroBatch>(frame) else { return Ok(false) };
-                batch.ticks.iter().try_for_each(|tick| self.gyro(batch.output, tick))?;
-            }
-            RawStream::Accel => {
-                let Ok(batch) = codec::decode::<AccelBatch>(frame) else { return Ok(false) };
-                batch.ticks.iter().try_for_each(|tick| self.accel(batch.output, tick))?;
-            }
-            RawStream::Temperature => {
-                let Ok(batch) = codec::decode::<TemperatureBatch>(frame) else { return Ok(false) };
-                batch.readings.iter().for_each(|reading| self.temperature(reading));
-            }
-            RawStream::Health => {}
-        }
-        Ok(true)
     }
 
     fn gyro(&mut self, output: OutputKind, tick: &GyroTick) -> Result<(), Error> {
@@ -146,23 +126,19 @@ impl Series {
 
 impl Ticks {
     /// Number of ticks.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.end_ns.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.end_ns.is_empty()
     }
 
     /// From the first tick's end to the last one's (s).
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
     pub fn length_s(&self) -> f64 {
         let ends = self.end_ns.first().zip(self.end_ns.last());
-        ends.map_or(0.0, |(first, last)| last.saturating_sub(*first) as f64 * 1e-9)
+        ends.map_or(0.0, |(first, last)| seconds(last.saturating_sub(*first)))
     }
 
     /// Adds a tick, with its end (ns) and duration (s).
@@ -178,13 +154,13 @@ impl Ticks {
             self.readings.resize_with(readings.len(), Vec::new);
         }
         if self.output != Some(output) || self.readings.len() != readings.len() {
-            return Err(Error::Refused(vec![format!(
+            return Err(Error::refused(format!(
                 "tick {sequence} has {} sensors ({output:?}), the ticks before it have {} ({:?}): a log must be of one \
                  instrument; cut it there with --start and --duration",
                 readings.len(),
                 self.readings.len(),
                 self.output.unwrap_or(output),
-            )]));
+            )));
         }
         self.sequence.push(sequence);
         self.end_ns.push(end_ns);

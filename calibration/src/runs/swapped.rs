@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use isotherm_correction::earth::{Place, Tilt};
 
 use crate::axes::AXES;
+use crate::numbers::{norm, unit};
 use crate::report::figures::fixed;
 use crate::size::Size;
 
@@ -34,17 +35,15 @@ pub struct Shown {
 
 impl Shown {
     /// Of sensors of a kind, with the symbol of their unit of measure.
-    #[must_use]
     pub fn of([kind, measure]: [&'static str; 2], sizes: [Size; 3], stated: [f64; 3]) -> Self {
         let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
         Self { kind, measure, mean: sizes.map(|size| size.mean), stated, deviation }
     }
 
     /// Which axes look swapped: another order fits by far better than that of the log; `None` where none does.
-    #[must_use]
     pub fn swapped(&self) -> Option<Looks> {
-        let off = |order: [usize; 3]| size([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]));
-        let (as_logged, size) = (self.off(), size(self.stated));
+        let off = |order: [usize; 3]| norm([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]));
+        let (as_logged, size) = (self.off(), norm(self.stated));
         if !self.is_away() {
             return None;
         }
@@ -56,7 +55,6 @@ impl Shown {
     }
 
     /// That the means are far from what they must be though no order looks right; `None` where they are near.
-    #[must_use]
     pub fn far(&self) -> Option<Looks> {
         (self.is_away() && self.swapped().is_none()).then(|| self.looks(None))
     }
@@ -68,13 +66,13 @@ impl Shown {
 
     /// How far the means are from what they must be.
     fn off(&self) -> f64 {
-        size([0, 1, 2].map(|axis| self.mean[axis] - self.stated[axis]))
+        norm([0, 1, 2].map(|axis| self.mean[axis] - self.stated[axis]))
     }
 
     /// Whether that is too far; false for NaN too.
     fn is_away(&self) -> bool {
         let off = self.off();
-        off > AWAY * size(self.stated) && off > AWAY_DEVIATIONS * self.deviation
+        off > AWAY * norm(self.stated) && off > AWAY_DEVIATIONS * self.deviation
     }
 }
 
@@ -120,12 +118,7 @@ impl Display for Looks {
     }
 }
 
-fn size(vector: [f64; 3]) -> f64 {
-    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
-}
-
 /// The axes that are not in their places, in words.
-#[must_use]
 pub fn moved(order: [usize; 3]) -> String {
     let names = AXES.into_iter().zip(order).enumerate();
     let moved: Vec<&str> = names.filter(|(axis, (_, of))| axis != of).map(|(_, (name, _))| name).collect();
@@ -133,14 +126,12 @@ pub fn moved(order: [usize; 3]) -> String {
 }
 
 /// Direction of the specific force at rest in case axes, a unit vector, where pitch and roll were stated.
-#[must_use]
 pub fn up(place: &Place) -> Option<[f64; 3]> {
     let Tilt::Given { pitch_rad, roll_rad } = place.tilt() else { return None };
     // At the pole the Earth turns about the vertical: where that axis is in the case, there gravity is.
     let tilt_deg = [pitch_rad.to_degrees(), roll_rad.to_degrees()];
     let rate = Place::new(90.0, 0.0, Some(tilt_deg)).ok()?.earth_rate_in_case(None)?;
-    let size = rate.iter().map(|part| part * part).sum::<f64>().sqrt();
-    Some(rate.map(|part| part / size))
+    Some(unit(rate))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use isotherm_log::offline::Loaded;
 
 use super::{Run, Troubles, Watch};
 use crate::error::Error;
+use crate::numbers::seconds;
 
 /// Flags of a tick that carries no reading of its own.
 const NOT_OWN: TickFlags = TickFlags::INTERPOLATED
@@ -40,6 +41,18 @@ pub struct Rows {
     pub length_s: f64,
     /// Which ticks count.
     pub takes: Takes,
+    /// Share of a row that must count, without a gap in it, for the row to have numbers; `None` where any tick is enough.
+    pub whole: Option<f64>,
+}
+
+impl Rows {
+    /// Windows without gaps, of valid ticks: what is stated of a unit is a mean over these.
+    pub const fn valid(length_s: f64) -> Self {
+        Self { length_s, takes: Takes::Valid, whole: Some(0.999) }
+    }
+
+    /// Every tick.
+    pub const TICKS: Self = Self { length_s: 0.0, takes: Takes::All, whole: None };
 }
 
 /// Columns of equal length, a row for each window of a run.
@@ -74,14 +87,12 @@ pub struct Table {
 }
 
 /// Whether the mean specific force of a unit at rest has the size of gravity (m/s²), within [`LEVELLING_TOLERANCE`].
-#[must_use]
 pub fn is_one_g(size: f64) -> bool {
     (size / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() <= LEVELLING_TOLERANCE
 }
 
 /// Length of the windows that what is left is stated over (s), for runs as long as the longest of some: in long runs several of
 /// `shortest_s`, so that white noise does not hide what they are about. `thermal` and `validate` have it from here.
-#[must_use]
 pub fn usual_window_s(longest_run_s: f64, shortest_s: f64) -> f64 {
     const WINDOWS_OF_A_RUN: f64 = 200.0;
     const MOST: f64 = 10.0;
@@ -140,9 +151,15 @@ impl Table {
     /// # Errors
     /// As [`Run::correct`].
     pub fn of(run: &Run, loaded: &Loaded, window_s: f64, watch: impl Watch) -> Result<Self, Error> {
-        let rows = Rows { length_s: window_s, takes: Takes::Valid };
-        let mut tables = Self::together(run, slice::from_ref(loaded), rows, watch)?;
-        Ok(tables.pop().unwrap_or_default().whole(0.999))
+        Self::of_rows(run, loaded, Rows::valid(window_s), watch)
+    }
+
+    /// The same with rows of any kind.
+    ///
+    /// # Errors
+    /// As [`Run::correct`].
+    pub fn of_rows(run: &Run, loaded: &Loaded, rows: Rows, watch: impl Watch) -> Result<Self, Error> {
+        Ok(Self::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default())
     }
 
     /// Corrects a run with several calibrations of the same channels and sensors at once: a table for each, with the same rows.
@@ -152,7 +169,7 @@ impl Table {
     pub fn together(
         run: &Run,
         loaded: &[Loaded],
-        Rows { length_s: window_s, takes }: Rows,
+        Rows { length_s: window_s, takes, whole }: Rows,
         watch: impl Watch,
     ) -> Result<Vec<Self>, Error> {
         let mut tables = vec![Self { window_s, ..Self::default() }; loaded.len()];
@@ -172,25 +189,25 @@ impl Table {
         let troubles = run.correct_together(loaded, watch, each)?;
         for (table, troubles) in tables.iter_mut().zip(troubles) {
             table.troubles = troubles;
+            if let Some(share) = whole {
+                table.keep_whole(share);
+            }
         }
         Ok(tables)
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 
-    /// The same with numbers only in rows that have no gap inside and of which at least this share counts.
-    #[must_use]
-    pub fn whole(mut self, share: f64) -> Self {
+    /// Leaves numbers only in rows that have no gap inside and of which at least this share counts.
+    fn keep_whole(&mut self, share: f64) {
         let kinds = [&mut self.rate_deg_per_h, &mut self.force_m_per_s2];
         for (columns, taken_s) in kinds.into_iter().zip(&self.taken_s) {
             for (row, taken_s) in taken_s.iter().enumerate() {
@@ -201,23 +218,19 @@ impl Table {
                 }
             }
         }
-        self
     }
 
     /// Axis 0…2.
-    #[must_use]
     pub fn rate(&self, axis: usize) -> &[f64] {
         self.rate_deg_per_h.get(axis).map_or(&[], Vec::as_slice)
     }
 
     /// Axis 0…2.
-    #[must_use]
     pub fn force(&self, axis: usize) -> &[f64] {
         self.force_m_per_s2.get(axis).map_or(&[], Vec::as_slice)
     }
 
     /// Mean rate (°/h) over the rows whose middle lies in a window (s since the beginning).
-    #[must_use]
     pub fn mean_rate_within(&self, [from_s, to_s]: [f64; 2]) -> [f64; 3] {
         let inside = || (0..self.len()).filter(|&row| (from_s..to_s).contains(&self.time_s[row]));
         let length_s: f64 = inside().map(|row| self.length_s[row]).sum();
@@ -228,8 +241,7 @@ impl Table {
 
     fn close(&mut self, row: &Row, (first, end): (Timestamp, Timestamp), unit: &Unit) {
         let Some(begin) = row.begin else { return };
-        #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let begin_s = begin.as_ns().saturating_sub(first.as_ns()) as f64 * 1e-9;
+        let begin_s = seconds(begin.as_ns().saturating_sub(first.as_ns()));
         self.end_ns.push(end.as_ns());
         self.begin_s.push(begin_s);
         self.length_s.push(row.length_s);
@@ -292,11 +304,11 @@ mod tests {
         assert_ne!(before.rate(0), means.rate(0), "the bias is in one of them");
         assert_eq!(run.series(()).unwrap().gyros.len(), 60 * 100);
         // Together they are what each is alone.
-        let rows = Rows { length_s: 10.0, takes: Takes::Valid };
+        let rows = Rows::valid(10.0);
         let both = Table::together(&run, &[written.loaded.clone(), bare], rows, ()).unwrap();
         assert_eq!(both, [means.clone(), before]);
         // Ticks as rows.
-        let rows = Rows { length_s: 0.0, takes: Takes::All };
+        let rows = Rows::TICKS;
         let ticks = Table::together(&run, slice::from_ref(&written.loaded), rows, ()).unwrap().remove(0);
         assert_eq!((ticks.len(), ticks.end_ns.len()), (6000, 6000));
         let within = ticks.mean_rate_within([10.0, 20.0]);

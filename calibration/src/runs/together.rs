@@ -7,11 +7,9 @@ use isotherm_correction::unit::{Unit, UnitSettings};
 use isotherm_log::message::Topic;
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::codec;
 use isotherm_protocol::key::RawStream;
-use isotherm_protocol::raw::GyroBatch;
 
-use super::{Fed, Piece, Run, Troubles, Watch};
+use super::{Fed, Piece, Run, Troubles, Watch, readings};
 use crate::error::Error;
 
 impl Run {
@@ -28,8 +26,10 @@ impl Run {
             match piece {
                 Piece::Event(LogEvent::Gyro { output, tick }) => each(*output, tick),
                 Piece::Message(message) if matches!(message.topic, Topic::Raw(_, RawStream::Gyro)) => {
-                    if let Ok(batch) = codec::decode::<GyroBatch>(&message.frame) {
-                        batch.ticks.iter().for_each(|tick| each(batch.output, tick));
+                    for event in readings(RawStream::Gyro, &message.frame).iter().flatten() {
+                        if let LogEvent::Gyro { output, tick } = event {
+                            each(*output, tick);
+                        }
                     }
                 }
                 Piece::Event(_) | Piece::Message(_) => {}

@@ -3,8 +3,10 @@
 use isotherm_correction::sample::SensorFlags;
 use isotherm_pages::Table;
 
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::runs::{Run, Watch};
 
@@ -61,7 +63,7 @@ impl Coverage {
             invalid: 0,
         };
         let document = &written.document;
-        let accels = document.accel.iter().flat_map(|accel| &accel.sensor);
+        let accels = accelerometers(document).iter();
         Self {
             channels: calibration.channels().iter().enumerate().map(channel).collect(),
             gyros: document.gyro.sensor.iter().map(|gyro| sensor("gyro", &gyro.name)).collect(),
@@ -154,15 +156,10 @@ impl Coverage {
                 share(sensor.invalid),
             ]
         };
-        let head = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect();
-        let channels = Table {
-            head: head(&["channel", "seen, °C", "fitted, °C", "covered", "rate, °C/min"]),
-            rows: self.channels.iter().map(channel).collect(),
-        };
-        let sensors = Table {
-            head: head(&["sensor", "ticks", "clamped", "temperature stale", "not valid"]),
-            rows: self.gyros.iter().chain(&self.accels).map(sensor).collect(),
-        };
+        let head = ["channel", "seen, °C", "fitted, °C", "covered", "rate, °C/min"];
+        let channels = Table::of(head, self.channels.iter().map(channel));
+        let head = ["sensor", "ticks", "clamped", "temperature stale", "not valid"];
+        let sensors = Table::of(head, self.gyros.iter().chain(&self.accels).map(sensor));
         vec![("Temperature".to_owned(), channels), ("Flags".to_owned(), sensors)]
     }
 }
@@ -185,9 +182,8 @@ impl ChannelRange {
 }
 
 impl Sensor {
-    #[expect(clippy::cast_precision_loss, reason = "ticks of logs are far below 2⁵³")]
     fn share(&self, count: u64) -> f64 {
-        if self.ticks == 0 { 0.0 } else { count as f64 / self.ticks as f64 }
+        if self.ticks == 0 { 0.0 } else { real(count) / real(self.ticks) }
     }
 }
 

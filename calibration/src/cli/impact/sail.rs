@@ -12,7 +12,8 @@ use crate::fits::impact::logged;
 use crate::fits::impact::models::Choice;
 use crate::fits::impact::monte_carlo::{Voyages, sail_all};
 use crate::fits::impact::report::{Report, Row};
-use crate::fits::impact::scenario::{CARES, Drift, Voyage};
+use crate::fits::impact::scenario::{Drift, Voyage};
+use crate::numbers::real;
 use crate::runs::cut::Cut;
 
 /// Seeds where nobody says.
@@ -42,8 +43,7 @@ impl ImpactArgs {
     pub(super) fn sail_stated(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
         let (trend, constant) = (self.trend.unwrap_or(0.0), self.constant.unwrap_or(0.0));
         let rate = |tick: usize| {
-            #[expect(clippy::cast_precision_loss, reason = "ticks of some weeks")]
-            let hours = (tick as f64 + 0.5) * TICK_S / HOUR_S;
+            let hours = (real(tick) + 0.5) * TICK_S / HOUR_S;
             let after = if tick < voyage.calibration_ticks() { 0.0 } else { constant };
             AngularRate::from_deg_per_h(trend * hours + after).as_rad_per_s()
         };
@@ -53,10 +53,7 @@ impl ImpactArgs {
             let truth: Vec<[f64; 3]> = ramp.iter().map(|rate| case.share.map(|share| share * rate)).collect();
             let held = truth.get(voyage.calibration_ticks().saturating_sub(1)).copied().unwrap_or_default();
             let drift = Drift { measured: truth.clone(), truth, held };
-            for care in CARES {
-                let course = voyage.sail(care, &drift, parts)?;
-                rows.push(Row { case: case.name.clone(), course, spread: None });
-            }
+            rows.extend(Row::of_cares(&case.name, voyage, &drift, parts)?);
         }
         let source = match (self.trend, self.constant) {
             (Some(trend), None) => format!("A trend of {trend} °/h² alone"),
@@ -144,14 +141,7 @@ impl ImpactArgs {
              included, is removed; the mean of its last hour is held."
                 .to_owned(),
         );
-        let mut rows = Vec::new();
-        for care in CARES {
-            rows.push(Row {
-                case: "as logged".to_owned(),
-                course: voyage.sail(care, &drift, parts)?,
-                spread: None,
-            });
-        }
+        let rows = Row::of_cares("as logged", voyage, &drift, parts)?;
         let source = format!("The log of unit {}", columns.unit);
         let choices = Choice::of(&drift, voyage);
         Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes, choices })

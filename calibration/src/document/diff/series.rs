@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::{BEYOND, Changes, changes};
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::once_each;
 use crate::report::Sheet;
 use crate::report::figures::short;
 
@@ -39,7 +40,6 @@ impl Series {
     }
 
     /// Everything.
-    #[must_use]
     pub fn sheet(&self) -> Sheet {
         let names: Vec<&str> = self.steps.iter().map(|step| step.names[0].as_str()).collect();
         let last = &self.whole.names[1];
@@ -73,17 +73,12 @@ impl Series {
             };
             row(&axis.of, self.columns().map(turned))
         });
-        let head_of_axes = head("input axis turned by, ″");
-        sheet.table("Input axes", &as_str(&head_of_axes), axes.collect());
+        sheet.table("Input axes", head("input axis turned by, ″"), axes);
         if self.columns().any(|step| !step.turned().is_empty()) {
             sheet.notes.push(format!("* beyond {BEYOND} σ of both calibrations."));
         }
-        let mut kinds: Vec<(&String, &str)> = Vec::new();
-        for value in self.columns().flat_map(|step| &step.values) {
-            if !kinds.contains(&(&value.of, value.unit)) {
-                kinds.push((&value.of, value.unit));
-            }
-        }
+        let values = self.columns().flat_map(|step| &step.values);
+        let kinds = once_each(values.map(|value| (&value.of, value.unit)));
         let values = kinds.into_iter().map(|(of, unit)| {
             let changed = |step: &Changes| {
                 let own = step.values.iter().find(|value| value.of == *of)?;
@@ -91,13 +86,11 @@ impl Series {
             };
             row(&format!("{of}, {unit}"), self.columns().map(changed))
         });
-        let head_of_values = head("");
-        sheet.table("Changes of biases and scale factors", &as_str(&head_of_values), values.collect());
+        sheet.table("Changes of biases and scale factors", head(""), values);
         sheet
     }
 
     /// Everything as JSON.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let steps: Vec<Value> = self.steps.iter().map(Changes::to_json).collect();
         json!({ "verdict": self.whole.headline(), "steps": steps, "whole": self.whole.to_json() })
@@ -108,10 +101,6 @@ impl Series {
 fn row(of: &str, cells: impl Iterator<Item = Option<String>>) -> Vec<String> {
     let cells = cells.map(|cell| cell.unwrap_or_else(|| "–".to_owned()));
     std::iter::once(of.to_owned()).chain(cells).collect()
-}
-
-fn as_str(head: &[String]) -> Vec<&str> {
-    head.iter().map(String::as_str).collect()
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Changes in words, tables and charts.
 
-use isotherm_pages::{Axis, Chart, Ink};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 use serde_json::{Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
-use crate::document::show::charts::{line, panel};
+use crate::document::show::charts::HEIGHT;
 use crate::report::Sheet;
 use crate::report::figures::short;
 
@@ -13,14 +13,12 @@ const MOST_ABOUT: usize = 12;
 
 impl Changes {
     /// Whether an axis has turned beyond what the two calibrations can tell.
-    #[must_use]
     pub fn turned(&self) -> Vec<&AxisChange> {
         let beyond = |axis: &&AxisChange| axis.significance.is_some_and(|sigmas| sigmas > BEYOND);
         self.axes.iter().filter(beyond).collect()
     }
 
     /// The first line.
-    #[must_use]
     pub fn headline(&self) -> String {
         let [before, after] = &self.names;
         if self.entries.is_empty() {
@@ -54,7 +52,6 @@ impl Changes {
     }
 
     /// Everything.
-    #[must_use]
     pub fn sheet(&self) -> Sheet {
         let [before, after] = &self.names;
         let mut sheet =
@@ -112,7 +109,7 @@ impl Changes {
         };
         let head =
             ["input axis, ″", "towards x", "towards y", "towards z", "turned", "in σ", "largest over T", ""];
-        sheet.table("Input axes", &head, self.axes.iter().map(row).collect());
+        sheet.table("Input axes", head, self.axes.iter().map(row));
     }
 
     fn values_table(&self, sheet: &mut Sheet) {
@@ -131,8 +128,7 @@ impl Changes {
             });
             cells
         };
-        let head: Vec<&str> = head.iter().map(String::as_str).collect();
-        sheet.table("Changes of biases and scale factors", &head, self.values.iter().map(row).collect());
+        sheet.table("Changes of biases and scale factors", head, self.values.iter().map(row));
     }
 
     fn entries_table(&self, sheet: &mut Sheet) {
@@ -142,10 +138,13 @@ impl Changes {
             vec![entry.key.clone(), or_dash(&entry.before), or_dash(&entry.after)]
         };
         let matter = self.entries.iter().filter(|entry| !about(&entry.key)).map(row);
-        sheet.table("Entries that differ", &["key", "before", "after"], matter.collect());
+        sheet.table("Entries that differ", ["key", "before", "after"], matter);
         let rest: Vec<_> = self.entries.iter().filter(|entry| about(&entry.key)).collect();
-        let shown = rest.iter().take(MOST_ABOUT).map(|entry| row(entry)).collect();
-        sheet.table("Origins", &["key", "before", "after"], shown);
+        sheet.table(
+            "Origins",
+            ["key", "before", "after"],
+            rest.iter().take(MOST_ABOUT).map(|entry| row(entry)),
+        );
         if rest.len() > MOST_ABOUT {
             sheet.notes.push(format!(
                 "Of {} entries about origins, {MOST_ABOUT} are shown; --json has all.",
@@ -158,19 +157,13 @@ impl Changes {
         let panels = self.values.iter().filter(|value| value.change.iter().any(|change| *change != 0.0));
         let panels = panels.map(|value| {
             let points = self.temperature_deg_c.iter().copied().zip(value.change.iter().copied());
-            panel(&value.of, value.unit, vec![line("change".to_owned(), Ink::First, points)])
+            Panel::of(&value.of, value.unit, HEIGHT, vec![Series::line("change", Ink::First, points)])
         });
-        let panels: Vec<_> = panels.collect();
-        if !panels.is_empty() {
-            let caption = "Change of each bias and scale factor.".to_owned();
-            let x = Axis::of("temperature", "°C");
-            let chart = Chart { caption, x, panels, marks: Vec::new() };
-            sheet.charts.push(("Over temperature".to_owned(), chart));
-        }
+        let (caption, x) = ("Change of each bias and scale factor.", Axis::of("temperature", "°C"));
+        sheet.chart("Over temperature", Chart::of(caption, x, panels.collect()));
     }
 
     /// Everything as JSON.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let mut value = json!(self);
         if let Some(object) = value.as_object_mut() {

@@ -9,6 +9,7 @@ use crate::document::provenance::{TOOL, command_line};
 use crate::document::show::terms::tree;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::hull;
 use crate::report::Sigmas;
 
 /// Most logs that a document's origin lists; more are in the parts' own origins only.
@@ -69,7 +70,7 @@ pub(super) fn origin(
 /// The range that all documents cover together.
 fn widest(documents: &[&Written], of: fn(&Document) -> Option<[f64; 2]>) -> Option<Value> {
     let ranges = documents.iter().filter_map(|document| of(&document.document));
-    let [low, high] = ranges.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
+    let [low, high] = hull(ranges)?;
     Some(Value::Array(vec![Value::Float(low), Value::Float(high)]))
 }
 

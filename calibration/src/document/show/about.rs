@@ -4,6 +4,7 @@ use isotherm_protocol::document::{Document, Orientation};
 
 use super::parts;
 use super::terms::Term;
+use crate::document::accelerometers;
 use crate::report::Sheet;
 use crate::report::figures::short;
 
@@ -14,8 +15,7 @@ pub(crate) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 pub(super) fn headline(name: &str, document: &Document) -> String {
     let names = |names: Vec<&str>| names.join(", ");
     let gyros = document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()).collect();
-    let accels: Vec<&str> =
-        document.accel.iter().flat_map(|accel| &accel.sensor).map(|sensor| sensor.name.as_str()).collect();
+    let accels: Vec<&str> = accelerometers(document).iter().map(|sensor| sensor.name.as_str()).collect();
     let accels = if accels.is_empty() {
         "no accelerometers".to_owned()
     } else {
@@ -78,7 +78,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         ]
     });
     let head = ["channel", "range, °C", "spike limit, °C", "conversion a0, a1, …"];
-    sheet.table("Temperature channels", &head, channels.collect());
+    sheet.table("Temperature channels", head, channels);
     let gyros = document.gyro.sensor.iter().map(|gyro| {
         let weight = match (gyro.increment_weight_arcsec_per_count, gyro.increment_weight_rad_per_rad) {
             (Some(weight), _) => Some(format!("{weight} ″/count")),
@@ -89,11 +89,11 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         });
         vec![gyro.name.clone(), or_dash(gyro.channel.clone()), or_dash(weight), or_dash(drift)]
     });
-    sheet.table("Gyros", &["gyro", "channel", "increment weight", "drift expected"], gyros.collect());
-    let accels = document.accel.iter().flat_map(|accel| &accel.sensor).map(|accel| {
+    sheet.table("Gyros", ["gyro", "channel", "increment weight", "drift expected"], gyros);
+    let accels = accelerometers(document).iter().map(|accel| {
         vec![accel.name.clone(), or_dash(accel.channel.clone()), or_dash(accel.board_channel.clone())]
     });
-    sheet.table("Accelerometers", &["accelerometer", "channel", "board channel"], accels.collect());
+    sheet.table("Accelerometers", ["accelerometer", "channel", "board channel"], accels);
     let names = document.gyro.sensor.iter().map(|sensor| format!("gyro {}", sensor.name)).collect();
     let mut rows = axes(names, &document.gyro.orientation);
     if let Some(accel) = &document.accel {
@@ -101,9 +101,9 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         rows.extend(axes(names, &accel.orientation));
     }
     let head = ["input axis", "x", "y", "z", "off its case axis, ″", "turns, ″/°C"];
-    sheet.table("Input axes in case axes", &head, rows);
+    sheet.table("Input axes in case axes", head, rows);
     let residuals = document.origin.iter().flat_map(|origin| &origin.residual);
-    sheet.table("Residuals as stated", &parts::HEAD, residuals.map(parts::of_residual).collect());
+    sheet.table("Residuals as stated", parts::HEAD, residuals.map(parts::of_residual));
     parts::tables(sheet, document);
 }
 

@@ -1,17 +1,21 @@
 //! The terms of a document as curves.
 
 use isotherm_correction::units::{AngularRate, SpecificForce};
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
+use isotherm_pages::{Axis, Chart, Content, Ink, Panel, Samples, Series};
 
 use super::about::ARCSEC;
 use super::terms::Term;
 use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
+use crate::document::accelerometers;
 use crate::document::written::Written;
+use crate::numbers::once_each;
 use crate::report::Sheet;
 use crate::size::Size;
 
 /// Points of a curve.
 const POINTS: usize = 201;
+/// Height of a panel (CSS pixels).
+pub(crate) const HEIGHT: u32 = 150;
 
 /// Adds them all.
 pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range: [f64; 2]) {
@@ -27,20 +31,16 @@ pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range
                 terms.iter().filter(|term| term.kind == kind && term.argument == argument).collect();
             // A constant is in the tables; curves of one kind of term that are all constant show nothing.
             let varying = |name: &str| mine.iter().any(|term| term.name == name && term.range.is_some());
-            let mut names: Vec<&str> = Vec::new();
-            for term in mine.iter().filter(|term| varying(&term.name)) {
-                if !names.contains(&term.name.as_str()) {
-                    names.push(&term.name);
-                }
-            }
+            let names = once_each(mine.iter().map(|term| term.name.as_str()).filter(|name| varying(name)));
             let panels = names.into_iter().map(|name| {
                 let of_name: Vec<&&Term> = mine.iter().filter(|term| term.name == name).collect();
                 let curves = of_name.iter().zip(Ink::several()).map(|(term, ink)| {
                     let over = term.range.unwrap_or(range);
                     let points = places(over, POINTS).into_iter().map(|x| (x, term.at(x).0));
-                    line(term.sensor.clone(), ink, points)
+                    Series::line(&term.sensor, ink, points)
                 });
-                panel(&spoken(name), of_name.first().map_or("", |term| term.unit.as_str()), curves.collect())
+                let unit = of_name.first().map_or("", |term| term.unit.as_str());
+                Panel::of(spoken(name), unit, HEIGHT, curves.collect())
             });
             let heading = format!("{sensors} over {label}");
             add(sheet, &heading, "Each term over its fitted range.", argument, panels.collect());
@@ -56,27 +56,12 @@ pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range
 }
 
 fn add(sheet: &mut Sheet, heading: &str, caption: &str, unit: &str, panels: Vec<Panel>) {
-    if panels.is_empty() {
-        return;
-    }
     let label = match unit {
         "°C" => "temperature",
         "°C/s" => "rate of temperature",
         _ => "acceleration of temperature",
     };
-    let x = Axis::of(label, unit);
-    sheet
-        .charts
-        .push((heading.to_owned(), Chart { caption: caption.to_owned(), x, panels, marks: Vec::new() }));
-}
-
-pub(crate) fn panel(title: &str, unit: &str, curves: Vec<Series>) -> Panel {
-    let content = Content::Series(curves);
-    Panel { title: title.to_owned(), unit: unit.to_owned(), height: 150, logarithmic: false, content }
-}
-
-pub(crate) fn line(name: String, ink: Ink, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-    Series { name, ink, form: Form::Line, samples: Samples::points(points) }
+    sheet.chart(heading, Chart::of(caption, Axis::of(label, unit), panels));
 }
 
 fn sums(written: &Written, range: [f64; 2]) -> Vec<Panel> {
@@ -87,18 +72,17 @@ fn sums(written: &Written, range: [f64; 2]) -> Vec<Panel> {
                 let bias = steady(written, *x, ramp).gyro_bias.get(index).copied().unwrap_or(f64::NAN);
                 (*x, AngularRate::from_rad_per_s(bias).as_deg_per_h())
             };
-            line(ramp_words(ramp), ink, at.iter().map(bias))
+            Series::line(ramp_words(ramp), ink, at.iter().map(bias))
         });
-        panel(&format!("gyro {}", gyro.name), "°/h", curves.collect())
+        Panel::of(format!("gyro {}", gyro.name), "°/h", HEIGHT, curves.collect())
     });
-    let accels = written.document.accel.iter().flat_map(|accel| &accel.sensor).enumerate();
-    let accels = accels.map(|(index, accel)| {
+    let accels = accelerometers(&written.document).iter().enumerate().map(|(index, accel)| {
         let bias = |x: &f64| {
             let bias = steady(written, *x, 0.0).accel_bias.get(index).copied().unwrap_or(f64::NAN);
             (*x, SpecificForce::from_m_per_s2(bias).as_g() * 1e3)
         };
-        let curve = line("steady".to_owned(), Ink::First, at.iter().map(bias));
-        panel(&format!("accelerometer {}", accel.name), "mg", vec![curve])
+        let curve = Series::line("steady", Ink::First, at.iter().map(bias));
+        Panel::of(format!("accelerometer {}", accel.name), "mg", HEIGHT, vec![curve])
     });
     // What is constant stands in the table.
     let varies = |panel: &Panel| match &panel.content {
@@ -124,9 +108,9 @@ fn axes(written: &Written, range: [f64; 2]) -> Vec<Panel> {
                 let squares = row.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
                 (*x, libm::sqrt(squares) * ARCSEC)
             };
-            line(name.to_owned(), ink, at.iter().map(turned))
+            Series::line(name, ink, at.iter().map(turned))
         });
-        panel(what, "″", curves.collect())
+        Panel::of(what, "″", HEIGHT, curves.collect())
     };
     let mut panels = Vec::new();
     if document.gyro.orientation.thermal.is_some() {

@@ -47,7 +47,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
         ]
     };
     let head = ["part", "method", "of", "taken from it", "logs"];
-    sheet.table("Parts", &head, parts.iter().map(row).collect());
+    sheet.table("Parts", head, parts.iter().map(row));
     let mut rows = Vec::new();
     for part in &parts {
         for residual in part.about.get("residual").and_then(Value::as_array).into_iter().flatten() {
@@ -56,7 +56,7 @@ pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
             rows.push(row);
         }
     }
-    sheet.table("Residuals as stated by each part", &HEAD, rows);
+    sheet.table("Residuals as stated by each part", HEAD, rows);
 }
 
 fn named<'a>(names: impl Iterator<Item = &'a str>) -> String {

@@ -9,6 +9,7 @@ use isotherm_protocol::document::{Argument, Document, Unit};
 use toml::{Table, Value};
 
 use crate::error::Error;
+use crate::numbers::real;
 use crate::report::figures::{six, superscript};
 
 /// One curve of one sensor, in the document's units.
@@ -33,7 +34,6 @@ pub struct Term {
 
 impl Term {
     /// Its value, held outside the fitted range; and whether it is held.
-    #[must_use]
     pub fn at(&self, x: f64) -> (f64, bool) {
         let at = self.curve.at(x);
         (at.value, at.clamped && self.range.is_some())
@@ -45,13 +45,12 @@ impl Term {
 /// # Errors
 /// [`Error::Document`] where it cannot be written.
 pub fn tree(document: &Document) -> Result<Table, Error> {
-    let words = |error: &dyn std::fmt::Display| Error::Document(vec![error.to_string()]);
+    let words = |error: &dyn std::fmt::Display| Error::document(&error);
     let text = document.to_toml().map_err(|error| words(&error))?;
     text.parse::<Table>().map_err(|error| words(&error))
 }
 
 /// All curves of the sensors, in the order of the document.
-#[must_use]
 pub fn terms(tree: &Table) -> Vec<Term> {
     let mut terms = Vec::new();
     for kind in ["gyro", "accel"] {
@@ -160,8 +159,7 @@ fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Opti
 
 /// Any number of a tree.
 pub(crate) fn number(value: &Value) -> Option<f64> {
-    #[expect(clippy::cast_precision_loss, reason = "whole numbers that people write")]
-    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+    value.as_float().or_else(|| value.as_integer().map(real))
 }
 
 fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> String {

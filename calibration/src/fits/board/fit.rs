@@ -1,19 +1,22 @@
 //! From runs to a document with the ratio of the board, and its report.
 
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples as Points, Series};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 use isotherm_protocol::document::{AccelSensor, Document, Sample};
 use toml::{Table, Value};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
+use crate::document::accelerometers;
 use crate::document::written::{Written, tidy};
 use crate::error::Error;
 use crate::finding::AccelKind;
 use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
+use crate::numbers::{dot, hull};
 use crate::report::figures::{fixed, short};
 use crate::report::{Coefficient, Curve, Figure, FitReport, Judged, Rest, Sigmas, judge};
+use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
 /// Height of a panel (CSS pixels).
@@ -54,10 +57,10 @@ pub struct Made {
 /// # Errors
 /// [`Error::Refused`] and [`Error::Found`] with every reason; [`Error::Log`], [`Error::Document`].
 pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
-    let sensors = wanted.base.accel.as_ref().map_or(&[][..], |accel| &accel.sensor);
+    let sensors = accelerometers(wanted.base);
     if sensors.is_empty() {
         let words = "the document has no accelerometers: add [accel] with their channels and board_channel";
-        return Err(Error::Refused(vec![words.to_owned()]));
+        return Err(Error::refused(words));
     }
     let mut bare = wanted.base.clone();
     for sensor in bare.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
@@ -131,7 +134,7 @@ fn rows(
     for (number, (run, stand)) in samples.iter().zip(wanted.stands).enumerate() {
         let Site::Known { force_m_per_s2: Some(force), .. } = &stand.site else { continue };
         let turned = wanted.base.accel.as_ref().map(|accel| axes(&accel.orientation, index, run));
-        let along = |row: &[f64; 3]| force.iter().zip(row).map(|(f, c)| f * c).sum::<f64>();
+        let along = |row: &[f64; 3]| dot(*force, *row);
         let input: Vec<f64> = turned.iter().flatten().map(along).collect();
         let of = |channel: &String| {
             run.deg_c.get(channel).ok_or_else(|| AccelKind::NoReadings { channel: channel.clone() })
@@ -176,7 +179,7 @@ fn judged(
         let documents = (&before.loaded, &after.loaded);
         let about = (&after.document, &Rest::default());
         let Judged { curves: of_run, troubles } =
-            judge(run, sample, documents, about, wanted.window_s, &mut watch)?;
+            judge(run, sample, documents, about, Windows::valid(wanted.window_s), &mut watch)?;
         curves.extend(of_run.into_iter().filter(|curve| curve.of.starts_with("accelerometer")));
         let words = troubles.iter().map(|words| format!("{}: {words}", run.name));
         let new: Vec<String> = words.filter(|words| !troubled.contains(words)).collect();
@@ -225,12 +228,7 @@ fn tell(
                 ));
                 let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(POINTS);
                 let points = (0..=POINTS).map(|step| (at(step), ratio.error_ppm(at(step))));
-                curves.push(Series {
-                    name: format!("accelerometer {name}"),
-                    ink,
-                    form: Form::Line,
-                    samples: Points::points(points),
-                });
+                curves.push(Series::line(format!("accelerometer {name}"), ink, points));
             }
         }
     }
@@ -241,30 +239,19 @@ fn tell(
             .reference_deg_c
             .map_or("the middle of the board's range".to_owned(), |t| format!("{} °C", short(t)))
     ));
-    let panel = Panel {
-        title: "r − 1".to_owned(),
-        unit: "ppm".to_owned(),
-        height: HEIGHT,
-        logarithmic: false,
-        content: Content::Series(curves),
-    };
-    let chart = Chart {
-        caption: "Ratio of the board over its temperature.".to_owned(),
-        x: Axis::of("temperature of the board", "°C"),
-        panels: vec![panel],
-        marks: Vec::new(),
-    };
+    let panel = Panel::of("r − 1", "ppm", HEIGHT, curves);
+    let x = Axis::of("temperature of the board", "°C");
+    let chart = Chart::of("Ratio of the board over its temperature.", x, vec![panel]);
     report.charts.push(("Ratio of the board".to_owned(), chart));
 }
 
 impl Made {
     fn each(&self) -> impl Iterator<Item = (&AccelSensor, &Ratio)> {
-        let sensors = self.written.document.accel.iter().flat_map(|accel| &accel.sensor);
-        sensors.zip(&self.found).filter_map(|(sensor, found)| Some((sensor, found.as_ref().ok()?)))
+        let sensors = accelerometers(&self.written.document);
+        sensors.iter().zip(&self.found).filter_map(|(sensor, found)| Some((sensor, found.as_ref().ok()?)))
     }
 
     /// Standard errors of the ratios, by powers from 0.
-    #[must_use]
     pub fn sigmas(&self) -> Sigmas {
         let mut sigmas = Sigmas::default();
         for (sensor, ratio) in self.each() {
@@ -275,7 +262,6 @@ impl Made {
     }
 
     /// What goes into `origin.details`.
-    #[must_use]
     pub fn details(&self) -> Table {
         let of = |(sensor, ratio): (&AccelSensor, &Ratio)| {
             let mut table = Table::new();
@@ -288,9 +274,8 @@ impl Made {
     }
 
     /// Lowest and highest temperature of the boards (°C).
-    #[must_use]
     pub fn range_deg_c(&self) -> Option<[f64; 2]> {
         let ranges = self.each().map(|(_, ratio)| ratio.range_deg_c);
-        ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|range| range.map(tidy))
+        hull(ranges).map(|range| range.map(tidy))
     }
 }

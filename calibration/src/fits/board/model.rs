@@ -6,6 +6,7 @@ use isotherm_protocol::document::{Curve, Shape};
 use crate::document::written::tidy;
 use crate::finding::AccelKind;
 use crate::lsq::weighted::{once, solve};
+use crate::numbers::ends;
 use crate::size::Size;
 
 /// Least change of the board's temperature (°C).
@@ -53,12 +54,6 @@ pub struct Ratio {
     pub beside_own: bool,
     /// What is to be said beside.
     pub doubt: Option<AccelKind>,
-}
-
-fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values
-        .filter(|value| value.is_finite())
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 impl Rows {
@@ -186,7 +181,6 @@ impl Rows {
 
 impl Ratio {
     /// r − 1 (ppm) at a temperature of the board (°C).
-    #[must_use]
     pub fn error_ppm(&self, deg_c: f64) -> f64 {
         let away = deg_c - self.reference_deg_c;
         let x = self.x.iter().rev().fold(0.0, |sum, c| (sum + c) * away);
@@ -194,7 +188,6 @@ impl Ratio {
     }
 
     /// As the document has it: 1/(1 + x) − 1 = −x + x² − …, whose next term is some 1e-9.
-    #[must_use]
     pub fn curve(&self) -> Curve {
         let mut coefficients = vec![0.0; 2 * self.x.len() + 1];
         for (i, a) in self.x.iter().enumerate() {

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::columns::stated_in;
-use super::document::{Trend, markov, trend};
+use super::document::{Trend, trend};
 use super::fit::Analysis;
 use super::page::page;
 use super::report::Report;
@@ -53,8 +53,7 @@ impl Report {
             None => "–".to_owned(),
         };
         // A correlation time beyond the log's length is not in it.
-        let part = markov(sensor.markov.as_ref().map(|(fit, _)| fit))
-            .filter(|(_, time)| time.value <= self.length_h);
+        let part = sensor.slow_drift().filter(|(_, time)| time.value <= self.length_h);
         let slope = match trend(sensor) {
             Trend::Seen { slope, .. } => Some(slope),
             Trend::NotSeen { .. } => None,

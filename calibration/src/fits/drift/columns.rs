@@ -12,6 +12,7 @@ use super::allan::Term;
 use super::pieces::checks;
 use crate::axes::{AXES, sensor_name};
 use crate::error::Error;
+use crate::numbers::seconds;
 use crate::runs::cut::Cut;
 use crate::runs::series::{Series, Ticks};
 use crate::runs::{Run, Watch};
@@ -85,11 +86,10 @@ impl Columns {
         let scale = match (gyros.output, increment_weight_arcsec) {
             (None, _) => return Err(nothing("gyro ticks", "for the accelerometers use --accelerometers")),
             (Some(OutputKind::Counts), None) => {
-                return Err(Error::Refused(vec![
+                return Err(Error::refused(
                     "the gyro readings are counts: give the angle per count with --increment-weight ARCSEC, or a \
-                     calibration document with --calibration"
-                        .to_owned(),
-                ]));
+                     calibration document with --calibration",
+                ));
             }
             (Some(OutputKind::Counts), Some(weight)) => Scale::PerSecond(weight * DEG_PER_H_IN_ARCSEC_PER_S),
             (Some(OutputKind::Mean), _) => Scale::Mean(DEG_PER_H_IN_RAD_PER_S),
@@ -108,10 +108,9 @@ impl Columns {
                 return Err(nothing("accelerometer ticks", "for the gyros remove --accelerometers"));
             }
             Some(OutputKind::Counts) => {
-                return Err(Error::Refused(vec![
-                    "the accelerometer readings are counts: give a calibration document with --calibration"
-                        .to_owned(),
-                ]));
+                return Err(Error::refused(
+                    "the accelerometer readings are counts: give a calibration document with --calibration",
+                ));
             }
             Some(OutputKind::Mean) => Scale::Mean(1.0),
         };
@@ -187,9 +186,9 @@ impl Columns {
                 let columns = columns.get_or_insert_with(|| Self::empty(ticks.unit.clone(), kind));
                 if columns.unit != ticks.unit {
                     let (first, second) = (&columns.unit, &ticks.unit);
-                    return Err(Error::Refused(vec![format!(
+                    return Err(Error::refused(format!(
                         "the log is of several units ({first}, {second}): choose one with --unit"
-                    )]));
+                    )));
                 }
                 ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
                 progress();
@@ -246,15 +245,12 @@ impl Columns {
     }
 
     /// Time of a tick since the first (s).
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "lengths of logs")]
     pub fn since_s(&self, tick: usize) -> f64 {
         let time = self.end_ns.get(tick).zip(self.end_ns.first());
-        time.map_or(0.0, |(end, first)| end.saturating_sub(*first) as f64 * 1e-9)
+        time.map_or(0.0, |(end, first)| seconds(end.saturating_sub(*first)))
     }
 
     /// Symbol of the readings' unit of measure.
-    #[must_use]
     pub fn measure(&self) -> &'static str {
         self.kind.measure()
     }
@@ -262,7 +258,6 @@ impl Columns {
 
 impl Kind {
     /// Symbol of the unit of measure.
-    #[must_use]
     pub const fn measure(self) -> &'static str {
         match self {
             Self::Rate => "°/h",
@@ -271,7 +266,6 @@ impl Kind {
     }
 
     /// Symbol of the unit of measure of a slope (power 1) or a bend (power 2), over hours.
-    #[must_use]
     pub const fn over_hours(self, power: usize) -> &'static str {
         match (self, power) {
             (_, 0) => self.measure(),
@@ -283,7 +277,6 @@ impl Kind {
     }
 
     /// What a sensor of the kind is called.
-    #[must_use]
     pub const fn sensor(self) -> &'static str {
         match self {
             Self::Rate => "gyro",
@@ -302,5 +295,5 @@ enum Scale {
 }
 
 fn nothing(what: &str, advice: &str) -> Error {
-    Error::Refused(vec![format!("the log has no {what}: {advice}")])
+    Error::refused(format!("the log has no {what}: {advice}"))
 }

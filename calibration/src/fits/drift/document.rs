@@ -3,7 +3,7 @@
 use isotherm_protocol::document::{Document, Drift};
 
 use super::fit::Analysis;
-use super::markov::{Estimate, Fit};
+use super::markov::Fit;
 use crate::axes::AXES;
 use crate::error::Error;
 use crate::fits::drift::allan::{Coefficient, Term};
@@ -46,9 +46,7 @@ impl Parameters {
     pub fn of(analysis: &Analysis, initial_sigma: Option<f64>) -> Result<Self, String> {
         let mut notes = Vec::new();
         let length_h = analysis.slow.length_h();
-        let fit = analysis.markov.as_ref().map(|(fit, _)| fit);
-        let part = fit.and_then(|fit| Some((fit.sigma?, fit.correlation_time_h?)));
-        let (sigma, time_h) = match part {
+        let (sigma, time_h) = match analysis.slow_drift() {
             // Of what is slower than the log only the random walk is seen, of size σ²/τ: that stays.
             Some((sigma, time)) if time.value > length_h => {
                 notes.push(format!(
@@ -186,14 +184,12 @@ pub enum Trend {
 }
 
 /// What an analysis says of the trend, under the drift and noise that it found.
-#[must_use]
 pub fn trend(analysis: &Analysis) -> Trend {
     Trend::of(analysis.slope, analysis.second_order.as_ref())
 }
 
 impl Trend {
     /// Of a slope with its standard error, and a fit with a bend.
-    #[must_use]
     pub fn of(straight: Option<(f64, f64)>, second_order: Option<&Fit>) -> Self {
         let (slope, error) = straight.unwrap_or((0.0, f64::INFINITY));
         if slope.abs() <= TREND_SIGMAS * error {
@@ -205,12 +201,6 @@ impl Trend {
         let holds_h = seen.map_or(TREND_CORRELATION_TIME_H, |(bend, _)| (slope / (2.0 * bend)).abs());
         Self::Seen { slope, holds_h }
     }
-}
-
-/// σ and τ of a fit, where there are any.
-#[must_use]
-pub fn markov(fit: Option<&Fit>) -> Option<(Estimate, Estimate)> {
-    fit.and_then(|fit| fit.sigma.zip(fit.correlation_time_h))
 }
 
 /// Four significant digits: a log knows no more.

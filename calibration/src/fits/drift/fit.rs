@@ -1,6 +1,6 @@
 //! Everything that is said of one sensor, made for all of them on every processor core.
 
-use super::markov::{Beside, DailyLine, Fit};
+use super::markov::{Beside, DailyLine, Estimate, Fit};
 use super::pieces::{Grid, Sensor};
 use super::slow::{Autocorrelation, Slow};
 use super::trend::Extrapolation;
@@ -9,6 +9,7 @@ use crate::fits::drift::allan::deviation::lengths;
 use crate::fits::drift::allan::fit::interval;
 use crate::fits::drift::allan::{Estimator, NoiseFit, Phase, PowerLaw, Variance};
 use crate::fits::drift::spectrum::{Line, Spectrum};
+use crate::numbers::real;
 use crate::report::in_parallel;
 
 /// What is asked for.
@@ -76,8 +77,13 @@ pub struct Analysis {
 }
 
 impl Analysis {
+    /// σ and τ of the Markov part, where there is one.
+    pub fn slow_drift(&self) -> Option<(Estimate, Estimate)> {
+        let (fit, _) = self.markov.as_ref()?;
+        fit.sigma.zip(fit.correlation_time_h)
+    }
+
     /// The noise coefficients, where they describe the log: others are not stated.
-    #[must_use]
     pub fn stated_noise(&self) -> Option<&NoiseFit> {
         self.noise.as_ref().filter(|noise| noise.describes())
     }
@@ -96,7 +102,6 @@ struct Prepared {
 }
 
 /// Analyses every sensor of a log.
-#[must_use]
 pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
     let sensors = &grid.sensors;
     let prepared = in_parallel(sensors, |_| (), |sensor| prepare(grid, sensor));
@@ -137,10 +142,9 @@ pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
     finished.into_iter().flatten().collect()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 fn prepare(grid: &Grid, sensor: &Sensor) -> Prepared {
     let pieces: Vec<&[f64]> = sensor.pieces.iter().map(|piece| piece.readings.as_slice()).collect();
-    let count = pieces.iter().map(|piece| piece.len()).sum::<usize>() as f64;
+    let count = real(pieces.iter().map(|piece| piece.len()).sum::<usize>());
     // About the first reading, so that a large constant takes no digits.
     let first = pieces.first().and_then(|piece| piece.first()).copied().unwrap_or(0.0);
     let (mut sum, mut squares) = (0.0, 0.0);
@@ -205,16 +209,14 @@ fn finish(
 }
 
 /// Standard deviation of some values.
-#[expect(clippy::cast_precision_loss, reason = "at most some hundred")]
 fn deviation_of(values: &[f64]) -> f64 {
-    let count = values.len() as f64;
+    let count = real(values.len());
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
     (squares / (count - 1.0).max(1.0)).sqrt()
 }
 
 /// Deviations by averaging time, with their confidence by the kind of noise that dominates there.
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 fn table(
     tick_s: f64,
     variances: &[(Estimator, Variance)],
@@ -227,7 +229,7 @@ fn table(
     let wanted = lengths(factors.last().map_or(0, |last| last * 3), factor);
     factors.retain(|m| wanted.contains(m));
     let row = |m: usize| {
-        let tau_s = m as f64 * tick_s;
+        let tau_s = real(m) * tick_s;
         let law = noise.map_or(PowerLaw::White, |noise| noise.dominant(tau_s).law());
         let of = ESTIMATORS.map(|estimator| {
             let same =

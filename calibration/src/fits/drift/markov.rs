@@ -84,7 +84,6 @@ pub struct Estimate {
 
 impl Estimate {
     /// The number with its interval, as text.
-    #[must_use]
     pub fn words(&self) -> String {
         match self.interval {
             Some(interval) => within(self.value, interval),
@@ -106,7 +105,6 @@ pub struct DailyLine {
 
 impl DailyLine {
     /// Whether it stands out.
-    #[must_use]
     pub fn stands_out(&self) -> bool {
         self.chi_square > LINE_CHI_SQUARE
     }
@@ -119,7 +117,6 @@ fn share_of_mean(x: f64) -> f64 {
 
 impl Fit {
     /// The most likely noise and what stands beside it; `None` with fewer than [`FEWEST_BINS`] bins.
-    #[must_use]
     pub fn of(slow: &Slow, beside: &Beside) -> Option<Self> {
         if slow.mean.len() < FEWEST_BINS {
             return None;
@@ -137,7 +134,6 @@ impl Fit {
     }
 
     /// With the noise of another fit.
-    #[must_use]
     pub fn with_noise(slow: &Slow, beside: &Beside, noise: Noise) -> Option<Self> {
         let problem = Problem::new(slow, beside);
         let solution = problem.solve(&noise)?;
@@ -146,7 +142,6 @@ impl Fit {
 
     /// The same, with the lines of the day that stand out beside the trend, and what is to be said of each:
     /// lines of the hall must not count as the gyro's drift, so σ and τ are those without them.
-    #[must_use]
     pub fn with_daily_lines(slow: &Slow, degree: u32) -> Option<(Self, Vec<DailyLine>)> {
         let length_h = slow.length_h();
         let resolved = |period: &u32| {
@@ -192,7 +187,6 @@ impl Fit {
     }
 
     /// Trend at a time (h).
-    #[must_use]
     pub fn trend_at(&self, time_h: f64) -> f64 {
         let u = (time_h - self.span_h[0]) / self.span_h[1];
         let terms = self.beta.iter().take(self.beside.degree as usize + 1);
@@ -200,7 +194,6 @@ impl Fit {
     }
 
     /// Trend and lines at a time (h).
-    #[must_use]
     pub fn beside_at(&self, time_h: f64) -> f64 {
         let waves = self.beta.get(self.beside.degree as usize + 1..).unwrap_or(&[]).chunks_exact(2);
         let waves = self.beside.periods_h.iter().zip(waves).map(|(period, wave)| {
@@ -211,7 +204,6 @@ impl Fit {
     }
 
     /// Coefficient of a power of (t − middle) in readings per hourⁿ, and its standard error.
-    #[must_use]
     pub fn power(&self, power: u32) -> Option<(f64, f64)> {
         let at = power as usize;
         let scale = self.span_h[1].powi(power.cast_signed());
@@ -224,7 +216,6 @@ impl Fit {
     /// of the likelihood ratio against no trend at all, with the noise that is most likely then. A slope may be a slow drift, and the
     /// error by this noise is too small for that: a fit with a straight line has taken that part of the drift away before it looks
     /// for the noise.
-    #[must_use]
     pub fn slope(&self, slow: &Slow) -> Option<(f64, f64)> {
         let (value, error) = self.power(1)?;
         let level = Beside { degree: 0, periods_h: self.beside.periods_h.clone() };

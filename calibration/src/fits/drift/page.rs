@@ -1,11 +1,10 @@
 //! The HTML report of a log's noise and drift.
 
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series, Table};
 
-use super::fit::{Analysis, ESTIMATORS};
+use super::fit::Analysis;
 use super::markov::{Fit, Noise};
 use super::report::Report;
-use crate::fits::drift::allan::Estimator;
 
 /// Most points of a spectrum in the page.
 const SPECTRUM_POINTS: usize = 4096;
@@ -13,7 +12,6 @@ const SPECTRUM_POINTS: usize = 4096;
 const HEIGHT: u32 = 260;
 
 /// The report as a page.
-#[must_use]
 pub fn page(report: &Report) -> String {
     let mut page = Page::new(&format!("Noise and drift of unit {}", report.unit));
     let sentences: Vec<_> =
@@ -29,7 +27,7 @@ pub fn page(report: &Report) -> String {
     report.notes.iter().chain(&report.refused).for_each(|note| page.paragraph(note));
     page.heading("Allan deviation");
     page.chart(&allan(report));
-    tabulate(&mut page, report.noise_rows());
+    page.table(&report.noise_rows());
     page.paragraph(
         "Coefficients are fitted to the overlapping variances with their covariance; intervals hold 95 %. A \
          coefficient that the log does not show is given as an upper limit.",
@@ -37,7 +35,7 @@ pub fn page(report: &Report) -> String {
     report.noise_words().iter().for_each(|words| page.paragraph(words));
     page.heading("Drift");
     page.chart(&slow(report));
-    tabulate(&mut page, report.drift_rows());
+    page.table(&report.drift_rows());
     page.paragraph(
         "σ and correlation time are most likely together with trend, white noise and daily lines. The plain \
          autocorrelation falls too early, because mean and trend were fitted to the drift itself.",
@@ -45,8 +43,8 @@ pub fn page(report: &Report) -> String {
     if let Some(chart) = autocorrelation(report) {
         page.chart(&chart);
     }
-    let (head, rows) = report.extrapolation_rows();
-    if !rows.is_empty() {
+    let extrapolated = report.extrapolation_rows();
+    if !extrapolated.rows.is_empty() {
         page.heading("How far a trend can be trusted");
         page.paragraph(
             "A straight line is fitted to the beginning, the length of a calibration, and extrapolated over the \
@@ -54,12 +52,12 @@ pub fn page(report: &Report) -> String {
              process.",
         );
         page.chart(&extrapolation(report));
-        page.table(&Table { head, rows });
+        page.table(&extrapolated);
     }
     page.heading("Spectrum");
     page.chart(&spectrum(report));
     report.line_words().iter().for_each(|words| page.paragraph(words));
-    tabulate(&mut page, report.allan_rows());
+    page.table(&report.allan_rows());
     if !report.parameters.is_empty() {
         page.heading("Parameters of the estimator");
         let fields = [
@@ -70,7 +68,6 @@ pub fn page(report: &Report) -> String {
             "initial_sigma_deg_per_h",
             "angle_random_walk_deg_per_sqrt_h",
         ];
-        let head = std::iter::once(String::new()).chain(fields.map(str::to_owned)).collect();
         let rows = report.parameters.iter().map(|(name, parameters)| {
             let d = &parameters.drift;
             let values = [
@@ -83,7 +80,7 @@ pub fn page(report: &Report) -> String {
             ];
             std::iter::once(format!("gyro {name}")).chain(values.map(|value| value.to_string())).collect()
         });
-        page.table(&Table { head, rows: rows.collect() });
+        page.table(&Table::of(std::iter::once("").chain(fields), rows));
         for (name, parameters) in &report.parameters {
             for note in &parameters.notes {
                 page.paragraph(&format!("gyro {name}: {note}."));
@@ -93,16 +90,9 @@ pub fn page(report: &Report) -> String {
     page.to_html()
 }
 
-fn tabulate(page: &mut Page, (head, rows): (Vec<String>, Vec<Vec<String>>)) {
-    page.table(&Table { head, rows });
-}
-
-fn series(name: String, ink: Ink, form: Form, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-    Series { name, ink, form, samples: Samples::points(points) }
-}
-
-fn panel(title: String, unit: &str, logarithmic: bool, content: Vec<Series>) -> Panel {
-    Panel { title, unit: unit.to_owned(), height: HEIGHT, logarithmic, content: Content::Series(content) }
+/// Curves of a sensor.
+fn panel(report: &Report, sensor: &Analysis, unit: &str, curves: Vec<Series>) -> Panel {
+    Panel::of(format!("{} {}", report.kind.sensor(), sensor.name), unit, HEIGHT, curves)
 }
 
 fn allan(report: &Report) -> Chart {
@@ -113,53 +103,36 @@ fn allan(report: &Report) -> Chart {
                 .iter()
                 .filter_map(move |row| Some((row.tau_s, row.of.get(estimator)?.as_ref()?.value)))
         };
-        let inks = [Ink::Second, Ink::First, Ink::Third];
-        let mut curves: Vec<Series> = ESTIMATORS
-            .iter()
-            .enumerate()
-            .zip(inks)
-            .map(|((index, estimator), ink)| {
-                let (name, form) = match estimator {
-                    Estimator::Plain => ("plain", Form::Dots),
-                    Estimator::Overlapping => ("overlapping", Form::Line),
-                    Estimator::Modified => ("modified", Form::Line),
-                };
-                series(name.to_owned(), ink, form, curve(index))
-            })
-            .collect();
+        let mut curves = vec![
+            Series::dots("plain", Ink::Second, curve(0)),
+            Series::line("overlapping", Ink::First, curve(1)),
+            Series::line("modified", Ink::Third, curve(2)),
+        ];
         for end in [0, 1] {
             let limit = sensor
                 .allan
                 .iter()
                 .filter_map(move |row| Some((row.tau_s, row.of[1].as_ref()?.interval[end])));
-            curves.push(series("95 % of overlapping".to_owned(), Ink::Faint, Form::Line, limit));
+            curves.push(Series::line("95 % of overlapping", Ink::Faint, limit));
         }
         if let Some(noise) = sensor.stated_noise() {
             let fit = sensor
                 .allan
                 .iter()
                 .map(|row| (row.tau_s, noise.variances(row.tau_s).iter().sum::<f64>().sqrt()));
-            curves.push(series("fit".to_owned(), Ink::Fourth, Form::Line, fit));
+            curves.push(Series::line("fit", Ink::Fourth, fit));
         }
-        panel(format!("{} {}", report.kind.sensor(), sensor.name), report.kind.measure(), true, curves)
+        panel(report, sensor, report.kind.measure(), curves).logarithmic()
     };
-    Chart {
-        caption: "Allan deviation against averaging time, with the fit of N, B, K, R and Q.".to_owned(),
-        x: Axis { label: "averaging time".to_owned(), unit: "s".to_owned(), logarithmic: true },
-        panels: report.sensors.iter().map(of).collect(),
-        marks: Vec::new(),
-    }
+    let caption = "Allan deviation against averaging time, with the fit of N, B, K, R and Q.";
+    Chart::of(caption, Axis::of("averaging time", "s").logarithmic(), report.sensors.iter().map(of).collect())
 }
 
 fn slow(report: &Report) -> Chart {
     let of = |sensor: &Analysis| {
         let slow = &sensor.slow;
-        let mut curves = vec![series(
-            "slow part".to_owned(),
-            Ink::Raw,
-            Form::Line,
-            slow.time_h.iter().copied().zip(slow.mean.iter().copied()),
-        )];
+        let points = slow.time_h.iter().copied().zip(slow.mean.iter().copied());
+        let mut curves = vec![Series::line("slow part", Ink::Raw, points)];
         let fits = [
             (sensor.markov.as_ref().map(|(fit, _)| fit), "first order", Ink::Second),
             (sensor.second_order.as_ref(), "second order", Ink::Third),
@@ -167,39 +140,31 @@ fn slow(report: &Report) -> Chart {
         for (fit, name, ink) in fits {
             if let Some(fit) = fit {
                 let points = slow.time_h.iter().map(|time| (*time, fit.trend_at(*time)));
-                curves.push(series(name.to_owned(), ink, Form::Line, points));
+                curves.push(Series::line(name, ink, points));
             }
         }
-        panel(format!("{} {}", report.kind.sensor(), sensor.name), report.kind.measure(), false, curves)
+        panel(report, sensor, report.kind.measure(), curves)
     };
-    Chart {
-        caption: "Slow part of the readings, with its trend.".to_owned(),
-        x: Axis::of("time since the log's beginning", "h"),
-        panels: report.sensors.iter().map(of).collect(),
-        marks: Vec::new(),
-    }
+    let x = Axis::of("time since the log's beginning", "h");
+    Chart::of("Slow part of the readings, with its trend.", x, report.sensors.iter().map(of).collect())
 }
 
 fn autocorrelation(report: &Report) -> Option<Chart> {
     let of = |sensor: &Analysis| {
         let auto = sensor.autocorrelation.as_ref()?;
         let points = auto.lag_h.iter().copied().zip(auto.correlation.iter().copied());
-        let mut curves = vec![series("of the slow part".to_owned(), Ink::Raw, Form::Line, points)];
+        let mut curves = vec![Series::line("of the slow part", Ink::Raw, points)];
         if let Some((Fit { noise: Noise { correlation_time_h: time_h, markov: true, .. }, .. }, _)) =
             &sensor.markov
         {
             let model = auto.lag_h.iter().map(|lag| (*lag, libm::exp(-lag / time_h)));
-            curves.push(series("Markov part".to_owned(), Ink::Second, Form::Line, model));
+            curves.push(Series::line("Markov part", Ink::Second, model));
         }
-        Some(panel(format!("{} {}", report.kind.sensor(), sensor.name), "", false, curves))
+        Some(panel(report, sensor, "", curves))
     };
     let panels: Vec<Panel> = report.sensors.iter().filter_map(of).collect();
-    (!panels.is_empty()).then(|| Chart {
-        caption: "Autocorrelation of the slow part less its trend.".to_owned(),
-        x: Axis::of("lag", "h"),
-        panels,
-        marks: Vec::new(),
-    })
+    let caption = "Autocorrelation of the slow part less its trend.";
+    (!panels.is_empty()).then(|| Chart::of(caption, Axis::of("lag", "h"), panels))
 }
 
 fn extrapolation(report: &Report) -> Chart {
@@ -212,18 +177,15 @@ fn extrapolation(report: &Report) -> Chart {
         let fitted = slow.time_h.iter().filter(|time| **time - first <= found.fit_h);
         let rest = slow.time_h.iter().filter(|time| **time - first > found.fit_h);
         let curves = vec![
-            series("slow part".to_owned(), Ink::Raw, Form::Line, points),
-            series("fitted".to_owned(), Ink::Second, Form::Line, fitted.map(|time| (*time, line(*time)))),
-            series("extrapolated".to_owned(), Ink::Alert, Form::Line, rest.map(|time| (*time, line(*time)))),
+            Series::line("slow part", Ink::Raw, points),
+            Series::line("fitted", Ink::Second, fitted.map(|time| (*time, line(*time)))),
+            Series::line("extrapolated", Ink::Alert, rest.map(|time| (*time, line(*time)))),
         ];
-        Some(panel(format!("{} {}", report.kind.sensor(), sensor.name), report.kind.measure(), false, curves))
+        Some(panel(report, sensor, report.kind.measure(), curves))
     };
-    Chart {
-        caption: "A straight line through the beginning, extrapolated over the rest.".to_owned(),
-        x: Axis::of("time since the log's beginning", "h"),
-        panels: report.sensors.iter().filter_map(of).collect(),
-        marks: Vec::new(),
-    }
+    let caption = "A straight line through the beginning, extrapolated over the rest.";
+    let x = Axis::of("time since the log's beginning", "h");
+    Chart::of(caption, x, report.sensors.iter().filter_map(of).collect())
 }
 
 fn spectrum(report: &Report) -> Chart {
@@ -241,18 +203,16 @@ fn spectrum(report: &Report) -> Chart {
         };
         let points: Vec<(f64, f64)> =
             points.chunks(stride).map(largest).filter(|point| point.0 > 0.0).collect();
-        let mut curves = vec![series("density".to_owned(), Ink::Raw, Form::Line, points)];
+
         let lines =
             sensor.lines.iter().map(|line| (line.frequency_hz, spectrum_at(sensor, line.frequency_hz)));
-        curves.push(series("lines".to_owned(), Ink::Alert, Form::Dots, lines));
-        Some(panel(format!("{} {}", report.kind.sensor(), sensor.name), &unit, true, curves))
+        let curves =
+            vec![Series::line("density", Ink::Raw, points), Series::dots("lines", Ink::Alert, lines)];
+        Some(panel(report, sensor, &unit, curves).logarithmic())
     };
-    Chart {
-        caption: "Square root of the power spectral density.".to_owned(),
-        x: Axis { label: "frequency".to_owned(), unit: "Hz".to_owned(), logarithmic: true },
-        panels: report.sensors.iter().filter_map(of).collect(),
-        marks: Vec::new(),
-    }
+    let x = Axis::of("frequency", "Hz").logarithmic();
+    let panels = report.sensors.iter().filter_map(of).collect();
+    Chart::of("Square root of the power spectral density.", x, panels)
 }
 
 fn spectrum_at(sensor: &Analysis, frequency_hz: f64) -> f64 {

@@ -6,6 +6,7 @@ pub(crate) mod steps;
 
 use super::columns::Columns;
 use crate::error::Error;
+use crate::numbers::{real, seconds};
 use crate::report::figures::{counted, short};
 use crate::runs::faults::{self, Fault};
 
@@ -75,7 +76,6 @@ impl Grid {
     ///
     /// # Errors
     /// [`Error::Refused`]: too short, time that goes back, no sensor that can be analysed.
-    #[expect(clippy::cast_precision_loss, reason = "counts of ticks and log lengths are far below 2⁵³")]
     pub fn of(mut columns: Columns) -> Result<Self, Error> {
         let spacing = Spacing::of(&columns.end_ns)?;
         let told = checks::at_rest(&mut columns, &spacing)?;
@@ -89,11 +89,11 @@ impl Grid {
             notes.push(format!(
                 "{:.1} % of the ticks are more than 5 % longer or shorter than the median of {:.6} s; they are \
                  treated as equal.",
-                uneven as f64 * 100.0 / count as f64,
-                middle_ns as f64 * 1e-9
+                real(uneven) * 100.0 / real(count),
+                seconds(middle_ns)
             ));
         }
-        let bridge = missing as f64 <= LARGEST_BRIDGED_SHARE * count as f64;
+        let bridge = real(missing) <= LARGEST_BRIDGED_SHARE * real(count);
         notes.extend(words(&gaps, bridge, tick_s));
         let mut grid = Self { tick_s, ticks: places, sensors: Vec::new(), refused: Vec::new(), notes };
         for (name, column) in names.into_iter().zip(values) {
@@ -123,10 +123,8 @@ impl Grid {
     }
 
     /// Length of the log (h).
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
     pub fn length_h(&self) -> f64 {
-        self.ticks as f64 * self.tick_s / super::HOUR_S
+        real(self.ticks) * self.tick_s / super::HOUR_S
     }
 }
 
@@ -135,49 +133,43 @@ impl Spacing {
     ///
     /// # Errors
     /// [`Error::Refused`]: too few, or time that goes back.
-    #[expect(clippy::cast_precision_loss, reason = "log lengths are far below 2⁵³")]
     pub fn of(end_ns: &[i64]) -> Result<Self, Error> {
         let count = end_ns.len();
         if count < FEWEST_TICKS {
-            return refused(format!(
+            return Err(Error::refused(format!(
                 "the log has {count} ticks, at least {FEWEST_TICKS} are needed, and for drift hours of them: log for longer"
-            ));
+            )));
         }
         let intervals: Vec<i64> = end_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
         if let Some(at) = intervals.iter().position(|interval| *interval <= 0) {
-            return refused(format!(
+            return Err(Error::refused(format!(
                 "time does not increase at tick {} of {count} ({} ns, then {} ns): are these logs of two runs, or in \
                  the wrong order? Give one run",
                 at + 2,
                 end_ns.get(at).copied().unwrap_or_default(),
                 end_ns.get(at + 1).copied().unwrap_or_default(),
-            ));
+            )));
         }
         let mut sorted = intervals.clone();
         let (_, middle, _) = sorted.select_nth_unstable(intervals.len() / 2);
         let middle_ns = *middle;
         let gaps = gaps(&intervals, middle_ns);
         let uneven = intervals.iter().filter(|interval| {
-            let off = (**interval - middle_ns).abs() as f64;
-            off > UNEVEN * middle_ns as f64 && **interval < middle_ns + middle_ns / 2
+            let off = real((**interval - middle_ns).abs());
+            off > UNEVEN * real(middle_ns) && **interval < middle_ns + middle_ns / 2
         });
         let uneven = uneven.count();
         // The mean over everything that is no gap: the middle one may be off by the clock's resolution.
         let within: i64 = intervals.iter().filter(|interval| **interval < middle_ns + middle_ns / 2).sum();
         let whole = intervals.len() - gaps.len();
-        let tick_s = within as f64 * 1e-9 / whole.max(1) as f64;
+        let tick_s = seconds(within) / real(whole.max(1));
         Ok(Self { middle_ns, tick_s, uneven, gaps })
     }
 
     /// Ticks that are missing.
-    #[must_use]
     pub fn missing(&self) -> usize {
         self.gaps.iter().map(|gap| gap.missing).sum()
     }
-}
-
-fn refused<T>(why: String) -> Result<T, Error> {
-    Err(Error::Refused(vec![why]))
 }
 
 /// Where ticks are missing.
@@ -192,7 +184,6 @@ fn gaps(intervals: &[i64], middle_ns: i64) -> Vec<Gap> {
 }
 
 /// What is to be said of gaps.
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
     let bridged = |gap: &&Gap| bridge && gap.missing <= LONGEST_BRIDGE;
     let single = gaps.iter().filter(bridged).map(|gap| gap.missing).sum::<usize>();
@@ -209,7 +200,7 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
              over a gap.",
             counted(long.len(), "gap", "gaps"),
             counted(missing, "tick", "ticks"),
-            short(longest as f64 * tick_s),
+            short(real(longest) * tick_s),
             if long.len() == 1 { "cuts" } else { "cut" },
             long.len() + 1
         ));

@@ -2,12 +2,13 @@
 
 use std::fmt::Write;
 
+use isotherm_pages::Table;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::columns::Kind;
 use super::columns::stated_in;
-use super::document::{Parameters, Trend, markov, trend};
+use super::document::{Parameters, Trend, trend};
 use super::fit::{Analysis, Deviation};
 use crate::fits::drift::allan::{Coefficient, Term};
 use crate::report::figures::{short, table, within};
@@ -43,13 +44,11 @@ pub struct Report {
 
 impl Report {
     /// All sentences in one line: what was found, in words.
-    #[must_use]
     pub fn verdict(&self) -> String {
         format!("{}.", self.sentences().join("; "))
     }
 
     /// The first lines: what was found, one sentence for each sensor.
-    #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let (measure, sensor) = (self.kind.measure(), self.kind.sensor());
         let of = |analysis: &Analysis| {
@@ -63,7 +62,7 @@ impl Report {
                 }
                 None => "too short for noise coefficients".to_owned(),
             };
-            match markov(analysis.markov.as_ref().map(|(fit, _)| fit)) {
+            match analysis.slow_drift() {
                 Some((_, time)) if time.value > self.length_h => {
                     let _ = write!(
                         words,
@@ -94,8 +93,7 @@ impl Report {
     }
 
     /// Allan deviations, one row per averaging time.
-    #[must_use]
-    pub fn allan_rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
+    pub fn allan_rows(&self) -> Table {
         let mut head = vec!["τ, s".to_owned()];
         for sensor in &self.sensors {
             for estimator in ["plain", "overlapping", "modified"] {
@@ -113,14 +111,16 @@ impl Report {
             });
             std::iter::once(short(tau)).chain(cells).collect()
         };
-        (head, (0..longest).map(row).collect())
+        Table::of(head, (0..longest).map(row))
+    }
+
+    /// Heads of a table with a column for each sensor; the first one names the rows.
+    fn sensor_heads(&self) -> impl Iterator<Item = &str> {
+        std::iter::once("").chain(self.sensors.iter().map(|sensor| sensor.name.as_str()))
     }
 
     /// The noise coefficients, one row per coefficient.
-    #[must_use]
-    pub fn noise_rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let names = self.sensors.iter().map(|sensor| sensor.name.clone());
-        let head = std::iter::once(String::new()).chain(names).collect();
+    pub fn noise_rows(&self) -> Table {
         let row = |term: Term| {
             let (factor, unit) = stated_in(term, self.kind);
             let cells = self.sensors.iter().map(|sensor| {
@@ -137,15 +137,13 @@ impl Report {
             });
             std::iter::once(format!("{} {}, {unit}", term.symbol(), term.name())).chain(cells).collect()
         };
-        (head, Term::ALL.map(row).to_vec())
+        Table::of(self.sensor_heads(), Term::ALL.map(row))
     }
 
     /// The slow part, one row per figure.
-    #[must_use]
-    pub fn drift_rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
+    pub fn drift_rows(&self) -> Table {
         let measure = self.kind.measure();
-        let names = self.sensors.iter().map(|sensor| sensor.name.clone());
-        let head = std::iter::once(String::new()).chain(names).collect();
+
         let mut rows: Vec<Vec<String>> = Vec::new();
         let mut row = |name: String, of: &dyn Fn(&Analysis) -> String| {
             rows.push(std::iter::once(name).chain(self.sensors.iter().map(of)).collect());
@@ -158,12 +156,9 @@ impl Report {
         row(format!("standard deviation, {measure}"), &|a| short(a.deviation));
         row(format!("of the slow part, {measure}"), &|a| short(a.slow_deviation));
         row(format!("σ of the Markov part, {measure}"), &|a| {
-            markov(a.markov.as_ref().map(|(fit, _)| fit))
-                .map_or_else(|| "none seen".to_owned(), |(s, _)| s.words())
+            a.slow_drift().map_or_else(|| "none seen".to_owned(), |(s, _)| s.words())
         });
-        row("its correlation time, h".to_owned(), &|a| {
-            markov(a.markov.as_ref().map(|(fit, _)| fit)).map_or_else(none, |(_, t)| t.words())
-        });
+        row("its correlation time, h".to_owned(), &|a| a.slow_drift().map_or_else(none, |(_, t)| t.words()));
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
             a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map_or_else(none, short)
         });
@@ -171,12 +166,11 @@ impl Report {
         row(format!("second order, {}", self.kind.over_hours(2)), &|a| {
             power(a.second_order.as_ref().and_then(|fit| fit.power(2)))
         });
-        (head, rows)
+        Table::of(self.sensor_heads(), rows)
     }
 
     /// "Fit 21 h, extrapolate the rest", one row per sensor.
-    #[must_use]
-    pub fn extrapolation_rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
+    pub fn extrapolation_rows(&self) -> Table {
         let measure = self.kind.measure();
         let head = [
             "",
@@ -189,7 +183,7 @@ impl Report {
             "of the range",
             "without slope",
         ];
-        let head = head.map(str::to_owned).to_vec();
+
         let rows = self.sensors.iter().filter_map(|sensor| {
             let e = sensor.extrapolation.as_ref()?;
             Some(vec![
@@ -204,11 +198,10 @@ impl Report {
                 short(e.error_at_end_without_trend),
             ])
         });
-        (head, rows.collect())
+        Table::of(head, rows)
     }
 
     /// Sensors whose Allan deviation the five terms do not describe, or not within its statistics.
-    #[must_use]
     pub fn noise_words(&self) -> Vec<String> {
         let badly = self.sensors.iter().filter_map(|sensor| {
             let noise = sensor.noise.as_ref().filter(|noise| noise.model_error > 0.0)?;
@@ -232,7 +225,6 @@ impl Report {
     }
 
     /// What is to be said of lines, by sensor.
-    #[must_use]
     pub fn line_words(&self) -> Vec<String> {
         let (measure, kind) = (self.kind.measure(), self.kind.sensor());
         let mut words = Vec::new();
@@ -271,11 +263,10 @@ impl Report {
     }
 
     /// What a terminal shows: what was found, the noise coefficients, and what is to be looked at.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let mut found: Vec<String> =
             self.sentences().into_iter().map(|sentence| format!("{sentence}.")).collect();
-        let (head, mut rows) = self.noise_rows();
+        let Table { head, mut rows } = self.noise_rows();
         // What no sensor shows is on the page, with its limits.
         rows.retain(|row| row.iter().skip(1).any(|cell| !cell.starts_with("not ")));
         if !rows.is_empty() {
@@ -299,7 +290,6 @@ impl Report {
     }
 
     /// Everything as JSON.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let mut value = json!(self);
         let sensors: Vec<Value> = self.sensors.iter().map(|sensor| self.sensor_json(sensor)).collect();
@@ -344,11 +334,7 @@ impl Report {
             .iter()
             .map(|line| json!({ "period_h": line.period_h, "amplitude": line.amplitude, "stands_out": line.stands_out() }))
             .collect();
-        let others: Vec<Value> = sensor
-            .lines
-            .iter()
-            .map(|line| json!({ "frequency_hz": line.frequency_hz, "amplitude": line.amplitude, "ratio": line.ratio }))
-            .collect();
+
         let power =
             |value: Option<(f64, f64)>| value.map(|(value, error)| json!({ "value": value, "sigma": error }));
         let parameters = self.parameters.iter().find(|(name, _)| *name == sensor.name);
@@ -367,7 +353,7 @@ impl Report {
             "trend_per_h": power(sensor.slope),
             "second_order_per_h2": power(sensor.second_order.as_ref().and_then(|fit| fit.power(2))),
             "daily_lines": daily,
-            "lines": others,
+            "lines": sensor.lines,
             "extrapolation": sensor.extrapolation,
             "drift": parameters.map(|(_, parameters)| json!(parameters.drift)),
             "drift_notes": parameters.map(|(_, parameters)| json!(parameters.notes)),

@@ -1,6 +1,7 @@
 //! The slow part of a sensor's readings: means over bins, and their autocorrelation.
 
 use super::HOUR_S;
+use crate::numbers::real;
 
 /// Bins that a log is cut into.
 pub const BINS: usize = 512;
@@ -20,8 +21,6 @@ pub struct Slow {
 
 impl Slow {
     /// Of readings every `tick_s`, with the place of each on a grid of ticks.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
     pub fn of(pieces: &[(usize, &[f64])], places: usize, tick_s: f64) -> Self {
         let width = places.div_ceil(BINS).max(1);
         let bins = places.div_ceil(width);
@@ -39,16 +38,15 @@ impl Slow {
                 (place, rest) = (place + take, later);
             }
         }
-        let full = width as f64 * LEAST_SHARE;
-        let width_h = width as f64 * tick_s / HOUR_S;
-        let filled = sums.into_iter().enumerate().filter(|(_, (_, count))| *count as f64 >= full);
+        let full = real(width) * LEAST_SHARE;
+        let width_h = real(width) * tick_s / HOUR_S;
+        let filled = sums.into_iter().enumerate().filter(|(_, (_, count))| real(*count) >= full);
         let (time_h, mean) =
-            filled.map(|(bin, (sum, count))| ((bin as f64 + 0.5) * width_h, sum / count as f64)).unzip();
+            filled.map(|(bin, (sum, count))| ((real(bin) + 0.5) * width_h, sum / real(count))).unzip();
         Self { width_h, time_h, mean }
     }
 
     /// Length from the first bin's beginning to the last one's end (h).
-    #[must_use]
     pub fn length_h(&self) -> f64 {
         match (self.time_h.first(), self.time_h.last()) {
             (Some(first), Some(last)) => last - first + self.width_h,
@@ -70,9 +68,7 @@ pub struct Autocorrelation {
 
 impl Autocorrelation {
     /// Of residuals at the times of bins of a width, up to half of the log.
-    #[must_use]
     #[expect(
-        clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "times of at most 512 bins in widths of one"
@@ -97,13 +93,13 @@ impl Autocorrelation {
         let variance = products(0);
         let lags = 0..=length / 2;
         let correlation: Vec<f64> = lags.clone().map(|lag| products(lag) / variance).collect();
-        let lag_h: Vec<f64> = lags.map(|lag| lag as f64 * width_h).collect();
+        let lag_h: Vec<f64> = lags.map(|lag| real(lag) * width_h).collect();
         let limit = libm::exp(-1.0);
         let crossing =
             correlation.iter().zip(correlation.iter().skip(1)).position(|(a, b)| *a >= limit && *b < limit);
         let correlation_time_h = crossing.filter(|lag| *lag > 0).and_then(|lag| {
             let (before, after) = (correlation.get(lag)?, correlation.get(lag + 1)?);
-            Some((lag as f64 + (before - limit) / (before - after)) * width_h)
+            Some((real(lag) + (before - limit) / (before - after)) * width_h)
         });
         Self { lag_h, correlation, correlation_time_h }
     }

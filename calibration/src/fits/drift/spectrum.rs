@@ -3,6 +3,7 @@
 //! Segments under a Hann window, half overlapping, never across a gap. Two real segments go through one complex
 //! transform: |Z(f)|² + |Z(−f)|² is twice the sum of their powers.
 
+use crate::numbers::real;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -34,7 +35,7 @@ pub struct Spectrum {
 }
 
 /// A line.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Line {
     /// Frequency (Hz).
     pub frequency_hz: f64,
@@ -46,8 +47,6 @@ pub struct Line {
 
 impl Spectrum {
     /// Of pieces without gaps, one reading every `tick_s`; `None` where no piece has 64 readings.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "lengths are far below 2⁵³")]
     pub fn of(pieces: &[&[f64]], mean: f64, tick_s: f64) -> Option<Self> {
         let longest = pieces.iter().map(|piece| piece.len()).max()?;
         if longest < SHORTEST {
@@ -57,7 +56,7 @@ impl Spectrum {
         while length * 2 <= LONGEST && length * 2 * SEGMENTS <= longest {
             length *= 2;
         }
-        let angle = |k: usize| std::f64::consts::TAU * k as f64 / length as f64;
+        let angle = |k: usize| std::f64::consts::TAU * real(k) / real(length);
         let window: Vec<f64> = (0..length).map(|k| 0.5 - 0.5 * libm::cos(angle(k))).collect();
         let power: f64 = window.iter().map(|w| w * w).sum();
         let fft = FftPlanner::new().plan_fft_forward(length);
@@ -83,26 +82,23 @@ impl Spectrum {
                 *sum += 0.5 * (up + down);
             }
         }
-        let scale = 2.0 * tick_s / (power * segments.len() as f64);
+        let scale = 2.0 * tick_s / (power * real(segments.len()));
         let density = sums.into_iter().map(|sum| sum * scale).collect();
-        Some(Self { step_hz: 1.0 / (length as f64 * tick_s), density, segments: segments.len() })
+        Some(Self { step_hz: 1.0 / (real(length) * tick_s), density, segments: segments.len() })
     }
 
     /// Frequencies and densities.
-    #[expect(clippy::cast_precision_loss, reason = "lengths are far below 2⁵³")]
     pub fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.density.iter().enumerate().map(|(k, density)| ((k + 1) as f64 * self.step_hz, *density))
+        self.density.iter().enumerate().map(|(k, density)| (real(k + 1) * self.step_hz, *density))
     }
 
     /// Lines that stand out of their neighbourhoods, the strongest first.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "lengths are far below 2⁵³")]
     pub fn lines(&self) -> Vec<Line> {
         let count = self.density.len();
         // Half overlapping Hann segments: each new one brings about 0.95 of its own.
-        let degrees = (2.0 * (1.0 + 0.9 * (self.segments as f64 - 1.0))).max(2.0);
+        let degrees = (2.0 * (1.0 + 0.9 * (real(self.segments) - 1.0))).max(2.0);
         let Ok(chi) = ChiSquared::new(degrees) else { return Vec::new() };
-        let limit = chi.inverse_cdf(1.0 - FALSE_ALARM / count as f64) / chi.inverse_cdf(0.5);
+        let limit = chi.inverse_cdf(1.0 - FALSE_ALARM / real(count)) / chi.inverse_cdf(0.5);
         let mut lines = Vec::new();
         // Below the first lobe there is no neighbourhood, only the slope of slow drift.
         for k in LOBE + 1..count.saturating_sub(LOBE) {
@@ -115,7 +111,7 @@ impl Spectrum {
             if ratio > limit {
                 // The power of a sine of amplitude A is A²/2; the window spreads it over 1.5 bins.
                 let power = (here - here / ratio) * 1.5 * self.step_hz;
-                let frequency_hz = (k + 1) as f64 * self.step_hz;
+                let frequency_hz = real(k + 1) * self.step_hz;
                 lines.push(Line { frequency_hz, amplitude: (2.0 * power).sqrt(), ratio });
             }
         }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::slow::Slow;
 use crate::lsq::linear::{self, SINGULAR, Weak};
+use crate::numbers::{ends, mean};
 
 /// Hours that 002 fits: how long its system is calibrated.
 pub const FIT_H: f64 = 21.0;
@@ -41,7 +42,6 @@ pub struct Extrapolation {
 impl Extrapolation {
     /// Fits the first `fit_h` hours and extrapolates; a log too short for that gives its first 29 %. `None` where that is
     /// too little too.
-    #[must_use]
     pub fn of(slow: &Slow, fit_h: f64) -> Option<Self> {
         let length_h = slow.length_h();
         let fit_h = if length_h >= fit_h / 0.75 { fit_h } else { length_h * FIT_SHARE };
@@ -62,17 +62,12 @@ impl Extrapolation {
         let (start, slope) = (line.coefficients[0], line.coefficients[1]);
         let errors: Vec<f64> =
             later.iter().zip(rest).map(|(time, mean)| mean - start - slope * (time - first)).collect();
-        let mean = |values: &[f64]| {
-            #[expect(clippy::cast_precision_loss, reason = "at most some hundred")]
-            let count = values.len() as f64;
-            values.iter().sum::<f64>() / count
-        };
+
         let last = errors.len().div_ceil(END_SHARE);
-        let ends = |values: &[f64]| mean(values.get(values.len() - last..).unwrap_or(values));
+        let end = |values: &[f64]| mean(values.get(values.len() - last..).unwrap_or(values));
         let squares: Vec<f64> = errors.iter().map(|error| error * error).collect();
-        let (low, high) =
-            slow.mean.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(*m), h.max(*m)));
-        let error_at_end = ends(&errors);
+        let [low, high] = ends(slow.mean.iter().copied());
+        let error_at_end = end(&errors);
         Some(Self {
             fit_h,
             extrapolated_h: length_h - fit_h,
@@ -82,7 +77,7 @@ impl Extrapolation {
             error_rms: mean(&squares).sqrt(),
             error_largest: errors.iter().fold(0.0, |largest: f64, error| largest.max(error.abs())),
             share_of_range: error_at_end.abs() / (high - low),
-            error_at_end_without_trend: ends(rest) - mean(means),
+            error_at_end_without_trend: end(rest) - mean(means),
         })
     }
 }

@@ -94,13 +94,11 @@ pub fn residual(
 }
 
 /// The same parts without the state of the trend.
-#[must_use]
 pub fn without_trend(parts: &DriftParts) -> DriftParts {
     DriftParts { trend_sigma_rad_per_s2: 0.0, ..*parts }
 }
 
 /// The same parts without the Markov part.
-#[must_use]
 pub fn trend_alone(parts: &DriftParts) -> DriftParts {
     DriftParts { sigma_rad_per_s: 0.0, ..*parts }
 }

@@ -56,13 +56,11 @@ pub struct Errors {
 
 impl Errors {
     /// Distance from the true position (m).
-    #[must_use]
     pub fn radial_m(&self) -> f64 {
         libm::hypot(self.position_m[0], self.position_m[1])
     }
 
     /// Heading (′).
-    #[must_use]
     pub fn heading_arcmin(&self) -> f64 {
         self.heading_rad.to_degrees() * 60.0
     }
@@ -71,7 +69,6 @@ impl Errors {
 impl Ins {
     /// A system without errors at a latitude (°), to be stepped by `step_s`; its platform turns at `turn_ratio` times the
     /// Earth's rate.
-    #[must_use]
     pub fn new(latitude_deg: f64, turn_ratio: f64, step_s: f64) -> Self {
         let rate = EARTH_RATE.as_rad_per_s();
         let (s, c) = libm::sincos(latitude_deg.to_radians());
@@ -124,7 +121,6 @@ impl Ins {
     }
 
     /// The errors now.
-    #[must_use]
     pub fn errors(&self) -> Errors {
         let east = EARTH_RADIUS_M * self.cosine * self.state[6];
         Errors { heading_rad: self.state[2], position_m: [EARTH_RADIUS_M * self.state[5], east] }

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::fits::drift::columns::Columns;
 use crate::fits::drift::pieces::{Spacing, check, checks};
 use crate::fits::drift::{DEG_PER_H_IN_RAD_PER_S, HOUR_S};
+use crate::numbers::{real, seconds};
 
 /// Hours of calibration whose mean is held.
 const HELD_H: f64 = 1.0;
@@ -22,7 +23,6 @@ const SHORTEST_H: f64 = 1.0;
 /// # Errors
 /// [`Error::Refused`] where the log is too short, has gaps, or not three gyros, and as [`checks::at_rest`].
 #[expect(
-    clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "ticks of 10 s of a log are far below 2⁵³"
@@ -32,19 +32,18 @@ pub fn drift(
     voyage: &mut Voyage,
     otherwise: &str,
 ) -> Result<(Drift, Vec<String>), Error> {
-    let refused = |why: String| Error::Refused(vec![why]);
     if columns.values.len() != 3 {
-        return Err(refused(format!(
+        return Err(Error::refused(format!(
             "the log has {} gyros, the platform three: give corrected ticks, which are along three axes",
             columns.values.len()
         )));
     }
     let (Some(first), Some(last)) = (columns.end_ns.first().copied(), columns.end_ns.last().copied()) else {
-        return Err(refused("the log has no ticks".to_owned()));
+        return Err(Error::refused("the log has no ticks".to_owned()));
     };
-    let length_h = last.saturating_sub(first) as f64 * 1e-9 / HOUR_S;
+    let length_h = seconds(last.saturating_sub(first)) / HOUR_S;
     if length_h < voyage.calibration_h + SHORTEST_H {
-        return Err(refused(format!(
+        return Err(Error::refused(format!(
             "the log has {length_h:.2} h, but {:.1} h of calibration and at least {SHORTEST_H} h of voyage are \
              needed: shorten the calibration with --calibration-hours, or {otherwise}",
             voyage.calibration_h
@@ -70,7 +69,7 @@ pub fn drift(
     for (axis, (values, name)) in columns.values.iter().zip(&columns.names).enumerate() {
         let mut sums = vec![(0.0, 0_u32); count];
         for (end, value) in columns.end_ns.iter().zip(values).filter(|(_, value)| value.is_finite()) {
-            let place = end.saturating_sub(first) as f64 * 1e-9 / TICK_S;
+            let place = seconds(end.saturating_sub(first)) / TICK_S;
             if let Some(sum) = sums.get_mut(place as usize) {
                 sum.0 += value;
                 sum.1 += 1;
@@ -79,15 +78,15 @@ pub fn drift(
         let means: Vec<Option<f64>> =
             sums.iter().map(|(sum, count)| (*count > 0).then(|| sum / f64::from(*count))).collect();
         let filled = bridge(&means).map_err(|gap| {
-            let hours = gap.0 as f64 * TICK_S / HOUR_S;
-            let minutes = gap.1 as f64 * TICK_S / 60.0;
-            refused(format!(
+            let hours = real(gap.0) * TICK_S / HOUR_S;
+            let minutes = real(gap.1) * TICK_S / 60.0;
+            Error::refused(format!(
                 "gyro {name} has no good readings for {minutes:.0} min at {hours:.2} h, at most 10 min can be bridged: cut the log \
                  there"
             ))
         })?;
         let calibration = voyage.calibration_ticks().max(1);
-        let mean = filled.iter().take(calibration).sum::<f64>() / calibration as f64;
+        let mean = filled.iter().take(calibration).sum::<f64>() / real(calibration);
         let of_axis = truth.iter_mut().zip(filled);
         of_axis.for_each(|(tick, value)| tick[axis] = (value - mean) / DEG_PER_H_IN_RAD_PER_S);
     }
@@ -96,13 +95,12 @@ pub fn drift(
     let hour = truth.get(departure.saturating_sub(hour)..departure).unwrap_or(&[]);
     let mut held = [0.0; 3];
     for tick in hour {
-        held.iter_mut().zip(tick).for_each(|(sum, value)| *sum += value / hour.len() as f64);
+        held.iter_mut().zip(tick).for_each(|(sum, value)| *sum += value / real(hour.len()));
     }
     Ok((Drift { measured: truth.clone(), truth, held }, notes))
 }
 
 /// Straight lines over what is missing, or where and how long a gap is that is too long.
-#[expect(clippy::cast_precision_loss, reason = "a handful")]
 fn bridge(means: &[Option<f64>]) -> Result<Vec<f64>, (usize, usize)> {
     let mut filled: Vec<f64> = Vec::with_capacity(means.len());
     for (index, mean) in means.iter().enumerate() {
@@ -112,8 +110,8 @@ fn bridge(means: &[Option<f64>]) -> Result<Vec<f64>, (usize, usize)> {
             return Err((filled.len(), missing));
         }
         let before = filled.last().copied().unwrap_or(*mean);
-        let step = (mean - before) / (missing + 1) as f64;
-        filled.extend((1..=missing).map(|k| before + step * k as f64));
+        let step = (mean - before) / real(missing + 1);
+        filled.extend((1..=missing).map(|k| before + step * real(k)));
         filled.push(*mean);
     }
     let missing = means.len() - filled.len();

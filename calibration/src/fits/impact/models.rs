@@ -17,6 +17,7 @@ use crate::axes::AXES;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
 use crate::fits::drift::markov::{Beside, Fit, Noise};
 use crate::fits::drift::slow::Slow;
+use crate::numbers::real;
 use crate::report::figures::short;
 
 /// A difference of the criterion from which on a log is said to bear a model out: odds of 20 to 1.
@@ -49,10 +50,8 @@ pub struct Choice {
 
 impl Choice {
     /// Of slow means in °/h; `None` where they are too few.
-    #[must_use]
     pub fn of_slow(gyro: &'static str, slow: &Slow) -> Option<Self> {
-        #[expect(clippy::cast_precision_loss, reason = "at most some hundred")]
-        let per_parameter = libm::log(slow.mean.len() as f64);
+        let per_parameter = libm::log(real(slow.mean.len()));
         let beside = |degree| Beside { degree, periods_h: Vec::new() };
         let level = Fit::of(slow, &beside(0))?;
         let white = Noise { correlation_time_h: 0.0, white_ratio: 1.0, markov: false };
@@ -72,7 +71,6 @@ impl Choice {
     }
 
     /// Of each gyro over the calibration, which is all that is known at departure.
-    #[must_use]
     pub fn of(drift: &Drift, voyage: &Voyage) -> Vec<Self> {
         let ticks = voyage.calibration_ticks();
         let of = |(axis, gyro): (usize, &'static str)| {
@@ -84,7 +82,6 @@ impl Choice {
     }
 
     /// In words.
-    #[must_use]
     pub fn words(&self) -> String {
         let sure = if self.difference < BORNE_OUT { "rather than" } else { "and not" };
         let trend = format!("a trend of {} °/h²", short(self.trend_deg_per_h2));
@@ -102,7 +99,7 @@ impl Choice {
 }
 
 /// A row of 002's table 3: position errors of a voyage with the drift of a real gyro.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Voyaged {
     /// The gyro.
     pub gyro: &'static str,
@@ -141,7 +138,6 @@ pub const TABLE_3: [Voyaged; 18] = [
 ];
 
 /// Least, middle and largest factor by which the model with trend is better in table 3.
-#[must_use]
 pub fn table_3_gains() -> [f64; 3] {
     let mut gains = TABLE_3.map(|row| row.existing_km / row.trend_km);
     gains.sort_unstable_by(f64::total_cmp);
@@ -149,9 +145,8 @@ pub fn table_3_gains() -> [f64; 3] {
 }
 
 /// Table 3 for the page.
-#[must_use]
 pub fn table_3() -> Table {
-    let head = ["gyro", "start", "model 1, km", "with trend, km", "better by"].map(str::to_owned);
+    let head = ["gyro", "start", "model 1, km", "with trend, km", "better by"];
     let row = |row: &Voyaged| {
         vec![
             row.gyro.to_owned(),
@@ -161,7 +156,7 @@ pub fn table_3() -> Table {
             format!("{:.1}×", row.existing_km / row.trend_km),
         ]
     };
-    Table { head: head.to_vec(), rows: TABLE_3.iter().map(row).collect() }
+    Table::of(head, TABLE_3.iter().map(row))
 }
 
 #[cfg(test)]

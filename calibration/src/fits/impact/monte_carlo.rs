@@ -7,6 +7,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use super::estimate::{REFERENCE_TICKS, TICK_S};
 use super::scenario::{CARES, Course, Drift, Figures, Voyage};
 use crate::error::Error;
+use crate::numbers::real;
 use crate::report::in_parallel;
 
 /// Normal deviates from a seed, the same on every machine.
@@ -22,9 +23,8 @@ impl Deviates {
         Self { generator: Pcg64Mcg::seed_from_u64(scramble.next_u64()), spare: None }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "the shift leaves 53 bits, which a double holds exactly")]
     fn uniform(&mut self) -> f64 {
-        (self.generator.next_u64() >> 11) as f64 * (2.0 / 9_007_199_254_740_992.0) - 1.0
+        real(self.generator.next_u64() >> 11) * (2.0 / 9_007_199_254_740_992.0) - 1.0
     }
 
     /// By Marsaglia's polar method.
@@ -45,7 +45,6 @@ impl Deviates {
 }
 
 /// A drift of three gyros from a seed, with a straight trend (rad/s²) beside it.
-#[must_use]
 pub fn drift(voyage: &Voyage, parts: &[DriftParts; 3], trend: [f64; 3], seed: u64) -> Drift {
     let ticks = voyage.ticks();
     let mut truth = vec![[0.0; 3]; ticks];

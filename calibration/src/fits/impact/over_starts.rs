@@ -5,6 +5,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::fits::drift::columns::Columns;
+use crate::numbers::real;
 use crate::size::Size;
 
 /// Probability beyond either end of an interval.
@@ -20,16 +21,13 @@ pub struct Found {
 }
 
 /// Mean rate of each gyro over a log (°/h).
-#[must_use]
 pub fn means(columns: &Columns) -> [f64; 3] {
     [0, 1, 2].map(|axis| columns.values.get(axis).map_or(f64::NAN, |values| Size::of(values).mean))
 }
 
 /// Standard deviations of the gyros' means, a row for each start; `None` for fewer than two.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "some starts")]
 pub fn sigmas(starts: &[[f64; 3]]) -> Option<[Found; 3]> {
-    let degrees = starts.len().checked_sub(1).filter(|degrees| *degrees > 0)? as f64;
+    let degrees = real(starts.len().checked_sub(1).filter(|degrees| *degrees > 0)?);
     let law = ChiSquared::new(degrees).ok()?;
     Some([0, 1, 2].map(|axis| {
         let mean = starts.iter().map(|start| start[axis]).sum::<f64>() / (degrees + 1.0);

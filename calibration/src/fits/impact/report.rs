@@ -2,15 +2,17 @@
 
 use std::fmt::Write;
 
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Page, Panel, Samples, Series, Table};
-use serde::Serialize;
+use isotherm_correction::drift::DriftParts;
+use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series, Table};
+
 use serde_json::{Value, json};
 
 use super::ins::Errors;
 use super::models::{Choice, TABLE_3, table_3, table_3_gains};
 use super::monte_carlo::Spread;
-use super::scenario::{CARES, Care, Course, Figures, Voyage};
+use super::scenario::{CARES, Care, Course, Drift, Figures, Voyage};
 use crate::axes::AXES;
+use crate::error::Error;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
 use crate::report::figures::{short, table};
 
@@ -28,19 +30,6 @@ pub struct Row {
     pub course: Course,
     /// Over many seeds; `None` for one drift.
     pub spread: Option<Spread>,
-}
-
-/// A row as JSON.
-#[derive(Debug, Serialize)]
-struct RowJson<'a> {
-    case: &'a str,
-    care: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    figures: Option<Figures>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    median: Option<Figures>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    within_95_percent: Option<Figures>,
 }
 
 /// What is said.
@@ -61,6 +50,21 @@ pub struct Report {
 }
 
 impl Row {
+    /// One drift under each care.
+    ///
+    /// # Errors
+    /// As [`Voyage::sail`].
+    pub fn of_cares(
+        case: &str,
+        voyage: &Voyage,
+        drift: &Drift,
+        parts: &[DriftParts; 3],
+    ) -> Result<Vec<Self>, Error> {
+        let row =
+            |care| Ok(Self { case: case.to_owned(), course: voyage.sail(care, drift, parts)?, spread: None });
+        CARES.into_iter().map(row).collect()
+    }
+
     /// The figure that the row is judged by.
     fn judged(&self) -> Figures {
         self.spread.as_ref().map_or_else(|| self.course.figures(), |spread| spread.median)
@@ -69,7 +73,6 @@ impl Row {
 
 impl Report {
     /// The first line, in words: the case that carries the position farthest.
-    #[must_use]
     pub fn verdict(&self) -> String {
         let radial = |row: &&Row| row.judged().radial_largest_m;
         let Some(worst) = self.rows.iter().max_by(|a, b| radial(a).total_cmp(&radial(b))) else {
@@ -123,8 +126,7 @@ impl Report {
     }
 
     /// Head and rows of the table.
-    #[must_use]
-    pub fn rows(&self) -> (Vec<String>, Vec<Vec<String>>) {
+    pub fn rows(&self) -> Table {
         let mut head =
             vec!["drift", "care", "position at end, m", "largest, m", "heading at end, ′", "largest, ′"];
         if self.seeds > 0 {
@@ -143,13 +145,12 @@ impl Report {
             }
             cells
         });
-        (head.into_iter().map(str::to_owned).collect(), rows.collect())
+        Table::of(head, rows)
     }
 
     /// Everything as text.
-    #[must_use]
     pub fn to_text(&self) -> String {
-        let (head, rows) = self.rows();
+        let Table { head, rows } = self.rows();
         let mut text = format!("{}\n\n{}\n\n{}\n", self.verdict(), self.circumstances(), table(&head, &rows));
         for note in self.notes.iter().chain(&self.said_of_models()) {
             let _ = writeln!(text, "\n{note}");
@@ -171,32 +172,24 @@ impl Report {
     }
 
     /// Everything as JSON; the curves too.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let rows: Vec<Value> = self
             .rows
             .iter()
             .map(|row| {
-                let figures = row.spread.is_none().then(|| row.course.figures());
-                let median = row.spread.as_ref().map(|spread| spread.median);
-                let within_95_percent = row.spread.as_ref().map(|spread| spread.within_95_percent);
-                let care = row.course.care.words();
-                let mut value = json!(RowJson { case: &row.case, care, figures, median, within_95_percent });
-                let points = row.course.points.iter();
-                let points: Vec<Value> = points
-                    .map(|(hours, errors)| {
-                        json!([
-                            hours,
-                            errors.heading_arcmin(),
-                            errors.position_m[0],
-                            errors.position_m[1],
-                            errors.radial_m()
-                        ])
-                    })
-                    .collect();
-                if let Some(object) = value.as_object_mut() {
-                    object.insert("points".to_owned(), json!(points));
+                let mut value = json!({ "case": row.case, "care": row.course.care.words() });
+                match &row.spread {
+                    None => value["figures"] = json!(row.course.figures()),
+                    Some(spread) => {
+                        value["median"] = json!(spread.median);
+                        value["within_95_percent"] = json!(spread.within_95_percent);
+                    }
                 }
+                let points = row.course.points.iter().map(|(hours, errors)| {
+                    let [north, east] = errors.position_m;
+                    [*hours, errors.heading_arcmin(), north, east, errors.radial_m()]
+                });
+                value["points"] = json!(points.collect::<Vec<_>>());
                 value
             })
             .collect();
@@ -209,18 +202,16 @@ impl Report {
             "rows": rows,
             "notes": self.notes,
             "models": self.choices,
-            "table_3": TABLE_3.map(|row| json!({ "gyro": row.gyro, "start": row.start, "existing_km": row.existing_km, "trend_km": row.trend_km })),
+            "table_3": TABLE_3,
         })
     }
 
     /// The page.
-    #[must_use]
     pub fn to_html(&self) -> String {
         let mut page = Page::new("What a drift means for navigation");
         page.headline(&self.verdict());
         page.paragraph(&self.circumstances());
-        let (head, rows) = self.rows();
-        page.table(&Table { head, rows });
+        page.table(&self.rows());
         self.notes.iter().chain(&self.said_of_models()).for_each(|note| page.paragraph(note));
         let mut cases: Vec<&str> = self.rows.iter().map(|row| row.case.as_str()).collect();
         cases.dedup();
@@ -238,19 +229,10 @@ impl Report {
 
     fn chart(&self, case: &str) -> Chart {
         let curves = |of: &dyn Fn(&Course) -> Vec<(f64, f64)>| {
-            let rows = self.rows.iter().filter(|row| row.case == case).zip([
-                Ink::Third,
-                Ink::Second,
-                Ink::First,
-                Ink::Fourth,
-            ]);
-            let curve = |(row, ink): (&Row, Ink)| Series {
-                name: row.course.care.words().to_owned(),
-                ink,
-                form: Form::Line,
-                samples: Samples::points(of(&row.course)),
-            };
-            Content::Series(rows.map(curve).collect())
+            let inks = [Ink::Third, Ink::Second, Ink::First, Ink::Fourth];
+            let rows = self.rows.iter().filter(|row| row.case == case).zip(inks);
+            rows.map(|(row, ink)| Series::line(row.course.care.words(), ink, of(&row.course)))
+                .collect::<Vec<_>>()
         };
         let errors = |of: fn(&Errors) -> f64| {
             move |course: &Course| {
@@ -269,23 +251,13 @@ impl Report {
             left.map(|((hours, _), left)| (*hours, left[axis] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
         };
         let title = format!("remaining drift of gyro {}", AXES[axis]);
-        let panel = |title: &str, unit: &str, content| Panel {
-            title: title.to_owned(),
-            unit: unit.to_owned(),
-            height: HEIGHT,
-            logarithmic: false,
-            content,
-        };
-        Chart {
-            caption: format!("{case}: errors since departure."),
-            x: Axis::of("time since departure", "h"),
-            panels: vec![
-                panel("radial position error", "m", curves(&errors(Errors::radial_m))),
-                panel("heading error", "′", curves(&errors(Errors::heading_arcmin))),
-                panel(&title, "°/h", curves(&left)),
-            ],
-            marks: Vec::new(),
-        }
+        let panels = vec![
+            Panel::of("radial position error", "m", HEIGHT, curves(&errors(Errors::radial_m))),
+            Panel::of("heading error", "′", HEIGHT, curves(&errors(Errors::heading_arcmin))),
+            Panel::of(title, "°/h", HEIGHT, curves(&left)),
+        ];
+        let x = Axis::of("time since departure", "h");
+        Chart::of(format!("{case}: errors since departure."), x, panels)
     }
 
     fn circumstances(&self) -> String {

@@ -58,7 +58,6 @@ pub const CARES: [Care; 4] = [Care::Held, Care::WithoutTrend, Care::WithTrend, C
 
 impl Care {
     /// In words.
-    #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
             Self::Held => "held at its last value",
@@ -95,7 +94,6 @@ pub struct Figures {
 
 impl Course {
     /// Its figures.
-    #[must_use]
     pub fn figures(&self) -> Figures {
         let end = self.points.last().map(|point| point.1).unwrap_or_default();
         let largest =
@@ -111,13 +109,11 @@ impl Course {
 
 impl Voyage {
     /// Ticks of the calibration.
-    #[must_use]
     pub fn calibration_ticks(&self) -> usize {
         ticks(self.calibration_h)
     }
 
     /// Ticks of all.
-    #[must_use]
     pub fn ticks(&self) -> usize {
         self.calibration_ticks() + ticks(self.hours)
     }

@@ -14,6 +14,7 @@ use jackknife::Jackknife;
 
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::real;
 use crate::runs::{Run, Troubles, Watch};
 
 /// Largest power of temperature that is tried.
@@ -135,8 +136,7 @@ pub fn gather<W: Watch>(
     let mut gathered = Gathered::default();
     let (mut velocity, mut force_s) = ([0.0; 3], 0.0);
     for (number, run) in runs.iter().enumerate() {
-        #[expect(clippy::cast_precision_loss, reason = "few runs")]
-        let begin_s = number as f64 * BETWEEN_RUNS_S;
+        let begin_s = real(number) * BETWEEN_RUNS_S;
         let run = run.of_gyros(group);
         let mut jackknife =
             Jackknife::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));

@@ -7,9 +7,10 @@ use isotherm_protocol::document::{Document, GyroOutput};
 use super::cells::{Gathered, Second};
 use super::model::deg_per_h;
 use super::seen::Stay;
-use super::switches::{Switches, real};
+use super::switches::Switches;
 use super::{steps, units};
 use crate::axes::AXES;
+use crate::numbers::{dot, ends, real};
 use crate::report::figures::{counted, short, six};
 use crate::robust::{median, scatter_of_steps};
 use crate::runs::swapped::Shown;
@@ -39,7 +40,6 @@ pub(super) const TURNING_DEG_PER_H: f64 = 180.0;
 const PARTS: usize = 20;
 
 /// Reasons that show before anything is corrected.
-#[must_use]
 pub fn before(switches: &Switches, document: &Document, transition_ticks: Option<u8>) -> Vec<String> {
     let mut reasons = Vec::new();
     let Some(output) = switches.output else {
@@ -120,7 +120,7 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
     // What else is wrong with the readings makes them look lost too.
     let lost = switches.transition_ticks();
     if transition_ticks.is_none() && reasons.is_empty() {
-        let is_longer = real(lost.saturating_sub(1) as u64) * switches.tick_s > TRANSITION_S;
+        let is_longer = real(lost.saturating_sub(1)) * switches.tick_s > TRANSITION_S;
         if lost > TRANSITION_TICKS && is_longer {
             let ms = short(1e3 * TRANSITION_S);
             reasons.push(format!(
@@ -135,7 +135,6 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
 }
 
 /// Reasons that show in the gathered cells.
-#[must_use]
 pub fn behind(
     gathered: &Gathered,
     names: [&str; 3],
@@ -203,7 +202,6 @@ pub(super) fn lacks_temperatures(gathered: &Gathered) -> bool {
 }
 
 /// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
-#[must_use]
 pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>) -> Vec<String> {
     let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
     let looks = |of: [&'static str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
@@ -255,9 +253,8 @@ fn motion(seconds: &[Second], names: [&str; 3], count_arcsec: [f64; 3]) -> Vec<S
 /// The first second that differs from its neighbours by more than noise explains, by how much, and the limit.
 fn jump(seconds: &[Second], values: &[f64], floor: f64, by_mode: bool) -> Option<(Second, f64, f64)> {
     let limit = floor.max(SIGMAS * scatter_of_steps(values));
-    let span =
-        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)]);
-    if span[1] - span[0] <= limit {
+    let [low, high] = ends(values.iter().copied());
+    if high - low <= limit {
         return None;
     }
     (0..seconds.len()).find_map(|index| {
@@ -274,5 +271,5 @@ fn jump(seconds: &[Second], values: &[f64], floor: f64, by_mode: bool) -> Option
 
 /// Earth rate along input axes (°/h): rows of the orientation times the rate in case axes.
 pub(super) fn earth_along(row: [f64; 3], earth_rad_per_s: [f64; 3]) -> f64 {
-    deg_per_h(row.iter().zip(earth_rad_per_s).map(|(a, b)| a * b).sum())
+    deg_per_h(dot(row, earth_rad_per_s))
 }

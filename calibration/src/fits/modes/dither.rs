@@ -7,6 +7,7 @@ use super::cells::{Cell, MAX_POWER};
 use super::model::largest_order;
 use super::units::LARGEST_HZ;
 use crate::lsq::correlated::Data;
+use crate::numbers::ends;
 use crate::report::figures::short;
 
 /// Squared standard errors that the highest coefficient must be away from zero.
@@ -46,13 +47,10 @@ pub fn found(cells: &[Cell], place: usize, reference_deg_c: f64) -> Result<Rest,
 }
 
 /// Fits f0 of the gyro at a place among the three of the cells; `None` without half-period counts.
-#[must_use]
 fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
     let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.dither_hz[place].is_finite()).collect();
     let temperature: Vec<f64> = cells.iter().map(|cell| cell.powers[0][place] + reference_deg_c).collect();
-    let (low, high) = temperature
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+    let [low, high] = ends(temperature.iter().copied());
     let rates = rates(&cells, &temperature);
     let moving = rates.iter().filter(|rate| rate.abs() > SLOWEST_DEG_C_PER_S).count() * 4 > rates.len();
     let largest = largest_order(high - low, &mut Vec::new()).min(MAX_ORDER);

@@ -7,7 +7,8 @@ use toml::{Table, Value};
 
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
-use crate::document::written::tidy;
+use crate::document::written::{matrix, numbers, tidy};
+use crate::numbers::unit;
 use crate::report::Sigmas;
 use crate::report::words::gyros as gyros_in_words;
 
@@ -21,7 +22,6 @@ const FITTED: [Feature; 3] = [Feature::One, Feature::LasingMode, Feature::Meande
 const PER_DEG_C: f64 = 10.0;
 
 /// The base without the terms that are fitted, with the switch parameters.
-#[must_use]
 pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> Document {
     let mut document = base.clone();
     let reversal = document.mode_reversal.take().unwrap_or_default();
@@ -38,7 +38,6 @@ pub fn bare(base: &Document, transition_ticks: u8, servos: &[Option<Servo>]) -> 
 
 /// The bare document with the servos as they were fitted: what the residuals "before" are taken with, so that switching
 /// costs the same before and after.
-#[must_use]
 pub fn stripped(
     without_terms: &Document,
     servos: &[Result<ServoFit, String>],
@@ -67,7 +66,6 @@ fn servo(found: &ServoFit, old: &GyroSensor, reference: f64) -> Servo {
 }
 
 /// The document with everything that was found. `constants` are those of static biases that are not to be touched.
-#[must_use]
 pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Document {
     let mut document = stripped.clone();
     for ((sensor, found), constant) in document.gyro.sensor.iter_mut().zip(&made.gyros).zip(constants) {
@@ -109,7 +107,6 @@ pub(crate) fn widened([low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 /// `T_ref` of the base's own biases, else 20 °C.
-#[must_use]
 pub fn reference_of(base: &Document) -> f64 {
     let of = |sensor: &GyroSensor| {
         let curves = [Feature::One, Feature::LasingMode].map(|feature| sensor.terms.curve(feature));
@@ -122,7 +119,6 @@ pub fn reference_of(base: &Document) -> f64 {
 }
 
 /// The base's static bias of a gyro at `T_ref` (°/h); zero where it has none.
-#[must_use]
 pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f64 {
     let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.terms.curve(Feature::One));
     curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
@@ -157,19 +153,15 @@ pub(super) fn inverted(
 }
 
 /// What one count of a gyro stands for (″); zero where the output is no count.
-#[must_use]
 pub fn count_arcsec(document: &Document, sensor: usize) -> f64 {
     let sensor = document.gyro.sensor.get(sensor);
     sensor.and_then(|sensor| sensor.increment_weight_arcsec_per_count).map_or(0.0, f64::abs)
 }
 
 /// Input axis of a gyro at a temperature; at its reference where that is no number.
-#[must_use]
 pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
     let orientation = &document.gyro.orientation;
-    let mut row = orientation.rows.get(sensor).copied().unwrap_or_default();
-    let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
-    row = row.map(|x| x / norm);
+    let mut row = unit(orientation.rows.get(sensor).copied().unwrap_or_default());
     if let Some(thermal) = orientation.thermal.as_ref().filter(|_| deg_c.is_finite()) {
         let slopes = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
         let away = deg_c - thermal.reference_deg_c;
@@ -181,7 +173,6 @@ pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
 }
 
 /// Standard errors of the terms.
-#[must_use]
 pub fn sigmas(made: &Made) -> Sigmas {
     let mut sigmas = Sigmas::default();
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
@@ -200,7 +191,6 @@ pub fn sigmas(made: &Made) -> Sigmas {
 }
 
 /// What goes into `origin.details`: standard errors, covariance, noise, switch parameters.
-#[must_use]
 pub fn details(made: &Made) -> Table {
     let mut table = Table::new();
     table.insert("transition_ticks".into(), Value::Integer(made.transition_ticks.into()));
@@ -213,8 +203,6 @@ pub fn details(made: &Made) -> Table {
 }
 
 fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, String>) -> Table {
-    let numbers =
-        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match fit {
@@ -224,10 +212,9 @@ fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, S
         Ok(fit) => {
             let names = fit.coefficients.iter().map(|one| format!("{}.{}", one.term.key(), one.power).into());
             table.insert("coefficient".into(), Value::Array(names.collect()));
-            table
-                .insert("sigma_deg_per_h".into(), numbers(&mut fit.coefficients.iter().map(|one| one.sigma)));
-            let rows = fit.covariance.row_iter().map(|row| numbers(&mut row.iter().copied()));
-            table.insert("covariance".into(), Value::Array(rows.collect()));
+            let sigmas = fit.coefficients.iter().map(|one| &one.sigma);
+            table.insert("sigma_deg_per_h".into(), numbers(sigmas));
+            table.insert("covariance".into(), matrix(&fit.covariance));
             table.insert(
                 "angle_random_walk_deg_per_sqrt_h".into(),
                 tidy(fit.noise.white.sqrt() / 60.0).into(),
@@ -247,7 +234,7 @@ fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, S
             let mut own = Table::new();
             own.insert("time_constant_sigma_s".into(), tidy(servo.transient.sigma_s).into());
             own.insert("frequency_loss_rms_hz".into(), tidy(servo.transient.loss_hz).into());
-            let sigmas = &mut servo.rest.coefficients.iter().map(|pair| pair[1]);
+            let sigmas = servo.rest.coefficients.iter().map(|[_, sigma]| sigma);
             own.insert("rest_frequency_sigma_hz".into(), numbers(sigmas));
             if let Some(delay_s) = servo.rest.delay_s {
                 own.insert("temperature_delay_s".into(), tidy(delay_s).into());

@@ -7,7 +7,7 @@ use super::cells::{Cut, gather};
 use super::checks;
 use super::dither;
 use super::document::{self, base_constant, reference_of};
-use super::judge::judged;
+
 use super::model::{Asked, Given, GyroFit, fit};
 use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
@@ -16,8 +16,10 @@ use super::{temperatures, units};
 use crate::axes::{main_axis, output_name};
 use crate::document::written::Written;
 use crate::error::Error;
-use crate::report::{Curve as Residual, FitReport};
+use crate::numbers::real;
+use crate::report::{Curve as Residual, FitReport, Rest, judge};
 use crate::robust::median;
+use crate::runs::table::{Rows, Takes};
 use crate::runs::{Run, Watch};
 
 /// About so many cells are made of a fit's runs, none shorter than [`SHORTEST_S`].
@@ -25,6 +27,8 @@ const CELLS: f64 = 400.0;
 const SHORTEST_S: f64 = 15.0;
 /// Time behind a switch that is left out where the servo is not known (s).
 const SETTLE_S: f64 = 0.5;
+/// Share of a window that must count: whole reversal periods, but for rounding.
+const WHOLE: f64 = 1.0 - 1e-9;
 
 /// What the fit starts from.
 #[derive(Debug, Clone)]
@@ -102,8 +106,7 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let bare = document::bare(wanted.base, transition_ticks, &provisional);
     let known = bare.gyro.sensor.iter().all(|sensor| sensor.servo.is_some());
     let reference_deg_c = wanted.reference_deg_c.unwrap_or_else(|| reference_of(wanted.base));
-    #[expect(clippy::cast_precision_loss, reason = "ticks of a log are far below 2⁵³")]
-    let length_s = switches.ticks as f64 * switches.tick_s;
+    let length_s = real(switches.ticks) * switches.tick_s;
     // A switch loses its ticks, and the transient is over one tick later at the least.
     let settle_s = SETTLE_S.max((f64::from(transition_ticks) + 1.5) * switches.tick_s);
     let cut = Cut {
@@ -206,11 +209,11 @@ impl Made {
         self.residuals = self.judged(wanted, earth, watch)?;
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
-            return Err(Error::Refused(vec![format!(
+            return Err(Error::refused(format!(
                 "no window of {:.0} s, of whole reversal periods, is without lost ticks: the fit cannot be judged. \
                  Record without gaps; isotherm-replay info shows them",
                 self.window_s
-            )]));
+            )));
         }
         let worse: Vec<String> =
             verdicts.iter().filter(|one| !one.accepted).map(|one| one.of.clone()).collect();
@@ -236,19 +239,21 @@ impl Made {
         earth: Option<[f64; 3]>,
         watch: &mut impl FnMut() -> W,
     ) -> Result<Vec<Residual>, Error> {
-        let earth = earth.map(|rate| rate.map(super::model::deg_per_h));
+        let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
+        let about = (&self.written.document, &Rest { rate_deg_per_h, ..Rest::default() });
+        let documents = (&self.before.loaded, &self.written.loaded);
+        let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };
         let runs = wanted.runs.iter().map(|run| (run, Sample::In));
         let runs = runs.chain(wanted.judge.iter().map(|run| (run, Sample::Out)));
         let mut residuals = Vec::new();
         for (run, sample) in runs {
-            let pair = [&self.before, &self.written];
-            residuals.extend(judged(run, sample, pair, earth, self.window_s, &mut *watch)?);
+            let curves = judge(run, sample, documents, about, rows, watch())?.curves;
+            residuals.extend(curves.into_iter().filter(|curve| curve.of.starts_with("gyro")));
         }
         Ok(residuals)
     }
 
     /// The report.
-    #[must_use]
     pub fn report(&self) -> FitReport {
         super::report::report(self)
     }

@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 
 use super::cells::{Cell, MAX_POWER};
 use super::orders::{self, Folds, Model, Score};
-use crate::lsq::correlated::{Data, Noise, real};
+use crate::lsq::correlated::{Data, Noise};
+use crate::numbers::{ends, real};
 
 /// Temperature that the slow meander's powers are taken about (°C) (003).
 pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;
@@ -33,7 +34,6 @@ pub enum Term {
 
 impl Term {
     /// Its key in the document.
-    #[must_use]
     pub fn key(self) -> &'static str {
         match self {
             Self::Static => "static_bias",
@@ -94,7 +94,6 @@ pub struct GyroFit {
 
 impl GyroFit {
     /// Coefficients of a term, lowest power first; empty where it is not in the model.
-    #[must_use]
     pub fn of(&self, term: Term) -> Vec<f64> {
         self.coefficients.iter().filter(|fitted| fitted.term == term).map(|fitted| fitted.value).collect()
     }
@@ -124,9 +123,7 @@ pub struct Given<'a> {
 pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
     let Given { cells, place, reference_deg_c, .. } = given;
     let temperature: Vec<f64> = cells.iter().map(|cell| cell.powers[0][place] + reference_deg_c).collect();
-    let (low, high) = temperature
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+    let [low, high] = ends(temperature.iter().copied());
     let mut remarks = Vec::new();
     let largest = largest_order(high - low, &mut remarks);
     let (mut data, mut kept) = (data(given, &temperature), temperature);

@@ -5,6 +5,7 @@ use super::model::{Asked, MEANDER_ORDER, Term};
 use crate::lsq::blocks::Blocks;
 use crate::lsq::correlated::{Data, Noise};
 use crate::lsq::linear::{SINGULAR, Weak};
+use crate::numbers::ends;
 
 /// Share of the range that cooling and heating must each cover to be folds.
 const COVERED: f64 = 0.7;
@@ -28,7 +29,6 @@ pub struct Model {
 
 impl Model {
     /// Its columns among all.
-    #[must_use]
     pub fn columns(&self) -> Vec<usize> {
         let magnetic = MAX_POWER + 1;
         let meander = 2 * magnetic;
@@ -41,7 +41,6 @@ impl Model {
     }
 
     /// Term and power of each column.
-    #[must_use]
     pub fn terms(&self) -> Vec<(Term, usize)> {
         let mut terms: Vec<(Term, usize)> =
             (0..=self.static_order).map(|power| (Term::Static, power)).collect();
@@ -75,7 +74,6 @@ pub struct Folds {
 
 impl Folds {
     /// Cooling and heating, where both cover the range; else pairs of stretches, every fifth in one fold.
-    #[must_use]
     pub fn of(temperature: &[f64], time_s: &[f64], stretch: &[usize]) -> Self {
         let pairs =
             || Self { of: stretch.iter().map(|number| number / 2 % FOLDS).collect(), directions: false };
@@ -95,8 +93,7 @@ impl Folds {
         let span = |wanted: Option<usize>| {
             let mine =
                 temperature.iter().zip(&of).filter(|(_, of)| wanted.is_none_or(|wanted| wanted == **of));
-            let (low, high) = mine
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (t, _)| (low.min(*t), high.max(*t)));
+            let [low, high] = ends(mine.map(|(t, _)| *t));
             (high - low).max(0.0)
         };
         let whole = span(None);

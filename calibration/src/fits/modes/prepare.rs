@@ -64,9 +64,9 @@ pub(super) fn earth_rate(wanted: &Wanted<'_>, gathered: &Gathered) -> Result<Opt
             || "the document or the log has no accelerometers".to_owned(),
             |[x, y, z]| format!("the mean force is ({x:.3}, {y:.3}, {z:.3}) m/s²"),
         );
-        Error::Refused(vec![format!(
+        Error::refused(format!(
             "the unit cannot be levelled: {force}; it must be within 2 % of one g, x not vertical. Give --pitch and --roll"
-        )])
+        ))
     })?;
     Ok(Some(rate))
 }

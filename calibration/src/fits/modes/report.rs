@@ -5,6 +5,7 @@ use isotherm_pages::Table;
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, Term};
 use crate::axes::{main_axis, output_name};
+use crate::numbers::real;
 use crate::report::figures::{counted, fixed, per_deg_c, short};
 use crate::report::words::together;
 use crate::report::{Coefficient, Curve, Figure, FitReport};
@@ -50,7 +51,7 @@ pub(super) fn report(made: &Made) -> FitReport {
     report.warnings.extend(together(&told));
     if !validation.is_empty() {
         let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
-        report.validation = Some(Table { head: head.map(str::to_owned).to_vec(), rows: validation });
+        report.validation = Some(Table::of(head, validation));
     }
     report
 }
@@ -105,8 +106,7 @@ fn gyro(
     let chosen = fit.scores.iter().find(|score| score.model == fit.model);
     let first = fit.scores.iter().take(MODELS).filter(|score| score.model != fit.model);
     for score in chosen.into_iter().chain(first) {
-        #[expect(clippy::cast_precision_loss, reason = "means of a log are far below 2⁵³")]
-        let each = score.chi_square / score.count.max(1) as f64;
+        let each = score.chi_square / real(score.count.max(1));
         validation.push(vec![
             name.to_owned(),
             score.model.static_order.to_string(),
@@ -152,7 +152,6 @@ fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut FitReport) {
 
 impl GyroFit {
     /// Value and standard error of a coefficient.
-    #[must_use]
     pub fn coefficient(&self, term: Term, power: usize) -> Option<[f64; 2]> {
         let found = self.coefficients.iter().find(|one| one.term == term && one.power == power);
         found.map(|one| [one.value, one.sigma])

@@ -1,8 +1,7 @@
 //! What the raw ticks of one gyro are like as a whole: whether it lives all the time, and how fast it shows to turn.
 
+use crate::numbers::real;
 use isotherm_correction::sample::GyroTick;
-
-use super::switches::real;
 
 /// Times the usual distance of changes after which a reading that stays is no slow one, and reversal periods that it must last.
 const USUAL: f64 = 50.0;
@@ -85,7 +84,6 @@ impl Seen {
     }
 
     /// Where the reading stays the same for far longer than it does otherwise, and over reversals of the given period (s).
-    #[must_use]
     pub fn frozen(&self, period_s: f64) -> Option<Stay> {
         let usual = (self.ticks - self.longest.ticks) / self.changes;
         let lasts_s = self.longest.to_s - self.longest.from_s;
@@ -95,17 +93,15 @@ impl Seen {
 
     /// Usual reading over a second: counts, or the mean rate (rad/s); `None` where there is none away from the switches. Of counts the
     /// middle fifth is averaged, for they are whole numbers.
-    #[must_use]
     pub fn per_second(&self) -> Option<f64> {
         let mut sorted = self.per_second.clone();
         sorted.sort_by(f64::total_cmp);
         let beside = 2 * sorted.len() / 5;
         let middle = sorted.get(beside..sorted.len() - beside).filter(|middle| !middle.is_empty())?;
-        Some(middle.iter().sum::<f64>() / real(middle.len() as u64))
+        Some(middle.iter().sum::<f64>() / real(middle.len()))
     }
 
     /// Whether there are half-period counts, and all are zero.
-    #[must_use]
     pub fn has_dead_halves(&self) -> bool {
         matches!(self.halves, (1.., false))
     }

@@ -12,8 +12,9 @@
 use nalgebra::DVector;
 
 use super::switches::Behind;
-use crate::lsq::correlated::real;
+
 use crate::lsq::search::golden;
+use crate::numbers::real;
 
 /// Fewest ticks behind a switch, and fewest switches.
 const LEAST: [usize; 2] = [24, 8];

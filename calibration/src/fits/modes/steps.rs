@@ -5,6 +5,7 @@
 use super::cells::Second;
 use crate::axes::AXES;
 use crate::fits::drift::pieces::steps::step;
+use crate::numbers::real;
 use crate::report::figures::fixed;
 
 /// Most parts of a run that are compared.
@@ -94,9 +95,8 @@ fn of_stretch(seconds: &[Second]) -> Pair {
     mean(&seconds.iter().map(pair).collect::<Vec<Pair>>())
 }
 
-#[expect(clippy::cast_precision_loss, reason = "seconds of a run")]
 fn mean(of: &[Pair]) -> Pair {
-    let count = of.len().max(1) as f64;
+    let count = real(of.len().max(1));
     let mean = |axis: usize, part: fn(&Pair) -> [f64; 3]| {
         of.iter().map(|pair| part(pair)[axis]).sum::<f64>() / count
     };

@@ -7,6 +7,7 @@ use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 
 use super::seen::Seen;
 use crate::error::Error;
+use crate::numbers::{real, seconds};
 use crate::robust::{median, scatter};
 use crate::runs::{Run, Watch};
 
@@ -75,7 +76,7 @@ impl Switches {
     /// As [`Run::gyro_ticks`].
     pub fn of<W: Watch>(runs: &[Run], mut watch: impl FnMut() -> W) -> Result<Self, Error> {
         let mut found = Self { whole: true, ..Self::default() };
-        let mut seconds = 0.0;
+        let mut length_s = 0.0;
         let mut first: Option<Vec<f64>> = None;
         let mut changed: Vec<bool> = Vec::new();
         for run in runs {
@@ -91,14 +92,14 @@ impl Switches {
                     .all(|reading| reading.fract() == 0.0);
                 found.sensors = found.sensors.max(tick.readings.len());
                 found.ticks += 1;
-                seconds += tick.duration.as_s();
+                length_s += tick.duration.as_s();
                 let first = first.get_or_insert_with(|| tick.readings.to_vec());
                 changed.resize(first.len(), false);
                 for (changed, (first, now)) in changed.iter_mut().zip(first.iter().zip(&tick.readings)) {
                     *changed |= now.is_finite() && first.total_cmp(now).is_ne();
                 }
                 let now = tick.end_time.as_ns();
-                let since_s = seconds_of(now.saturating_sub(*begin.get_or_insert(now)));
+                let since_s = seconds(now.saturating_sub(*begin.get_or_insert(now)));
                 found.seen.resize(found.sensors, Seen::default());
                 eye.take(tick, &mut found);
                 let kind = (eye.is_calm(), output == OutputKind::Counts);
@@ -108,38 +109,34 @@ impl Switches {
             })?;
             eye.end(&mut found);
         }
-        found.tick_s = if found.ticks == 0 { 0.0 } else { seconds / real(found.ticks) };
+        found.tick_s = if found.ticks == 0 { 0.0 } else { length_s / real(found.ticks) };
         found.dead =
             (0..changed.len()).filter(|&sensor| !changed.get(sensor).is_some_and(|is| *is)).collect();
         Ok(found)
     }
 
     /// Ticks that a switch loses: the last one behind the command that more than a chance few of the switches lose.
-    #[must_use]
     pub fn transition_ticks(&self) -> usize {
         let count = |tick: usize| {
             let lost = self.behind.iter().filter(|behind| behind.lost.get(tick).is_some_and(|lost| *lost));
-            real(lost.count() as u64)
+            real(lost.count())
         };
-        let least = (LOST_SHARE * real(self.behind.len() as u64)).max(1.0);
+        let least = (LOST_SHARE * real(self.behind.len())).max(1.0);
         (0..SEARCH).rev().find(|&tick| count(tick) >= least).map_or(0, |tick| tick + 1)
     }
 
     /// Usual time between switches (s).
-    #[must_use]
     pub fn period_s(&self) -> f64 {
         median(&self.between_s)
     }
 
     /// Share by which one mode has more ticks than the other, 0…1.
-    #[must_use]
     pub fn unbalance(&self) -> f64 {
         let [plus, minus, _] = self.of_mode.map(real);
         if plus + minus > 0.0 { (plus - minus).abs() / (plus + minus) } else { 1.0 }
     }
 
     /// Whether the producer says which phase the slow meander has.
-    #[must_use]
     pub fn has_meander(&self) -> bool {
         self.of_meander.iter().all(|ticks| *ticks > 0)
     }
@@ -178,7 +175,7 @@ impl Eye {
             let now = tick.end_time.as_ns();
             self.changes_ns.push(now);
             if let Some(before) = self.switched_ns {
-                found.between_s.push(seconds_of(now - before));
+                found.between_s.push(seconds(now - before));
             }
             self.switched_ns = Some(now);
             self.behind = Some(Vec::new());
@@ -210,7 +207,7 @@ impl Eye {
             let near = self.commands_ns.get(next.saturating_sub(1)..)?.iter().take(2);
             near.map(|command| change - command).min_by_key(|late| late.abs())
         };
-        found.late_s.extend(self.changes_ns.iter().filter_map(nearest).map(seconds_of));
+        found.late_s.extend(self.changes_ns.iter().filter_map(nearest).map(seconds));
     }
 
     /// Ends what is behind a switch.
@@ -224,7 +221,7 @@ impl Eye {
         let seconds: f64 = behind.iter().map(|tick| tick.duration.as_s()).sum();
         found.behind.push(Behind {
             lost: behind.iter().take(SEARCH).map(lost).collect(),
-            tick_s: seconds / real(behind.len().max(1) as u64),
+            tick_s: seconds / real(behind.len().max(1)),
             dither_hz: (0..sensors)
                 .filter_map(|sensor| behind.iter().map(|tick| dither_hz(tick, sensor)).collect())
                 .collect(),
@@ -293,15 +290,5 @@ pub(super) fn dither_hz(tick: &GyroTick, sensor: usize) -> Option<f64> {
 /// How many ticks behind a switch are kept.
 fn wanted(tick_s: f64) -> usize {
     let [least, most] = AFTER;
-    (least..most).find(|count| real(*count as u64) * tick_s >= AFTER_S).unwrap_or(most)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-fn seconds_of(ns: i64) -> f64 {
-    ns as f64 * 1e-9
-}
-
-#[expect(clippy::cast_precision_loss, reason = "ticks of a log are far below 2⁵³")]
-pub(super) fn real(count: u64) -> f64 {
-    count as f64
+    (least..most).find(|count| real(*count) * tick_s >= AFTER_S).unwrap_or(most)
 }

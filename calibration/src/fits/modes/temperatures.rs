@@ -6,6 +6,7 @@ use isotherm_protocol::document::Document;
 
 use crate::error::Error;
 use crate::fits::drift::pieces::checks::frozen;
+use crate::numbers::{ends, once_each};
 use crate::report::figures::short;
 use crate::report::words::grouped;
 use crate::robust::median;
@@ -33,13 +34,10 @@ pub(super) fn read<W: Watch>(
     let is_wrong = all.iter().any(|(wrong, _)| *wrong);
     let told: Vec<&str> =
         all.iter().filter(|(wrong, _)| *wrong == is_wrong).map(|(_, words)| words.as_str()).collect();
-    let mut limits: Vec<String> = Vec::new();
-    for [low, high] in channels.map(|channel| channel.range_deg_c) {
-        let words = format!("{low}…{high} °C");
-        if !limits.contains(&words) {
-            limits.push(words);
-        }
-    }
+    let limits = once_each(channels.map(|channel| {
+        let [low, high] = channel.range_deg_c;
+        format!("{low}…{high} °C")
+    }));
     Ok(format!(
         "temperatures by the document's conversion_deg_c: {}. Its range_deg_c is {}",
         told.join("; "),
@@ -60,8 +58,7 @@ fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>)
         0 => String::new(),
         bad => format!(", {bad} of {} readings are not numbers", raw.len()),
     };
-    let [from, to] =
-        good.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(*t), high.max(*t)]);
+    let [from, to] = ends(good.iter().copied());
     if good.is_empty() {
         return (true, format!("{name} has no numbers"));
     }

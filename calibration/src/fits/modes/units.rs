@@ -5,7 +5,8 @@ use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::checks::TURNING_DEG_PER_H;
 use super::document::count_arcsec;
-use super::switches::{Switches, real};
+use super::switches::Switches;
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::report::words::gyros;
 use crate::robust::median;
@@ -119,7 +120,7 @@ pub(super) fn late(switches: &Switches) -> Option<String> {
 fn dither_hz(switches: &Switches, sensor: usize) -> Option<f64> {
     let settled = |row: &Vec<f64>| {
         let half = row.get(row.len() / 2..).filter(|half| !half.is_empty())?;
-        Some(half.iter().sum::<f64>() / real(half.len() as u64))
+        Some(half.iter().sum::<f64>() / real(half.len()))
     };
     let hz: Vec<f64> =
         switches.behind.iter().filter_map(|behind| settled(behind.dither_hz.get(sensor)?)).collect();

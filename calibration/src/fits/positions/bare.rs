@@ -1,15 +1,13 @@
 //! A document of a unit that has none yet: everything as the log has it, for a fit to complete.
 
-use isotherm_protocol::document::{
-    Accel, AccelOutput, AccelSensor, CURRENT_SCHEMA, Channel, Curve, Document, Filter, Gyro, GyroOutput,
-    GyroSensor, Orientation, Shape, Temperature,
-};
+use isotherm_protocol::document::{AccelOutput, Channel, Document, Filter, GyroOutput, Temperature};
 
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 
-use crate::axes::AXES;
+use crate::document::plain::plain;
 use crate::error::Error;
 use crate::runs::series::Series;
+use crate::runs::{Run, Watch};
 
 /// Physical range of a channel whose readings are °C already.
 const RANGE_DEG_C: [f64; 2] = [-70.0, 130.0];
@@ -66,55 +64,28 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
-    let follows = |kind: &str, index: usize| follows(&channels, kind, index);
-    let names = || AXES.into_iter().enumerate();
-    let scale_unit = accel_output.scale_unit();
-    let gyro = names().map(|(index, name)| GyroSensor {
-        channel: follows("gyro", index),
-        increment_weight_rad_per_rad: Some(1.0),
-        ..GyroSensor::bare(name)
-    });
-    let accel = names().map(|(index, name)| AccelSensor {
-        channel: follows("accel", index),
-        ..AccelSensor::bare(name, Curve::new(Shape::Constant { value: 1.0 }).in_unit(scale_unit))
-    });
-    Ok(Document {
-        schema: CURRENT_SCHEMA,
-        unit: series.unit.to_string(),
-        created: None,
-        note: None,
-        origin: None,
-        auxiliary: Vec::new(),
-        temperature: Temperature {
-            assumed_deg_c: 25.0,
-            filter: (!channels.is_empty()).then_some(Filter {
-                grid_step_s: 1.0,
-                smoothing_s: 5.0,
-                derivative_step_s: 1.0,
-                stale_after_s: 60.0,
-                branch_dead_band_deg_c2_per_s3: None,
-            }),
-            channel: channels.clone(),
-        },
-        gyro: Gyro {
-            output: GyroOutput::Mean,
-            sensor: gyro.collect(),
-            orientation: Orientation::along_case_axes(),
-        },
-        accel: Some(Accel {
-            output: accel_output,
-            sensor: accel.collect(),
-            orientation: Orientation::along_case_axes(),
-        }),
-        mode_reversal: None,
-        self_test: None,
-    })
+    let filter = Filter {
+        grid_step_s: 1.0,
+        smoothing_s: 5.0,
+        derivative_step_s: 1.0,
+        stale_after_s: 60.0,
+        branch_dead_band_deg_c2_per_s3: None,
+    };
+    let filter = (!channels.is_empty()).then_some(filter);
+    let temperature = Temperature { assumed_deg_c: 25.0, filter, channel: channels };
+    Ok(plain(series.unit.as_str(), GyroOutput::Mean, temperature, Some(accel_output)))
 }
 
-/// The channel that a sensor follows by its name: `accel0` for the first accelerometer, or the only one that there is.
-fn follows(channels: &[Channel], kind: &str, index: usize) -> Option<String> {
-    let own = format!("{kind}{index}");
-    let named = channels.iter().find(|channel| channel.name == own);
-    let only = channels.first().filter(|_| channels.len() == 1);
-    named.or(only).map(|channel| channel.name.clone())
+/// The same from a run whose readings that are no counts are in "V" or "m/s2".
+///
+/// # Errors
+/// As [`Run::series`] and [`bare`].
+pub fn of_run(run: &Run, accelerometer_unit: &str, watch: impl Watch) -> Result<Document, Error> {
+    let series = run.series(watch)?;
+    let output = match (series.accels.output, accelerometer_unit) {
+        (Some(OutputKind::Counts), _) => AccelOutput::Counts,
+        (_, "V") => AccelOutput::Volts,
+        _ => AccelOutput::MetresPerSecondSquared,
+    };
+    bare(&series, output)
 }

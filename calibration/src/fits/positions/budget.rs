@@ -1,5 +1,6 @@
 //! The error budget of a calibration that is planned (004, equations 3 to 7; models §9), before anyone books the chamber.
 
+use clap::Args;
 use isotherm_pages::Table;
 use serde_json::{Value, json};
 
@@ -7,52 +8,45 @@ use super::doubts::unseen;
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::solve::{Positions, Weights, guesses};
+use crate::numbers::{norm, real};
 use crate::report::figures::{counted, short, table};
 
 /// ″ in one radian.
 pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
 
-/// What is planned.
-#[derive(Debug, Clone, PartialEq)]
+/// What is planned; the defaults are the example of 004, with quartz accelerometers.
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Budget {
-    /// σ1: positioning of the stand (″).
+    /// σ1: positioning of the stand (″)
+    #[arg(skip)]
     pub positioning_arcsec: f64,
-    /// σ2: run-out of its axes (″).
+    /// σ2: run-out of its axes (″)
+    #[arg(skip)]
     pub run_out_arcsec: f64,
-    /// Q: white noise of an accelerometer (V²·s, or (m/s²)²·s and so on with the same unit in K).
+    /// Planned: white noise of an accelerometer (V²·s)
+    #[arg(long, hide_short_help = true, value_name = "Q", default_value_t = 3e-9, requires = "budget")]
     pub noise: f64,
-    /// τ: time in each position (s).
+    /// Planned: time in each position (s)
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 30.0, requires = "budget")]
     pub seconds: f64,
-    /// K: output of an accelerometer at 1 g (V).
-    pub scale_per_g: f64,
-    /// Thermal expansion of housing and sensor (1e-6/°C).
-    pub expansion_ppm_per_deg_c: [f64; 2],
-    /// Temperature of calibration and highest temperature inside (°C).
-    pub temperature_deg_c: [f64; 2],
-    /// Error of the measured temperature (°C).
-    pub temperature_error_deg_c: f64,
-    /// `k_C`: how fast an axis turns (″/°C).
-    pub axis_arcsec_per_deg_c: f64,
-    /// Δ`C_a`: hysteresis of an axis over its life (″).
-    pub hysteresis_arcsec: f64,
-}
-
-impl Default for Budget {
-    /// The example of 004, with quartz accelerometers.
-    fn default() -> Self {
-        Self {
-            positioning_arcsec: 5.0,
-            run_out_arcsec: 2.0,
-            noise: 3e-9,
-            seconds: 30.0,
-            scale_per_g: 1.0,
-            expansion_ppm_per_deg_c: [22.9, 15.0],
-            temperature_deg_c: [20.0, 85.0],
-            temperature_error_deg_c: 0.2,
-            axis_arcsec_per_deg_c: 1.5,
-            hysteresis_arcsec: 5.0,
-        }
-    }
+    /// Planned: output of an accelerometer at 1 g (V)
+    #[arg(long, hide_short_help = true, value_name = "V", default_value_t = 1.0, requires = "budget")]
+    pub scale: f64,
+    /// Planned: thermal expansion of housing and sensor (1e-6/°C)
+    #[arg(long, hide_short_help = true, value_name = "PPM", num_args = 2, default_values_t = [22.9, 15.0], requires = "budget")]
+    pub expansion: Vec<f64>,
+    /// Planned: calibration temperature and highest temperature inside (°C)
+    #[arg(long, hide_short_help = true, value_name = "DEG_C", num_args = 2, default_values_t = [20.0, 85.0], requires = "budget", allow_hyphen_values = true)]
+    pub temperatures: Vec<f64>,
+    /// Planned: error of the measured temperature (°C)
+    #[arg(long, hide_short_help = true, value_name = "DEG_C", default_value_t = 0.2, requires = "budget")]
+    pub temperature_error: f64,
+    /// Planned: turn of an axis with temperature (″/°C); quartz 1.5, silicon up to 6
+    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget")]
+    pub axis_rate: f64,
+    /// Planned: hysteresis of an axis over thermal cycles (″); quartz 5 to 15, silicon 15 to 60, or as measured
+    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 5.0, requires = "budget")]
+    pub hysteresis: f64,
 }
 
 /// `k_C` of 004 for accelerometers of quartz and of silicon (″/°C).
@@ -60,49 +54,40 @@ pub const TYPICAL_ARCSEC_PER_DEG_C: [(&str, f64); 2] = [("quartz", 1.5), ("silic
 
 impl Budget {
     /// White noise of a mean over τ as an angle (″).
-    #[must_use]
     pub fn noise_arcsec(&self) -> f64 {
-        ARCSEC_PER_RAD * (self.noise / self.seconds).sqrt() / self.scale_per_g
+        ARCSEC_PER_RAD * (self.noise / self.seconds).sqrt() / self.scale
     }
 
     /// Error of one element of C by the stand and the noise (″): 004, equation 4.
-    #[must_use]
     pub fn stand_arcsec(&self) -> f64 {
-        let parts = [self.positioning_arcsec, self.run_out_arcsec, self.noise_arcsec()];
-        2.0 * parts.iter().map(|part| part * part).sum::<f64>().sqrt()
+        2.0 * norm([self.positioning_arcsec, self.run_out_arcsec, self.noise_arcsec()])
     }
 
     /// Largest plastic deformation of the housing (″): equation 6.
-    #[must_use]
     pub fn housing_arcsec(&self) -> f64 {
-        let [housing, sensor] = self.expansion_ppm_per_deg_c;
-        let [cold, hot] = self.temperature_deg_c;
+        let [housing, sensor] = pair(&self.expansion);
+        let [cold, hot] = pair(&self.temperatures);
         ARCSEC_PER_RAD * 0.1 * (housing - sensor) * 1e-6 * (hot - cold)
     }
 
     /// Error by the measured temperature for axes that turn with `rate` (″): equation 7.
-    #[must_use]
     pub fn temperature_arcsec(&self, rate_arcsec_per_deg_c: f64) -> f64 {
-        self.temperature_error_deg_c * rate_arcsec_per_deg_c
+        self.temperature_error * rate_arcsec_per_deg_c
     }
 
     /// What turns an axis between calibrations (″): hysteresis, housing, measured temperature; equation 5.
-    #[must_use]
     pub fn thermal_arcsec(&self) -> f64 {
-        let measured = self.temperature_arcsec(self.axis_arcsec_per_deg_c);
-        self.hysteresis_arcsec.hypot(self.housing_arcsec()).hypot(measured)
+        let measured = self.temperature_arcsec(self.axis_rate);
+        self.hysteresis.hypot(self.housing_arcsec()).hypot(measured)
     }
 
     /// Root sum of squares with stand and noise (″).
-    #[must_use]
     pub fn total_arcsec(&self) -> f64 {
         self.stand_arcsec().hypot(self.thermal_arcsec())
     }
 
     /// Standard error of the elements of C that the least-squares fit of a plan will state, mean and largest (″); `None` where
     /// the plan does not determine them.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "six angles")]
     pub fn of_plan(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
         let taken: Vec<Taken> = plan
             .positions
@@ -110,7 +95,7 @@ impl Budget {
             .enumerate()
             .map(|(position, stated)| Taken {
                 position,
-                outputs: plan.up(&stated.attitude, [0.0; 3]).map(|c| c * self.scale_per_g).to_vec(),
+                outputs: plan.up(&stated.attitude, [0.0; 3]).map(|c| c * self.scale).to_vec(),
                 ratio: vec![1.0; 3],
                 duration_s: self.seconds,
                 sensor_t: vec![0.0; 3],
@@ -125,13 +110,12 @@ impl Budget {
         let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
         let covariance = found.axes_covariance(plan, 0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
-        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt();
+        let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / real(sigma.len())).sqrt();
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
     }
 
     /// How well an axis is known by the plan's own fit, and with what the housing and the measured temperature add (″); `None` where
     /// the plan does not determine it.
-    #[must_use]
     pub fn known_by(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
         let [mean, _] = self.of_plan(plan, levelling_rad)?;
         Some([mean, mean.hypot(self.thermal_arcsec())])
@@ -157,7 +141,6 @@ impl Budget {
     }
 
     /// As text.
-    #[must_use]
     pub fn to_text(&self, plan: &Plan, levelling_rad: f64) -> String {
         let Table { head, rows } = self.rows();
         let typical = TYPICAL_ARCSEC_PER_DEG_C
@@ -184,17 +167,16 @@ impl Budget {
     }
 
     /// The budget as a table.
-    #[must_use]
     pub fn rows(&self) -> Table {
-        let [housing, sensor] = self.expansion_ppm_per_deg_c;
-        let [cold, hot] = self.temperature_deg_c;
+        let [housing, sensor] = pair(&self.expansion);
+        let [cold, hot] = pair(&self.temperatures);
         let row = |what: String, formula: String, value: f64| vec![what, formula, format!("{value:.1}")];
         let rows = vec![
             row("positioning σ1".into(), "given".into(), self.positioning_arcsec),
             row("run-out σ2".into(), "given".into(), self.run_out_arcsec),
             row(
                 "white noise".into(),
-                format!("ρ·√(Q/τ)/K, Q {}, τ {} s, K {}", short(self.noise), self.seconds, self.scale_per_g),
+                format!("ρ·√(Q/τ)/K, Q {}, τ {} s, K {}", short(self.noise), self.seconds, self.scale),
                 self.noise_arcsec(),
             ),
             row("stand and noise [004 eq. 4]".into(), "2·√(σ1² + σ2² + noise²)".into(), self.stand_arcsec()),
@@ -205,10 +187,10 @@ impl Budget {
             ),
             row(
                 "measured temperature [004 eq. 7]".into(),
-                format!("{} °C · {} ″/°C", self.temperature_error_deg_c, self.axis_arcsec_per_deg_c),
-                self.temperature_arcsec(self.axis_arcsec_per_deg_c),
+                format!("{} °C · {} ″/°C", self.temperature_error, self.axis_rate),
+                self.temperature_arcsec(self.axis_rate),
             ),
-            row("hysteresis of the axis [004 table 1]".into(), "given".into(), self.hysteresis_arcsec),
+            row("hysteresis of the axis [004 table 1]".into(), "given".into(), self.hysteresis),
             row(
                 "between calibrations [004 eq. 5]".into(),
                 "root of the sum of squares of the last three".into(),
@@ -216,11 +198,10 @@ impl Budget {
             ),
             row("total".into(), "with stand and noise".into(), self.total_arcsec()),
         ];
-        Table { head: ["", "", "″"].map(str::to_owned).to_vec(), rows }
+        Table::of(["", "", "″"], rows)
     }
 
     /// As JSON.
-    #[must_use]
     pub fn to_json(&self, plan: &Plan, levelling_rad: f64) -> Value {
         let typical: serde_json::Map<String, Value> = TYPICAL_ARCSEC_PER_DEG_C
             .iter()
@@ -231,9 +212,9 @@ impl Budget {
             "noise_arcsec": self.noise_arcsec(),
             "stand_arcsec": self.stand_arcsec(),
             "housing_arcsec": self.housing_arcsec(),
-            "temperature_arcsec": self.temperature_arcsec(self.axis_arcsec_per_deg_c),
+            "temperature_arcsec": self.temperature_arcsec(self.axis_rate),
             "temperature_typical_arcsec": typical,
-            "hysteresis_arcsec": self.hysteresis_arcsec,
+            "hysteresis_arcsec": self.hysteresis,
             "thermal_arcsec": self.thermal_arcsec(),
             "total_arcsec": self.total_arcsec(),
             "positions": plan.positions.len(),
@@ -245,13 +226,34 @@ impl Budget {
     }
 }
 
+/// The two values of an option.
+fn pair(values: &[f64]) -> [f64; 2] {
+    <[f64; 2]>::try_from(values).unwrap_or_default()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The example of 004, with quartz accelerometers.
+    fn example() -> Budget {
+        Budget {
+            positioning_arcsec: 5.0,
+            run_out_arcsec: 2.0,
+            noise: 3e-9,
+            seconds: 30.0,
+            scale: 1.0,
+            expansion: vec![22.9, 15.0],
+            temperatures: vec![20.0, 85.0],
+            temperature_error: 0.2,
+            axis_rate: 1.5,
+            hysteresis: 5.0,
+        }
+    }
+
     #[test]
     fn the_examples_of_the_paper() {
-        let budget = Budget::default();
+        let budget = example();
         // 11.52″ in 004 (11.53 with its own numbers), 11″, 0.3″ and 1.2″.
         assert!((budget.stand_arcsec() - 11.53).abs() < 0.005, "{}", budget.stand_arcsec());
         assert!((budget.housing_arcsec() - 10.59).abs() < 0.005, "{}", budget.housing_arcsec());
@@ -259,10 +261,10 @@ mod tests {
         assert!((budget.temperature_arcsec(6.0) - 1.2).abs() < 1e-12);
         assert!((budget.total_arcsec() - 16.44).abs() < 0.005, "{}", budget.total_arcsec());
         // 12…19″ for quartz (a hysteresis of 5…15″), 19…61″ for silicon (15…60″).
-        for (hysteresis, rate, total) in
+        for (hysteresis, axis_rate, total) in
             [(5.0, 1.5, 12.0), (15.4, 1.5, 19.0), (15.4, 6.0, 19.0), (60.0, 6.0, 61.0)]
         {
-            let of = Budget { hysteresis_arcsec: hysteresis, axis_arcsec_per_deg_c: rate, ..budget.clone() };
+            let of = Budget { hysteresis, axis_rate, ..budget.clone() };
             assert!((of.thermal_arcsec() - total).abs() < 0.5, "{}", of.thermal_arcsec());
         }
         let text = budget.to_text(&Plan::twelve(), 3e-4);
@@ -273,7 +275,7 @@ mod tests {
 
     #[test]
     fn the_first_line_is_of_the_plan() {
-        let budget = Budget::default();
+        let budget = example();
         let first =
             |plan: &Plan| budget.to_text(plan, 60.0 / ARCSEC_PER_RAD).lines().next().unwrap().to_owned();
         let twelve = first(&Plan::twelve());
@@ -309,15 +311,15 @@ mod tests {
             position.attitude = Attitude::Up(Plan::twelve().up(&position.attitude, [0.0; 3]).map(f64::round));
         }
         // Two pairs for every element, each out of level by the stand's 60″: half of that, as the fit says.
-        let [mean, most] = Budget::default().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();
+        let [mean, most] = example().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();
         assert!((mean - 30.1).abs() < 0.2 && (most - 30.1).abs() < 0.2, "{mean} {most}");
         plan.positions.retain(|position| !position.name.starts_with('Z'));
-        assert!(Budget::default().of_plan(&plan, 3e-4).is_none(), "z is seen neither up nor down");
+        assert!(example().of_plan(&plan, 3e-4).is_none(), "z is seen neither up nor down");
     }
 
     #[test]
     fn twelve_positions_know_more_than_six() {
-        let budget = Budget::default();
+        let budget = example();
         let [twelve, _] = budget.of_plan(&Plan::twelve(), 3e-4).unwrap();
         let [six, _] = budget.of_plan(&Plan::six(), 3e-4).unwrap();
         // Four positions for every element: σ1 and σ2 by half, and what noise adds.

@@ -1,6 +1,6 @@
 //! Diagrams of a calibration on a stand.
 
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
 use super::budget::ARCSEC_PER_RAD;
 use super::fit::{Analysis, Settings};
@@ -12,7 +12,6 @@ use crate::axes::{AXES, main_axis};
 const POINTS: u32 = 60;
 
 /// Largest distance between the quadratic and the linear C over the range (rad).
-#[must_use]
 pub fn bend(analysis: &Analysis) -> f64 {
     let Some((quadratic, ..)) = &analysis.quadratic else { return 0.0 };
     let mut largest: f64 = 0.0;
@@ -50,26 +49,11 @@ pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
         let error = |(number, judgement): (u32, &Judgement)| {
             (f64::from(number), judgement.error[1][axis] / settings.gravity * 1e3)
         };
-        let after = Series {
-            name: "after".to_owned(),
-            ink: Ink::Corrected,
-            form: Form::Dots,
-            samples: Samples::points((1..).zip(judged).map(error)),
-        };
-        Panel {
-            title: format!("accelerometer {}", AXES[axis]),
-            unit: "mg".to_owned(),
-            height: 120,
-            logarithmic: false,
-            content: Content::Series(vec![after]),
-        }
+        let after = Series::dots("after", Ink::Corrected, (1..).zip(judged).map(error));
+        Panel::of(format!("accelerometer {}", AXES[axis]), "mg", 120, vec![after])
     };
-    Chart {
-        caption: "Error of the specific force, by position in the order of the table.".to_owned(),
-        x: Axis::of("number of the position", ""),
-        panels: (0..3).map(panel).collect(),
-        marks: Vec::new(),
-    }
+    let caption = "Error of the specific force, by position in the order of the table.";
+    Chart::of(caption, Axis::of("number of the position", ""), (0..3).map(panel).collect())
 }
 
 /// Elements that are shown over temperature: sensor, element.
@@ -98,33 +82,17 @@ pub(super) fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[Stri
             Some([(*deg_c, value - 1.96 * sigma), (*deg_c, value + 1.96 * sigma), (*deg_c, f64::NAN)])
         };
         let bars = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar).flatten();
-        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
-            name: name.to_owned(),
-            ink,
-            form,
-            samples: Samples::points(points),
-        };
+
         let mut content = vec![
-            series("each temperature", Ink::Raw, Form::Dots, by_level.collect()),
-            series("95 %", Ink::Faint, Form::Line, bars.collect()),
-            series("linear", Ink::Second, Form::Line, curve(&analysis.fit)),
+            Series::dots("each temperature", Ink::Raw, by_level),
+            Series::line("95 %", Ink::Faint, bars),
+            Series::line("linear", Ink::Second, curve(&analysis.fit)),
         ];
         if let Some((quadratic, ..)) = &analysis.quadratic {
-            content.push(series("quadratic", Ink::Third, Form::Line, curve(quadratic)));
+            content.push(Series::line("quadratic", Ink::Third, curve(quadratic)));
         }
-        Panel {
-            title: format!("accelerometer {} along {}", names[index], AXES[i]),
-            unit: "″".to_owned(),
-            height: 150,
-            logarithmic: false,
-            content: Content::Series(content),
-        }
+        Panel::of(format!("accelerometer {} along {}", names[index], AXES[i]), "″", 150, content)
     };
-    Chart {
-        caption: "Elements of C over temperature: each temperature alone, and the line of the document."
-            .to_owned(),
-        x: Axis::of("temperature", "°C"),
-        panels: shown(analysis).into_iter().map(panel).collect(),
-        marks: Vec::new(),
-    }
+    let caption = "Elements of C over temperature: each temperature alone, and the line of the document.";
+    Chart::of(caption, Axis::of("temperature", "°C"), shown(analysis).into_iter().map(panel).collect())
 }

@@ -7,12 +7,12 @@ use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationTherm
 use super::fit::Analysis;
 use super::model::Sensor;
 use crate::document::written::tidy;
+use crate::numbers::{hull, unit};
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
 const ROOM_DEG_C: f64 = 1.0;
 
 /// Puts what was found into a document.
-#[must_use]
 pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Document {
     let mut document = document.clone();
     let Some(accel) = &mut document.accel else { return document };
@@ -33,10 +33,9 @@ pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Docum
 }
 
 /// Range of the document (°C): of all curves, and of the axes.
-#[must_use]
 pub fn range(analysis: &Analysis) -> [f64; 2] {
     let own = analysis.sensors_deg_c.iter().map(|deg_c| deg_c.range);
-    with_room(own.fold(analysis.range_deg_c, |[low, high], own| [low.min(own[0]), high.max(own[1])]))
+    with_room(hull(own.chain([analysis.range_deg_c])).unwrap_or(analysis.range_deg_c))
 }
 
 /// Range of a curve (°C), in whole degrees.
@@ -120,8 +119,7 @@ fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, r
     let at_reference = |(index, sensor): (usize, &Sensor)| {
         let (found, turned) = (row(sensor), old(index));
         let row = [0, 1, 2].map(|i| found[i] - turned[i]);
-        let norm = libm::sqrt(row.iter().map(|c| c * c).sum());
-        row.map(|c| tidy(c / norm))
+        unit(row).map(tidy)
     };
     orientation.rows = analysis.fit.sensors.iter().enumerate().map(at_reference).collect();
 }

@@ -13,6 +13,7 @@ use super::{budget, measure, model};
 use crate::axes::{AXES, sensor_name, several};
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
+use crate::numbers::real;
 use crate::report::figures::{counted, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
@@ -39,9 +40,8 @@ pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {
 }
 
 /// Probability that χ² is at least so large by accident.
-#[expect(clippy::cast_precision_loss, reason = "degrees of freedom")]
 pub(super) fn survival(chi_square: f64, degrees: usize) -> f64 {
-    ChiSquared::new(degrees as f64).map_or(1.0, |law| law.sf(chi_square))
+    ChiSquared::new(real(degrees)).map_or(1.0, |law| law.sf(chi_square))
 }
 
 /// Factor by which standard errors are widened where the positions scatter more than they should.

@@ -23,7 +23,6 @@ fn takes(known: &mut Fault, other: Fault) -> bool {
 
 /// Sensors of runs that read the same in every tick, the same as another one, or too often nothing: what is wrong and what to do.
 /// Those with one fault are named together, and so are runs.
-#[must_use]
 pub fn dead(tracks: &[Track]) -> Vec<String> {
     // Kind and number of sensors, the sensors, the runs, and what is wrong with them.
     type Found<'a> = ((&'a str, usize), Vec<usize>, Vec<&'a str>, Fault);
@@ -57,7 +56,6 @@ pub fn dead(tracks: &[Track]) -> Vec<String> {
 }
 
 /// Names of logs, of many only the first.
-#[must_use]
 pub fn logs(names: &[&str]) -> String {
     match names {
         [first, _, _, _, ..] => {
@@ -68,7 +66,6 @@ pub fn logs(names: &[&str]) -> String {
 }
 
 /// Accelerometers that read exactly the same throughout some poses and not in others: they are at their limit there.
-#[must_use]
 pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
     let mut reasons = Vec::new();

@@ -18,6 +18,8 @@ use super::temperature::{
 };
 use super::times::Times;
 use super::track::Track;
+use crate::document::accelerometers;
+use crate::numbers::ends;
 use crate::report::figures::counted;
 
 /// How the positions are looked at.
@@ -100,8 +102,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     if let Some(words) = stuck(&channels, &axes, &own).filter(|_| !channels.is_empty()) {
         return Err(vec![words]);
     }
-    let (low, high) =
-        axes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let [low, high] = ends(axes.iter().copied());
     let reference = settings.reference_deg_c.unwrap_or_else(|| reference(low, high));
     let half = (0.5 * (high - low)).max(1.0);
     let scaled = |t: f64| (t - reference) / half;
@@ -156,7 +157,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let returns = returns(&all, &poses, &found, &levels_deg_c);
     let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
     for (sensor, kind) in returns.iter().filter_map(|back| back.finding(&names)) {
-        let own = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor));
+        let own = accelerometers(document).get(sensor);
         let name = own.map_or_else(|| sensor.to_string(), |own| own.name.clone());
         warnings.push(kind.of(&name).to_string());
     }

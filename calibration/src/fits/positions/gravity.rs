@@ -9,7 +9,6 @@ pub const STANDARD_M_PER_S2: f64 = 9.806_65;
 const PER_METRE: f64 = 3.086e-6;
 
 /// Gravity on the WGS 84 ellipsoid by Somigliana's closed formula, less the free-air decrease with height (m/s²).
-#[must_use]
 pub fn normal(latitude_deg: f64, height_m: f64) -> f64 {
     let sine = libm::sin(latitude_deg.to_radians());
     let square = sine * sine;

@@ -9,6 +9,7 @@ use super::pose::Pose;
 use super::solve::{Fit, Positions};
 use crate::finding::AccelKind;
 use crate::lsq::linear;
+use crate::numbers::real;
 
 /// The axes at one temperature, before and after others were visited.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,19 +26,16 @@ pub struct Return {
 
 impl Return {
     /// Whether some axis moved, beyond chance.
-    #[must_use]
     pub fn moved(&self) -> bool {
         self.accident < ACCIDENT
     }
 
     /// The accelerometer whose axis turned most.
-    #[must_use]
     pub fn largest(&self) -> Option<(usize, [f64; 2])> {
         self.turns.iter().copied().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
     }
 
     /// As a finding, where an axis moved: the accelerometer and the kind.
-    #[must_use]
     pub fn finding(&self, runs: &[String]) -> Option<(usize, AccelKind)> {
         let (sensor, turn) = self.largest().filter(|_| self.moved())?;
         let logs = self.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
@@ -91,9 +89,8 @@ fn compare(
     [(first, before), (second, after)]: [(&Visit, &Fit); 2],
     levels_deg_c: &[f64],
 ) -> Option<Return> {
-    #[expect(clippy::cast_precision_loss, reason = "positions")]
     let scaled =
-        |visit: &Visit| visit.taken.iter().map(|taken| taken.axes_t).sum::<f64>() / visit.taken.len() as f64;
+        |visit: &Visit| visit.taken.iter().map(|taken| taken.axes_t).sum::<f64>() / real(visit.taken.len());
     let away = scaled(second) - scaled(first);
     let [level, line] = [before, fit].map(|fit| fit.model(all.plan));
     let angle = |sensor: usize, which: usize| {
@@ -135,7 +132,6 @@ fn widening(fits: [&Fit; 2]) -> f64 {
     if degrees == 0 || survival(chi_square, degrees) >= ACCIDENT {
         return 1.0;
     }
-    #[expect(clippy::cast_precision_loss, reason = "some positions")]
-    let per_degree = chi_square / degrees as f64;
+    let per_degree = chi_square / real(degrees);
     per_degree.max(1.0)
 }

@@ -8,6 +8,7 @@ use super::plan::{Plan, StandErrors};
 use super::pose::Pose;
 use super::track::Track;
 use crate::axes::AXES;
+use crate::numbers::norm;
 use crate::report::Curve;
 
 /// One position, judged.
@@ -28,7 +29,6 @@ pub struct Judgement {
 }
 
 /// Judges poses: the same runs, corrected before and after.
-#[must_use]
 pub fn judge(
     plan: &Plan,
     errors: StandErrors,
@@ -45,7 +45,7 @@ pub fn judge(
         };
         let forces = [force(before)?, force(after)?];
         let error = forces.map(|force| [0, 1, 2].map(|axis| force[axis] - gravity * up[axis]));
-        let length = forces.map(|force| libm::sqrt(force.iter().map(|c| c * c).sum()) - gravity);
+        let length = forces.map(|force| norm(force) - gravity);
         Some(Judgement {
             run: pose.run,
             position: *position,
@@ -59,7 +59,6 @@ pub fn judge(
 }
 
 /// The judgements as curves, one per axis and run.
-#[must_use]
 pub fn curves(judged: &[Judgement], names: &[String], sample: Sample) -> Vec<Curve> {
     let mut curves = Vec::new();
     for (run, name) in names.iter().enumerate() {
@@ -83,7 +82,6 @@ pub fn curves(judged: &[Judgement], names: &[String], sample: Sample) -> Vec<Cur
 }
 
 /// |f| − g before and after (m/s²).
-#[must_use]
 pub fn lengths(judged: &[Judgement]) -> [Vec<f64>; 2] {
     [0, 1].map(|which| judged.iter().map(|judgement| judgement.length[which]).collect())
 }

@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
+use crate::numbers::{ends, real};
 use crate::report::figures::{counted, fixed};
 use crate::runs::swapped::{ORDERS, moved};
 
@@ -128,14 +129,13 @@ fn swapped(
 }
 
 /// Share of the ways on which gyros and accelerometers agree, with the accelerometers in another order.
-#[expect(clippy::cast_precision_loss, reason = "poses")]
 fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 3]) -> f64 {
     let up = |direction: &Vector3<f64>| Vector3::from_fn(|axis, _| direction[order[axis]]);
     let agree = ways
         .iter()
         .zip(directions.windows(2))
         .filter(|(way, pair)| (**way * up(&pair[0])).angle(&up(&pair[1])) < DIRECTION_RAD);
-    agree.count() as f64 / ways.len().max(1) as f64
+    real(agree.count()) / real(ways.len().max(1))
 }
 
 /// Words where a plan's neighbours differ by a turn about the vertical, which no accelerometer feels: without the turns in the log
@@ -223,13 +223,10 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
                 .to_owned(),
         );
     }
-    let ends = [0, 1, 2].map(|i| {
-        let of = poses.iter().map(move |pose| pose.outputs.get(i).copied().unwrap_or(f64::NAN));
-        of.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-    });
+    let ends = [0, 1, 2].map(|i| ends(poses.iter().map(|pose| pose.output(i))));
     let scaled = |pose: &Pose| {
         Vector3::from_fn(|i, _| {
-            let (low, high) = ends[i];
+            let [low, high] = ends[i];
             (pose.outputs[i] - 0.5 * (low + high)) / (0.5 * (high - low))
         })
     };
@@ -251,8 +248,7 @@ fn way(rate_deg_per_s: [&[f64]; 3], duration_s: &[f64], pair: &[Pose]) -> Matrix
         let column = rate_deg_per_s[axis];
         let at_rest = |pose: &Pose| {
             let ticks = &column[pose.interval.first..pose.interval.end];
-            #[expect(clippy::cast_precision_loss, reason = "ticks of a pose")]
-            let count = ticks.len().max(1) as f64;
+            let count = real(ticks.len().max(1));
             ticks.iter().sum::<f64>() / count
         };
         0.5 * (at_rest(before) + at_rest(after))

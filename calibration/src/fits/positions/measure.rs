@@ -3,6 +3,7 @@
 use isotherm_protocol::document::AccelOutput;
 
 use crate::axes::sensor_name;
+use crate::numbers::real;
 use crate::report::figures::short;
 
 /// Times that a scale factor may be away from what is stated, and one sensor's from another's: beyond it, it is another unit of
@@ -50,7 +51,6 @@ pub struct Beside {
 
 impl Beside {
     /// Accelerometers: output per specific force, found and stated.
-    #[must_use]
     pub fn accelerometers(output: AccelOutput, found: &[f64], stated: &[f64]) -> Self {
         Self {
             kind: "accelerometer",
@@ -63,7 +63,6 @@ impl Beside {
     }
 
     /// Gyros: true rate per stated rate, found and stated.
-    #[must_use]
     pub fn gyros(found: &[f64], stated: &[f64]) -> Self {
         Self {
             kind: "gyro",
@@ -75,7 +74,6 @@ impl Beside {
     }
 
     /// What is wrong, in words.
-    #[must_use]
     pub fn words(&self) -> Option<String> {
         self.apart().or_else(|| self.all())
     }
@@ -101,10 +99,9 @@ impl Beside {
     }
 
     /// All sensors far from what is stated.
-    #[expect(clippy::cast_precision_loss, reason = "three to eight sensors")]
     fn all(&self) -> Option<String> {
         let logs: f64 = self.times.iter().map(|times| libm::log(*times)).sum();
-        let times = libm::exp(logs / self.times.len() as f64);
+        let times = libm::exp(logs / real(self.times.len()));
         (self.stated && times.is_finite() && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&times)).then(|| {
             format!(
                 "{}s: their readings are {} times those of the document, or else the log, {}: {}. The new document \
@@ -131,7 +128,6 @@ fn is_placeholder(stated: &[f64]) -> bool {
 }
 
 /// Words where a log that is said to be in V is in m/s² by its scale factors.
-#[must_use]
 pub fn already_m_per_s2(output: AccelOutput, found: &[f64], stated: &[f64]) -> Option<String> {
     let placeholder = output == AccelOutput::Volts && is_placeholder(stated);
     let near = found.iter().all(|k| (k - 1.0).abs() < NEAR_ONE);

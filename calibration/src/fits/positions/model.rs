@@ -10,6 +10,7 @@
 
 use super::plan::{Plan, StandErrors};
 use crate::lsq::linear::{self, SINGULAR, Weak};
+use crate::numbers::norm;
 
 /// Least spread of the directions that a first guess is made of: smallest over largest singular value.
 const LEAST_SPREAD: f64 = 0.05;
@@ -44,7 +45,6 @@ pub struct Degrees {
 
 impl Degrees {
     /// Parameters of one accelerometer: K, S, and two angles of its axis.
-    #[must_use]
     pub fn of_sensor(self) -> usize {
         2 * (self.sensor + 1) + 2 * (self.axes + 1)
     }
@@ -87,7 +87,6 @@ pub struct Sensor {
 
 impl Guess {
     /// From the outputs by linear least squares: U = M·u + S, K·g the length of M.
-    #[must_use]
     pub fn of(ups: &[[f64; 3]], outputs: &[f64]) -> Option<Self> {
         let design =
             nalgebra::DMatrix::from_fn(
@@ -114,7 +113,6 @@ impl Guess {
 
 impl Guess {
     /// Two unit vectors at right angles to a unit vector.
-    #[must_use]
     pub fn across_of(axis: [f64; 3]) -> [[f64; 3]; 2] {
         across(axis)
     }
@@ -131,32 +129,27 @@ fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
 
 impl Model<'_> {
     /// Parameters of one accelerometer.
-    #[must_use]
     pub fn of_sensor(&self) -> usize {
         self.degrees.of_sensor()
     }
 
     /// All parameters: accelerometer by accelerometer K, S, a, b, each by powers; then δ1, δ2, δ3 (in thousandths).
-    #[must_use]
     pub fn count(&self) -> usize {
         self.guess.len() * self.of_sensor() + 3
     }
 
     /// The stand's errors (rad).
-    #[must_use]
     pub fn errors(&self, parameters: &[f64]) -> StandErrors {
         let from = self.guess.len() * self.of_sensor();
         [0, 1, 2].map(|i| parameters.get(from + i).copied().unwrap_or(0.0) * SMALL)
     }
 
     /// Place of a parameter of an accelerometer's axis: `which` of the two directions, power.
-    #[must_use]
     pub fn axis_index(&self, sensor: usize, which: usize, power: usize) -> usize {
         sensor * self.of_sensor() + 2 * (self.degrees.sensor + 1) + which * (self.degrees.axes + 1) + power
     }
 
     /// Outputs of all accelerometers in a position.
-    #[must_use]
     pub fn outputs(&self, parameters: &[f64], taken: &Taken) -> Vec<f64> {
         let Some(position) = self.plan.positions.get(taken.position) else { return Vec::new() };
         let up = self.plan.up(&position.attitude, self.errors(parameters));
@@ -164,7 +157,6 @@ impl Model<'_> {
     }
 
     /// Outputs of all accelerometers under a direction of "up".
-    #[must_use]
     pub fn outputs_under(&self, parameters: &[f64], taken: &Taken, up: [f64; 3]) -> Vec<f64> {
         let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let output = |(index, guess): (usize, &Guess)| {
@@ -187,7 +179,6 @@ impl Model<'_> {
     }
 
     /// What the parameters say of each accelerometer, rows of C at the reference of length one.
-    #[must_use]
     pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
         let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let sensor = |(index, guess): (usize, &Guess)| {
@@ -200,7 +191,7 @@ impl Model<'_> {
                 [0, 1, 2].map(|i| along * guess.axis[i] + a * first[i] + b * second[i])
             };
             let rows: Vec<[f64; 3]> = (0..axes).map(row).collect();
-            let length = libm::sqrt(rows[0].iter().map(|x| x * x).sum());
+            let length = norm(rows[0]);
             let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
             Sensor {
                 scale: (0..own).map(|j| guess.scale * (one(j) + p[j] * SMALL) * length).collect(),

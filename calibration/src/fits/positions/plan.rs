@@ -74,13 +74,11 @@ const TWELVE: [(&str, [f64; 2]); 12] = [
 
 impl Plan {
     /// The twelve positions of 004.
-    #[must_use]
     pub fn twelve() -> Self {
         Self::of_stand(&TWELVE)
     }
 
     /// Each case axis up and down once.
-    #[must_use]
     pub fn six() -> Self {
         let once: Vec<_> = TWELVE.into_iter().filter(|(name, _)| name.ends_with('a')).collect();
         Self::of_stand(&once)
@@ -118,7 +116,6 @@ impl Plan {
     }
 
     /// Direction of "up" in case axes in a position.
-    #[must_use]
     pub fn up(&self, attitude: &Attitude, errors: StandErrors) -> [f64; 3] {
         let [angle_1, angle_2] = match attitude {
             Attitude::Up(up) => return *up,
@@ -138,19 +135,16 @@ impl Plan {
     }
 
     /// Whether a position knows the stand's errors.
-    #[must_use]
     pub fn has_stand(&self) -> bool {
         self.positions.iter().any(|position| matches!(position.attitude, Attitude::Stand(_)))
     }
 
     /// Whether its positions tell the stand's level from the axes.
-    #[must_use]
     pub fn tells_level(&self) -> bool {
         self.has_stand() && self.positions.len() >= GOOD_POSITIONS
     }
 
     /// The position of a name.
-    #[must_use]
     pub fn index_of(&self, name: &str) -> Option<usize> {
         self.positions.iter().position(|position| position.name == name)
     }

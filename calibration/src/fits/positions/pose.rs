@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::still::Interval;
 use super::track::Track;
+use crate::numbers::{mean, real};
 
 /// Means over one static interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,19 +34,21 @@ const MOST_PARTS: usize = 60;
 
 impl Pose {
     /// The poses of a run.
-    #[must_use]
     pub fn of(track: &Track, run: usize, intervals: &[Interval]) -> Vec<Self> {
         intervals.iter().map(|interval| Self::over(track, run, *interval)).collect()
     }
 
+    /// Mean output of one accelerometer; no number where there is none.
+    pub fn output(&self, index: usize) -> f64 {
+        self.outputs.get(index).copied().unwrap_or(f64::NAN)
+    }
+
     /// Mean output of one gyro; no number where there is none.
-    #[must_use]
     pub fn gyro(&self, index: usize) -> f64 {
         self.gyros.get(index).copied().unwrap_or(f64::NAN)
     }
 
     /// Means over one interval.
-    #[must_use]
     pub fn over(track: &Track, run: usize, interval: Interval) -> Self {
         let ticks = interval.first..interval.end;
         let durations = &track.duration_s[ticks.clone()];
@@ -72,18 +75,15 @@ impl Pose {
     }
 
     /// Its middle since the run's beginning (s).
-    #[must_use]
     pub fn middle_s(&self) -> f64 {
         0.5 * (self.span_s[0] + self.span_s[1])
     }
 
     /// Mean temperature of some channels (°C); `None` where there is none of them.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "at most 32 channels")]
     pub fn mean_temperature(&self, channels: &[String]) -> Option<f64> {
         let of: Vec<f64> =
             channels.iter().filter_map(|name| self.temperature_deg_c.get(name).copied()).collect();
-        (!of.is_empty() && of.len() == channels.len()).then(|| of.iter().sum::<f64>() / of.len() as f64)
+        (!of.is_empty() && of.len() == channels.len()).then(|| mean(&of))
     }
 }
 
@@ -91,8 +91,6 @@ impl Pose {
 ///
 /// From differences of neighbouring parts of each interval, so that a slow drift within it does not count; pooled over all
 /// intervals, because a single one tells its noise to a fifth at best. NaN where no interval has two parts.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "parts of an interval")]
 pub fn intensities(tracks: &[Track], poses: &[Pose]) -> Vec<f64> {
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
     let mut sums = vec![(0.0, 0.0); sensors];
@@ -104,11 +102,11 @@ pub fn intensities(tracks: &[Track], poses: &[Pose]) -> Vec<f64> {
             continue;
         }
         let size = ticks / parts;
-        let length_s = pose.duration_s * size as f64 / ticks as f64;
+        let length_s = pose.duration_s * real(size) / real(ticks);
         for (sum, column) in sums.iter_mut().zip(&track.outputs) {
             let means: Vec<f64> = column[pose.interval.first..pose.interval.end]
                 .chunks_exact(size)
-                .map(|part| part.iter().sum::<f64>() / size as f64)
+                .map(|part| part.iter().sum::<f64>() / real(size))
                 .collect();
             for pair in means.windows(2) {
                 let difference = pair[1] - pair[0];

@@ -10,16 +10,15 @@ use super::hysteresis::Return;
 use super::model::SMALL;
 use crate::document::written::tidy;
 use crate::error::Error;
+use crate::numbers::real;
 use crate::report::{FitReport, Sigmas};
 
 /// The document that "before" stands for: the one that was given, or else one scale factor for all accelerometers, no bias, axes
 /// along the case.
-#[must_use]
 pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -> Document {
     let mut document = base.clone();
     let scales = analysis.fit.guess.iter().map(|guess| guess.scale / gravity);
-    #[expect(clippy::cast_precision_loss, reason = "at most eight accelerometers")]
-    let mean = scales.sum::<f64>() / analysis.fit.guess.len().max(1) as f64;
+    let mean = scales.sum::<f64>() / real(analysis.fit.guess.len().max(1));
     if let Some(accel) = document.accel.as_mut().filter(|_| !given) {
         for (sensor, guess) in accel.sensor.iter_mut().zip(&analysis.fit.guess) {
             let unit = sensor.scale_factor.unit();
@@ -45,17 +44,7 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
 /// [`Error::Document`] where it cannot be written, which would be a mistake here.
 pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> Result<Table, Error> {
     let bent = analysis.quadratic.as_ref().is_some_and(|found| found.3 < 1e-3);
-    let coefficients: serde_json::Map<String, serde_json::Value> = report
-        .coefficients
-        .iter()
-        .map(|c| {
-            (
-                c.name.clone(),
-                json!({ "value": c.value, "sigma": c.sigma.unwrap_or(f64::NAN), "unit": c.unit }),
-            )
-        })
-        .filter(|(_, value)| value["sigma"].is_number() && value["value"].is_number())
-        .collect();
+
     let fit = &analysis.fit;
     let covariance = fit.axes_covariance(&settings.plan, 0) * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
     let covariance: Vec<Vec<f64>> = covariance
@@ -75,7 +64,7 @@ pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> 
         "quadratic_axes": bent,
         "verdict": report.headline(),
         "warnings": report.warnings,
-        "coefficients": coefficients,
+        "coefficients": report.coefficients_by_name(),
         // Two angles per accelerometer across its axis, at the reference.
         "axes_covariance_arcsec2": covariance,
         "relative_scale_sigma": scale_sigmas(analysis),
@@ -83,7 +72,7 @@ pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> 
     if let (false, Some(about)) = (analysis.returns.is_empty(), about.as_object_mut()) {
         about.insert("hysteresis".to_owned(), hysteresis(analysis).into());
     }
-    Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+    Table::try_from(about).map_err(|error| Error::document(&error))
 }
 
 /// Turns of the axes (″) over thermal cycles, with their standard errors.
@@ -96,7 +85,6 @@ fn hysteresis(analysis: &Analysis) -> Vec<serde_json::Value> {
 }
 
 /// Standard errors of scale factors, biases and axes, for what compares documents.
-#[must_use]
 pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> Sigmas {
     let mut sigmas = Sigmas::default();
     let Some(accel) = &document.accel else { return sigmas };

@@ -9,8 +9,10 @@ use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::judged::{Judgement, curves, lengths};
+use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
+use crate::document::accelerometers;
 use crate::report::figures::{counted, fixed, per_deg_c, short, six};
 use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
 
@@ -24,7 +26,6 @@ pub struct Set<'a> {
 }
 
 /// Everything that is said.
-#[must_use]
 pub fn report(
     document: &Document,
     analysis: &Analysis,
@@ -65,13 +66,13 @@ pub fn report(
 
 /// By how much the axes turned from one visit of a temperature to the next.
 fn return_rows(analysis: &Analysis, names: &[String], runs: &[String]) -> Table {
-    let head = ["°C", "before", "after"].map(str::to_owned).into_iter().chain(names.iter().cloned());
+    let head = ["°C", "before", "after"].into_iter().chain(names.iter().map(String::as_str));
     let row = |back: &Return| {
         let logs = back.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
         let turns = back.turns.iter().map(|[turn, sigma]| format!("{turn:.1} ± {sigma:.1}"));
         std::iter::once(fixed(back.deg_c, 1)).chain(logs).chain(turns).collect()
     };
-    Table { head: head.collect(), rows: analysis.returns.iter().map(row).collect() }
+    Table::of(head, analysis.returns.iter().map(row))
 }
 
 /// Words where far too much is left of |f| − g: no set of coefficients holds for these logs.
@@ -107,7 +108,7 @@ fn as_a_whole(verdicts: Vec<Verdict>) -> Vec<Verdict> {
 /// Names of the accelerometers.
 fn names(document: &Document, count: usize) -> Vec<String> {
     let of = |index: usize| {
-        let sensor = document.accel.as_ref().and_then(|accel| accel.sensor.get(index));
+        let sensor = accelerometers(document).get(index);
         sensor.map_or_else(|| index.to_string(), |sensor| sensor.name.clone())
     };
     (0..count).map(of).collect()
@@ -156,28 +157,24 @@ fn coefficients(
 ) -> Vec<Coefficient> {
     let fit = &analysis.fit;
     let output = output_unit(document);
+    let by_power = |power: usize| analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
     let mut all = Vec::new();
     let of_sensor = fit.degrees.of_sensor();
     let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
         let sigma = |offset: usize, scale: f64| {
-            Some(
-                fit.solution.sigma(index * of_sensor + offset)
-                    * super::model::SMALL
-                    * scale
-                    * analysis.widened,
-            )
+            Some(fit.solution.sigma(index * of_sensor + offset) * SMALL * scale * analysis.widened)
         };
         let guess = fit.guess[index].scale;
         for (power, k) in sensor.scale.iter().enumerate() {
-            let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
+            let factor = by_power(power);
             let value = k * factor / settings.gravity;
             let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
             let sigma = sigma(power, guess / settings.gravity * factor);
             all.push(Coefficient::new(format!("accelerometer {name} K{power}"), unit, value, sigma));
         }
         for (power, bias) in sensor.bias.iter().enumerate() {
-            let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
+            let factor = by_power(power);
             let unit = per_deg_c(output, power);
             let sigma = sigma(s + power, guess * factor);
             all.push(Coefficient::new(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma));
@@ -186,7 +183,7 @@ fn coefficients(
     let mut axes = |fit: &Fit, from: usize, what: &str| {
         for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
             for (power, row) in sensor.axis.iter().enumerate().skip(from) {
-                let factor = analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0)) * ARCSEC_PER_RAD;
+                let factor = by_power(power) * ARCSEC_PER_RAD;
                 let sigma = fit.axis_sigma(&settings.plan, index, power);
                 for i in across(sensor.axis[0]) {
                     all.push(Coefficient::new(
@@ -211,8 +208,7 @@ fn coefficients(
 }
 
 fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
-    let head =
-        ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"].map(str::to_owned);
+    let head = ["position", "log", "at, s", "°C", "x, mg", "y, mg", "z, mg", "|f| − g, mg"];
     let row = |judgement: &Judgement| {
         let position = settings.plan.positions.get(judgement.position);
         let milli_g = |error: f64| fixed(error / settings.gravity * 1e3, 4);
@@ -226,14 +222,12 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
         row.push(milli_g(judgement.length[1]));
         row
     };
-    Table { head: head.to_vec(), rows: set.judged.iter().map(row).collect() }
+    Table::of(head, set.judged.iter().map(row))
 }
 
 fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Table {
     let shown = shown(analysis);
-    let head = std::iter::once("°C".to_owned())
-        .chain(shown.iter().map(|(index, i)| format!("{} along {}", names[*index], AXES[*i])))
-        .collect();
+    let elements = shown.iter().map(|(index, i)| format!("{} along {}", names[*index], AXES[*i]));
     let row = |(deg_c, fit): (&f64, &Option<Fit>)| {
         let cell = |(index, i): &(usize, usize)| {
             let Some(fit) = fit else { return "–".to_owned() };
@@ -243,5 +237,6 @@ fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Tab
         };
         std::iter::once(fixed(*deg_c, 2)).chain(shown.iter().map(cell)).collect()
     };
-    Table { head, rows: analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row).collect() }
+    let head = std::iter::once("°C".to_owned()).chain(elements);
+    Table::of(head, analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row))
 }

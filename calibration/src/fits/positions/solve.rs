@@ -46,7 +46,6 @@ pub struct Fit {
 
 impl Fit {
     /// Covariance of the directions of all axes at the reference: two angles (rad) per accelerometer.
-    #[must_use]
     pub fn axes_covariance(&self, plan: &Plan, power: usize) -> DMatrix<f64> {
         let model = self.model(plan);
         let index: Vec<usize> = (0..self.guess.len())
@@ -58,13 +57,11 @@ impl Fit {
     }
 
     /// The model that it was found with.
-    #[must_use]
     pub fn model<'a>(&self, plan: &'a Plan) -> Model<'a> {
         Model { plan, guess: self.guess.clone(), degrees: self.degrees }
     }
 
     /// Standard errors of the elements of a sensor's row of C, by power (per scaled temperature to that power).
-    #[must_use]
     pub fn axis_sigma(&self, plan: &Plan, sensor: usize, power: usize) -> [f64; 3] {
         let covariance = self.axes_covariance(plan, power);
         let Some(guess) = self.guess.get(sensor) else { return [f64::NAN; 3] };

@@ -5,6 +5,7 @@
 //! keeps half its length away from every motion.
 
 use super::track::{Track, quantile};
+use crate::numbers::real;
 
 /// What counts as still.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +39,6 @@ const RATE_SIGMAS: f64 = 6.0;
 const QUIET_SHARE: f64 = 0.2;
 
 /// The still intervals of a run. `rest` is a stretch from its beginning (s) that is known to be still.
-#[must_use]
 pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Interval> {
     let tick_s = track.tick_s();
     let half = half_window(limits.window_s, tick_s);
@@ -100,8 +100,7 @@ fn turning(track: &Track, limits: &StillLimits, half: usize, calm: &[bool]) -> V
             values.iter().zip(calm).filter(|(_, calm)| **calm).map(|(value, _)| *value).collect()
         };
         let rest = quantile(&of_calm(&mean), 0.5);
-        #[expect(clippy::cast_precision_loss, reason = "ticks of a window")]
-        let ticks = (2 * half + 1) as f64;
+        let ticks = real(2 * half + 1);
         let noise = (quantile(&of_calm(&variance), QUIET_SHARE) / ticks).max(0.0).sqrt();
         let limit = limits.rate_deg_per_s.max(RATE_SIGMAS * noise);
         for (turns, mean) in turning.iter_mut().zip(&mean) {
@@ -112,7 +111,6 @@ fn turning(track: &Track, limits: &StillLimits, half: usize, calm: &[bool]) -> V
 }
 
 /// Mean and variance of a column over a window around each tick; where the window is cut by the run's end, over what is there.
-#[expect(clippy::cast_precision_loss, reason = "ticks of a window")]
 fn spread(column: &[f64], half: usize) -> (Vec<f64>, Vec<f64>) {
     // Sums of squares would lose the variance beside a large mean.
     let about = quantile(column, 0.5);
@@ -138,7 +136,7 @@ fn spread(column: &[f64], half: usize) -> (Vec<f64>, Vec<f64>) {
             return (f64::NAN, f64::NAN);
         }
         let (low, high) = (tick.saturating_sub(half), (tick + half + 1).min(column.len()));
-        let count = (high - low) as f64;
+        let count = real(high - low);
         let mean = (sums[high].0 - sums[low].0) / count;
         let square = (sums[high].1 - sums[low].1) / count;
         (about + mean, (square - mean * mean).max(0.0) * count / (count - 1.0).max(1.0))

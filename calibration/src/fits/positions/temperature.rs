@@ -7,6 +7,8 @@ use isotherm_protocol::document::Document;
 use super::fit::Settings;
 use super::pose::Pose;
 use crate::axes::several;
+use crate::document::accelerometers;
+use crate::numbers::{ends, mean, once_each};
 use crate::report::figures::fixed;
 
 /// Distance of temperatures that are two (°C).
@@ -23,15 +25,7 @@ fn channels(document: &Document, settings: &Settings) -> Vec<String> {
 
 /// The accelerometers' own channels.
 fn of_accelerometers(document: &Document) -> Vec<String> {
-    let mut own: Vec<String> = Vec::new();
-    for channel in
-        document.accel.iter().flat_map(|accel| &accel.sensor).filter_map(|sensor| sensor.channel.as_ref())
-    {
-        if !own.contains(channel) {
-            own.push(channel.clone());
-        }
-    }
-    own
+    once_each(accelerometers(document).iter().filter_map(|sensor| sensor.channel.clone()))
 }
 
 /// Temperatures that something was taken at (°C).
@@ -45,13 +39,8 @@ pub struct Temperatures {
 
 impl Temperatures {
     /// Of some temperatures.
-    #[expect(clippy::cast_precision_loss, reason = "positions")]
     pub(super) fn of(deg_c: &[f64]) -> Self {
-        let ends = |[low, high]: [f64; 2], t: &f64| [low.min(*t), high.max(*t)];
-        Self {
-            mean: deg_c.iter().sum::<f64>() / deg_c.len() as f64,
-            range: deg_c.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends),
-        }
+        Self { mean: mean(deg_c), range: ends(deg_c.iter().copied()) }
     }
 }
 
@@ -64,7 +53,7 @@ pub(super) fn own_deg_c(
     sensors: usize,
 ) -> Vec<Vec<f64>> {
     let of = |sensor: usize| -> Vec<f64> {
-        let channel = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor)?.channel.as_ref());
+        let channel = accelerometers(document).get(sensor).and_then(|sensor| sensor.channel.as_ref());
         let in_pose = |pose: &Pose| channel.and_then(|name| pose.temperature_deg_c.get(name).copied());
         let reads = poses.iter().any(|(pose, _)| in_pose(pose).is_some());
         let without = |axes: f64| if reads { axes } else { document.temperature.assumed_deg_c };
@@ -88,7 +77,7 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
         if range[1] - range[0] > LEVEL_GAP_DEG_C {
             continue;
         }
-        let channel = document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor)?.channel.as_ref());
+        let channel = accelerometers(document).get(sensor).and_then(|sensor| sensor.channel.as_ref());
         let channel = channel.map_or("no channel".to_owned(), |channel| format!("channel {channel:?}"));
         match blind.iter_mut().find(|(of, ..)| *of == channel) {
             Some((_, sensors, [low, high])) => {
@@ -211,7 +200,7 @@ pub(super) fn slopes_deg_c(document: &Document, poses: &[Pose]) -> Option<f64> {
 /// r of the board of an accelerometer in a pose, by the document.
 pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f64 {
     let stated = || {
-        let sensor = document.accel.as_ref()?.sensor.get(sensor)?;
+        let sensor = accelerometers(document).get(sensor)?;
         let t = pose.temperature_deg_c.get(sensor.board_channel.as_ref()?)?;
         sensor.board_ratio_error.as_ref()?.shape().at(*t)
     };
@@ -219,7 +208,6 @@ pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f6
 }
 
 /// Temperatures that are far enough apart to be several: the number of each one's level, and the levels' means.
-#[expect(clippy::cast_precision_loss, reason = "positions")]
 pub(crate) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
     let mut order: Vec<usize> = (0..temperatures.len()).collect();
     order.sort_by(|a, b| temperatures[*a].total_cmp(&temperatures[*b]));
@@ -237,7 +225,7 @@ pub(crate) fn levels(temperatures: &[f64]) -> (Vec<usize>, Vec<f64>) {
             group.push(t);
         }
     }
-    (level_of, groups.iter().map(|group| group.iter().sum::<f64>() / group.len() as f64).collect())
+    (level_of, groups.iter().map(|group| mean(group)).collect())
 }
 
 /// A reference in whole degrees: 20 °C where that is in the range, else its middle.

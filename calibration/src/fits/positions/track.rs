@@ -1,14 +1,14 @@
 //! A run tick by tick, for finding where the unit stood still: accelerometer outputs, rates along the case axes, temperatures.
 
 use std::collections::BTreeMap;
-use std::slice;
 
 use isotherm_correction::sample::OutputKind;
 use isotherm_log::offline::Loaded;
 
 use crate::error::Error;
+use crate::numbers::{real, seconds};
 use crate::report::figures::{counted, six};
-use crate::runs::table::{Rows, Table, Takes};
+use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Watch};
 
 /// Share of the ticks, or of the time, that gaps may take.
@@ -51,13 +51,12 @@ impl Track {
         let series = run.series(&mut watch)?;
         let accels = &series.accels;
         if accels.is_empty() {
-            return Err(Error::Refused(vec![format!(
+            return Err(Error::refused(format!(
                 "{} has no accelerometer ticks: positions need an accelerometer in the log and its mapping",
                 run.name
-            )]));
+            )));
         }
-        let rows = Rows { length_s: 0.0, takes: Takes::All };
-        let table = Table::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default();
+        let table = Table::of_rows(run, loaded, Rows::TICKS, watch)?;
         let at = nearest(&accels.end_ns, &table.end_ns);
         let taken = |column: &[f64]| -> Vec<f64> {
             at.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
@@ -96,33 +95,28 @@ impl Track {
     }
 
     /// Number of ticks.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.end_ns.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.end_ns.is_empty()
     }
 
     /// Median duration of a tick (s).
-    #[must_use]
     pub fn tick_s(&self) -> f64 {
         quantile(&self.duration_s, 0.5)
     }
 
     /// Words where more than a hundredth of the ticks does not begin where the one before ends, or more than a hundredth of the time
     /// has none: gaps, or a tick length that is not the log's.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
     pub fn gaps(&self) -> Option<String> {
         let tick_s = self.tick_s();
         let away_s: Vec<f64> =
-            self.end_ns.windows(2).map(|pair| (pair[1] - pair[0]) as f64 * 1e-9 - tick_s).collect();
+            self.end_ns.windows(2).map(|pair| seconds(pair[1] - pair[0]) - tick_s).collect();
         let broken = away_s.iter().filter(|away_s| away_s.abs() > 0.5 * tick_s).count();
-        let share = broken as f64 / self.len().max(1) as f64;
+        let share = real(broken) / real(self.len().max(1));
         if share > MANY {
             return Some(format!(
                 "{:.0} % of the accelerometer ticks do not begin at the end of the one before: the log has gaps, or \
@@ -143,12 +137,10 @@ impl Track {
     }
 
     /// Start of a tick since the run's beginning (s).
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
     pub fn start_s(&self, tick: usize) -> f64 {
         let (Some(first), Some(end)) = (self.end_ns.first(), self.end_ns.get(tick)) else { return f64::NAN };
         let duration = |index: usize| self.duration_s.get(index).copied().unwrap_or(0.0);
-        (end - first) as f64 * 1e-9 + duration(0) - duration(tick)
+        seconds(end - first) + duration(0) - duration(tick)
     }
 }
 
@@ -166,19 +158,13 @@ fn nearest(of: &[i64], among: &[i64]) -> Vec<usize> {
 }
 
 /// The value below which a share of the finite values lies; NaN without any.
-#[must_use]
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "an index within the values"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index within the values")]
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut good: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     if good.is_empty() {
         return f64::NAN;
     }
-    let index = (share * (good.len() - 1) as f64).round() as usize;
+    let index = (share * real(good.len() - 1)).round() as usize;
     let (_, value, _) = good.select_nth_unstable_by(index, f64::total_cmp);
     *value
 }

@@ -1,7 +1,6 @@
 //! A run as short means of the rates along the gyros' own input axes, under the document that it starts from.
 
 use std::collections::BTreeMap;
-use std::slice;
 
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Document, OrientationThermal};
@@ -83,9 +82,8 @@ pub fn binned<W: Watch>(
 
 fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch) -> Result<Binned, Error> {
     let loaded = Written::compiled(&along_input_axes(document, group))?;
-    let rows = Rows { length_s: BIN_S, takes: Takes::Own };
-    let mut tables = Table::together(&run.of_gyros(group), slice::from_ref(&loaded), rows, watch)?;
-    let table = tables.pop().unwrap_or_default();
+    let rows = Rows { length_s: BIN_S, takes: Takes::Own, whole: None };
+    let table = Table::of_rows(&run.of_gyros(group), &loaded, rows, watch)?;
     let [good_s, force_s] = &table.taken_s;
     let at = |columns: &[Vec<f64>; 3], row: usize| columns.each_ref().map(|column| column[row]);
     let bin = |row: usize| Bin {
@@ -143,7 +141,6 @@ pub fn means_within(
     windows: &[[f64; 2]],
     watch: impl Watch,
 ) -> Result<Vec<[f64; 3]>, Error> {
-    let rows = Rows { length_s: 0.0, takes: Takes::All };
-    let ticks = Table::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default();
+    let ticks = Table::of_rows(run, loaded, Rows::TICKS, watch)?;
     Ok(windows.iter().map(|window| ticks.mean_rate_within(*window)).collect())
 }

@@ -11,6 +11,7 @@ use super::steps::Step;
 use crate::axes::main_axis;
 use crate::finding::{Instead, Kind};
 use crate::fits::modes::document::row;
+use crate::numbers::{dot, ends, norm, real};
 use crate::robust::median;
 use crate::size::Size;
 
@@ -49,7 +50,7 @@ pub(super) fn turned_as_stated(
         let shown = |sensor: usize| (one.plateau.rate[sensor] - rest[sensor]) / 3600.0;
         let rate = one.step.rate_deg_per_s;
         let turned = in_case(&shown).map(|x| x * rate.signum());
-        let size = dot(turned, turned).sqrt();
+        let size = norm(turned);
         let angle_deg = libm::acos((dot(turned, one.step.axis) / size).clamp(-1.0, 1.0)).to_degrees();
         let factor = size / rate.abs();
         let right_size = !scale_known || (1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor);
@@ -91,11 +92,8 @@ pub(super) fn steady(matched: &[Matched], bins: &[Bin]) -> Result<(), Kind> {
         let allowed =
             (UNSTEADY * one.step.rate_deg_per_s.abs() * 3600.0).max(UNSTEADY_SIGMAS * sigma[sensor]);
         let off = rates.iter().filter(|rate| (**rate - usual).abs() > allowed).count();
-        #[expect(clippy::cast_precision_loss, reason = "bins of a step")]
-        if off > 1 && off as f64 > UNSTEADY_BINS * rates.len() as f64 {
-            let (low, high) = rates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rate| {
-                (low.min(*rate), high.max(*rate))
-            });
+        if off > 1 && real(off) > UNSTEADY_BINS * real(rates.len()) {
+            let [low, high] = ends(rates);
             return Err(Kind::Unsteady {
                 window_s: one.plateau.window_s,
                 stated: one.step.rate_deg_per_s,
@@ -164,10 +162,6 @@ fn at_rest(matched: &[Matched], sensor: usize) -> f64 {
 /// The number below `count` with the largest value.
 fn largest(count: usize, value: impl Fn(usize) -> f64) -> usize {
     (0..count).fold(0, |best, index| if value(index) > value(best) { index } else { best })
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -2,25 +2,19 @@
 
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
-use isotherm_protocol::document::{
-    Curve, Document, Gyro, GyroOutput, GyroSensor, Orientation, Shape, Temperature,
-};
+use isotherm_protocol::document::{Curve, Document, Shape};
 use toml::{Table, Value};
 
 use super::fit::Made;
 use super::model::GyroRates;
 use super::over_temperature::Level;
-use crate::axes::AXES;
-use crate::document::written::tidy;
+use crate::document::written::{matrix, numbers, tidy};
 use crate::finding::Kind;
+use crate::numbers::unit;
 use crate::report::Sigmas;
-
-/// Temperature of a document without channels (°C).
-const ASSUMED_DEG_C: f64 = 20.0;
 
 /// The document with new weights and, where the steps span space, new input axes. What is fitted at `deg_c` of the axes'
 /// temperature is brought to their reference.
-#[must_use]
 pub fn fitted(
     base: &Document,
     gyros: &[Result<GyroRates, Kind>],
@@ -54,39 +48,13 @@ pub fn fitted(
             });
             let slopes = slopes.unwrap_or_default();
             let at_reference = [0, 1, 2].map(|element| axis[element] - slopes[element]);
-            let norm = at_reference.iter().map(|x| x * x).sum::<f64>().sqrt();
-            *row = at_reference.map(|x| tidy(x / norm));
+            *row = unit(at_reference).map(tidy);
         }
     }
     document
 }
 
-/// A document of three gyros along the case axes, of nominal scale: what a fit starts from without another.
-#[must_use]
-pub fn nominal(unit: &str, output: GyroOutput) -> Document {
-    let weight = |wanted: GyroOutput| (output == wanted).then_some(1.0);
-    let sensor = |name: &str| GyroSensor {
-        increment_weight_arcsec_per_count: weight(GyroOutput::Counts),
-        increment_weight_rad_per_rad: weight(GyroOutput::Mean),
-        ..GyroSensor::bare(name)
-    };
-    Document {
-        schema: 1,
-        unit: unit.to_owned(),
-        created: None,
-        note: None,
-        origin: None,
-        auxiliary: Vec::new(),
-        temperature: Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() },
-        gyro: Gyro { output, sensor: AXES.map(sensor).to_vec(), orientation: Orientation::along_case_axes() },
-        accel: None,
-        mode_reversal: None,
-        self_test: None,
-    }
-}
-
 /// Standard errors of weights and axes.
-#[must_use]
 pub fn sigmas(made: &Made) -> Sigmas {
     let mut sigmas = Sigmas::default();
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
@@ -102,7 +70,6 @@ pub fn sigmas(made: &Made) -> Sigmas {
 }
 
 /// What goes into `origin.details`: standard errors, and what a document has no place for.
-#[must_use]
 pub fn details(made: &Made) -> Table {
     let mut table = Table::new();
     if let Some(deg_c) = made.temperature_deg_c() {
@@ -122,8 +89,7 @@ pub fn details(made: &Made) -> Table {
 /// The axes at one temperature, with their standard errors.
 fn of_level(level: &Level) -> Value {
     let rows = |of: &dyn Fn(&GyroRates) -> [f64; 3]| {
-        let row = |found: &GyroRates| Value::Array(of(found).map(|x| tidy(x).into()).to_vec());
-        Value::Array(level.gyros.iter().map(row).collect())
+        Value::Array(level.gyros.iter().map(|found| numbers(&of(found))).collect())
     };
     let mut table = Table::new();
     table.insert("temperature_deg_c".into(), tidy(level.deg_c).into());
@@ -134,8 +100,6 @@ fn of_level(level: &Level) -> Value {
 }
 
 fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {
-    let numbers =
-        |values: &mut dyn Iterator<Item = f64>| Value::Array(values.map(|x| tidy(x).into()).collect());
     let mut table = Table::new();
     table.insert("name".into(), name.into());
     match found {
@@ -155,15 +119,14 @@ fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {
             table.insert("bias_sigma_deg_per_h".into(), tidy(found.bias[1]).into());
             if found.axis.is_some() {
                 let sigmas = found.axis_sigma.map(|sigma| Angle::from_rad(sigma).as_arcsec());
-                table.insert("axis_sigma_arcsec".into(), numbers(&mut sigmas.into_iter()));
+                table.insert("axis_sigma_arcsec".into(), numbers(&sigmas));
             }
-            table.insert("nonlinearity_deg_per_h".into(), numbers(&mut found.left.iter().copied()));
+            table.insert("nonlinearity_deg_per_h".into(), numbers(&found.left));
             if found.chi_square.is_finite() {
                 table.insert("chi_square_per_freedom".into(), tidy(found.chi_square).into());
             }
             table.insert("angle_random_walk_deg_per_sqrt_h".into(), tidy(walk).into());
-            let rows = found.covariance.row_iter().map(|row| numbers(&mut row.iter().copied()));
-            table.insert("covariance".into(), Value::Array(rows.collect()));
+            table.insert("covariance".into(), matrix(&found.covariance));
         }
     }
     table

@@ -4,6 +4,7 @@
 //! constant, and both the turn and the mean of E over it are closed formulas.
 
 use super::bins::Bin;
+use crate::numbers::{dot, norm};
 
 const RAD_PER_DEG: f64 = core::f64::consts::PI / 180.0;
 /// Angle below which a turn is none (rad).
@@ -11,7 +12,6 @@ const NONE_RAD: f64 = 1e-12;
 
 /// Mean of the Earth's rate in case axes over each bin (°/h), from that at the beginning of the run. `turning` gives a
 /// bin's rate in case axes (°/h), relative to the stars.
-#[must_use]
 pub fn carried(bins: &[Bin], start_deg_per_h: [f64; 3], turning: impl Fn(&Bin) -> [f64; 3]) -> Vec<[f64; 3]> {
     // What the gyros show is relative to the stars: the Earth's own turning is in it.
     let relative = |bin: &Bin, earth: [f64; 3]| {
@@ -23,7 +23,6 @@ pub fn carried(bins: &[Bin], start_deg_per_h: [f64; 3], turning: impl Fn(&Bin) -
 
 /// Mean over each bin of any vector that is fixed to the Earth, in its own unit of measure. `turning` gives a bin's rate in case axes
 /// (°/h), relative to the Earth.
-#[must_use]
 pub fn carried_along(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin) -> [f64; 3]) -> Vec<[f64; 3]> {
     means_of(bins, start, |bin, _| turning(bin))
 }
@@ -53,13 +52,13 @@ fn means_of(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin, [f64; 3]) -> [
 
 /// A vector that is fixed to the Earth, in a case that turns for some seconds: at their end, and its mean over them.
 fn turned(vector: [f64; 3], rate_deg_per_h: [f64; 3], seconds: f64) -> ([f64; 3], [f64; 3]) {
-    let size = rate_deg_per_h.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let size = norm(rate_deg_per_h);
     let angle = size / 3600.0 * RAD_PER_DEG * seconds;
     if angle < NONE_RAD {
         return (vector, vector);
     }
     let axis = rate_deg_per_h.map(|x| x / size);
-    let along: f64 = axis.iter().zip(vector).map(|(a, b)| a * b).sum();
+    let along = dot(axis, vector);
     let across = [
         axis[1] * vector[2] - axis[2] * vector[1],
         axis[2] * vector[0] - axis[0] * vector[2],

@@ -1,10 +1,11 @@
 //! Axes of gyros and accelerometers over temperature side by side, as 004 has them: what both do is the case's, what differs a sensor's.
 
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use isotherm_protocol::document::Document;
 
 use super::over_temperature::{Level, OverTemperature};
 use crate::axes::{AXES, main_axis};
+use crate::document::accelerometers;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::report::Sigmas;
 use crate::report::figures::fixed;
@@ -85,61 +86,41 @@ impl Element<'_> {
 pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
     let name = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
     let panel = |element: Element<'_>| {
-        let series = |name: &str, ink, form, points: Vec<(f64, f64)>| Series {
-            name: name.to_owned(),
-            ink,
-            form,
-            samples: Samples::points(points),
-        };
         let all: Vec<(f64, [f64; 2])> =
             over.levels.iter().map(|level| (level.deg_c, element.measured(level))).collect();
         let bars = all.iter().flat_map(|(deg_c, [value, sigma])| {
             [(*deg_c, value - WIDE * sigma), (*deg_c, value + WIDE * sigma), (*deg_c, f64::NAN)]
         });
         let ends = || all.iter().map(|(deg_c, _)| *deg_c);
-        let dots = all.iter().map(|(deg_c, [value, _])| (*deg_c, *value)).collect();
+        let dots = all.iter().map(|(deg_c, [value, _])| (*deg_c, *value));
         let mut content = vec![
-            series("gyro, each temperature", Ink::Raw, Form::Dots, dots),
-            series("95 %", Ink::Faint, Form::Line, bars.collect()),
-            series("gyro", Ink::First, Form::Line, ends().map(|t| (t, element.line_at(t))).collect()),
+            Series::dots("gyro, each temperature", Ink::Raw, dots),
+            Series::line("95 %", Ink::Faint, bars),
+            Series::line("gyro", Ink::First, ends().map(|t| (t, element.line_at(t)))),
         ];
         if let Some(accel) = element.accel {
-            let own = ends().map(|t| (t, accel.at(t))).collect();
-            content.push(series("accelerometer", Ink::Second, Form::Line, own));
+            content.push(Series::line("accelerometer", Ink::Second, ends().map(|t| (t, accel.at(t)))));
             if let Some(sigma) = accel.sigma {
                 let bars = ends().flat_map(|t| {
                     [(t, accel.at(t) - WIDE * sigma), (t, accel.at(t) + WIDE * sigma), (t, f64::NAN)]
                 });
-                content.push(series("95 % of it", Ink::Faint, Form::Line, bars.collect()));
+                content.push(Series::line("95 % of it", Ink::Faint, bars));
             }
-            let apart = ends().map(|t| (t, element.line_at(t) - accel.at(t))).collect();
-            content.push(series("gyro less accelerometer", Ink::Third, Form::Line, apart));
+            let apart = ends().map(|t| (t, element.line_at(t) - accel.at(t)));
+            content.push(Series::line("gyro less accelerometer", Ink::Third, apart));
         }
-        Panel {
-            title: format!("gyro {} along {}", name(element.gyro), AXES[element.along]),
-            unit: "″".to_owned(),
-            height: HEIGHT,
-            logarithmic: false,
-            content: Content::Series(content),
-        }
+        Panel::of(format!("gyro {} along {}", name(element.gyro), AXES[element.along]), "″", HEIGHT, content)
     };
-    Chart {
-        caption: "Elements of C over temperature: gyros, the document's accelerometers, and the difference."
-            .to_owned(),
-        x: Axis::of("temperature", "°C"),
-        panels: elements(over, document).into_iter().map(panel).collect(),
-        marks: Vec::new(),
-    }
+    let caption = "Elements of C over temperature: gyros, the document's accelerometers, and the difference.";
+    let panels = elements(over, document).into_iter().map(panel).collect();
+    Chart::of(caption, Axis::of("temperature", "°C"), panels)
 }
 
 /// The figure's numbers.
 pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
     let elements = elements(over, document);
     let gyro = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
-    let accel = |index: usize| {
-        let sensors = document.accel.as_ref().map(|accel| &accel.sensor);
-        sensors.and_then(|sensors| sensors.get(index)).map_or("", |sensor| sensor.name.as_str())
-    };
+    let accel = |index: usize| accelerometers(document).get(index).map_or("", |sensor| sensor.name.as_str());
     let heads = elements.iter().map(|element| {
         let along = AXES[element.along];
         match element.accel {
@@ -149,7 +130,7 @@ pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
             }
         }
     });
-    let head = std::iter::once("°C".to_owned()).chain(heads).collect();
+    let head = std::iter::once("°C".to_owned()).chain(heads);
     let row = |level: &Level| {
         let cell = |element: &Element<'_>| {
             let [value, sigma] = element.measured(level);
@@ -158,5 +139,5 @@ pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
         };
         std::iter::once(fixed(level.deg_c, 1)).chain(elements.iter().map(cell)).collect()
     };
-    Table { head, rows: over.levels.iter().map(row).collect() }
+    Table::of(head, over.levels.iter().map(row))
 }

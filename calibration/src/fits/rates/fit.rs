@@ -4,24 +4,26 @@ use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
 use super::attitude;
+use super::bins::means_within;
 use super::checks::{no_result, one_way};
 use super::document;
-use super::judge::{errors, verdicts};
 use super::matching::Matched;
 use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
 use super::model::{GyroRates, solve};
 use super::over_temperature::OverTemperature;
 use super::read::{Turned, read, whole_turns};
 use super::steps::Step;
-use crate::axes::main_axis;
+use crate::axes::{AXES, main_axis};
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
+use crate::numbers::hull;
 use crate::report::words::of_logs;
-use crate::report::{FitReport, Verdict};
+use crate::report::{Figure, FitReport, Verdict};
 use crate::robust::median;
 use crate::runs::{Run, Watch};
+use crate::size::Size;
 
 /// Rounds in which the Earth's turning and the fit settle.
 const ROUNDS: usize = 3;
@@ -283,20 +285,17 @@ impl Made {
     }
 
     /// Median of the runs' mean temperatures (°C).
-    #[must_use]
     pub fn temperature_deg_c(&self) -> Option<f64> {
         (!self.temperatures_deg_c.is_empty()).then(|| median(&self.temperatures_deg_c))
     }
 
     /// Lowest and highest mean temperature of a run (°C), in tenths of a degree.
-    #[must_use]
     pub fn range_deg_c(&self) -> Option<[f64; 2]> {
         let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
-        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(widened)
+        hull(ends).map(widened)
     }
 
     /// The report.
-    #[must_use]
     pub fn report(&self) -> FitReport {
         super::report::report(self)
     }
@@ -304,4 +303,53 @@ impl Made {
 
 fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
     row(base, sensor, f64::NAN)
+}
+
+/// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.
+fn errors<W: Watch>(
+    (number, run): (usize, &Run),
+    written: &Written,
+    steps: &mut [Measured],
+    sample: usize,
+    watch: &mut impl FnMut() -> W,
+) -> Result<(), Error> {
+    let windows: Vec<[f64; 2]> = steps
+        .iter()
+        .filter(|step| step.matched.step.run == number)
+        .map(|step| step.matched.plateau.window_s)
+        .collect();
+    let means = means_within(run, &written.loaded, &windows, watch())?;
+    let own = steps.iter_mut().filter(|step| step.matched.step.run == number);
+    for (step, mean) in own.zip(means) {
+        step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
+    }
+    Ok(())
+}
+
+/// Before and after by case axis, of the steps that were fitted and of those that were not, which decide where there are any; the
+/// bias is not what rates are about, so means are taken off.
+fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
+    let of = |steps: &[Measured], axis: usize, sample: usize| -> Vec<f64> {
+        let errors: Vec<f64> = steps.iter().map(|step| step.error[sample][axis]).collect();
+        let mean = Size::of(&errors).mean;
+        errors.iter().map(|error| error - mean).collect()
+    };
+    AXES
+        .iter()
+        .enumerate()
+        .map(|(axis, name)| {
+            let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
+            let outside = (!judged.is_empty()).then(|| both(judged));
+            let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
+            let verdict = verdict.stated_as(Figure::Rms);
+            if verdict.accepted {
+                return verdict;
+            }
+            let grown = format!(
+                "the errors of its steps grow, {}: check the table's axis and rates, and the temperature of all logs",
+                verdict.reason
+            );
+            verdict.refused(grown)
+        })
+        .collect()
 }

@@ -4,6 +4,7 @@ use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
 use crate::finding::Kind;
+use crate::numbers::ends;
 use crate::robust::median;
 
 /// Share of the smallest stated rate below which a plateau is a rest.
@@ -49,10 +50,7 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     }
     let turning: Vec<&Step> = steps.iter().filter(|step| step.rate_deg_per_s != 0.0).collect();
     let fastest = plateaus.iter().map(Plateau::size).fold(0.0, f64::max);
-    let (least, most) = turning
-        .iter()
-        .map(|step| step.rate_deg_per_s.abs())
-        .fold((f64::INFINITY, 0.0_f64), |(least, most), rate| (least.min(rate), most.max(rate)));
+    let [least, most] = ends(turning.iter().map(|step| step.rate_deg_per_s.abs()));
     let limit = REST * least / most * fastest;
     let moving: Vec<&Plateau> = plateaus.iter().filter(|plateau| plateau.size() > limit).collect();
     if turning.is_empty() || moving.len() != turning.len() {

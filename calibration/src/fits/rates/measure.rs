@@ -11,6 +11,7 @@ use super::model::Point;
 use super::read::Turned;
 use crate::fits::modes::document::count_arcsec;
 use crate::lsq::linear::{self, SINGULAR, Weak};
+use crate::numbers::dot;
 
 /// White noise of a gyro from second differences of its bins within steps (°/√h), less what the Earth's turning shows along
 /// its `gain`.
@@ -27,8 +28,7 @@ pub(super) fn white(
         for one in &run.matched {
             let own = |index: usize| {
                 let earth = earth.get(index).copied().unwrap_or_default();
-                let seen: f64 = gain.iter().zip(earth).map(|(a, b)| a * b).sum();
-                run.binned.bins[index].rate[sensor] - seen
+                run.binned.bins[index].rate[sensor] - dot(gain, earth)
             };
             for index in (one.plateau.bins[0] + 1)..one.plateau.bins[1].saturating_sub(1) {
                 let second = own(index - 1) - 2.0 * own(index) + own(index + 1);
@@ -54,7 +54,7 @@ pub(super) fn first_gains(runs: &[Turned], axes: &[[f64; 3]]) -> Vec<f64> {
     axes.iter()
         .enumerate()
         .map(|(sensor, axis)| {
-            let along = |one: &Matched| axis.iter().zip(one.step.axis).map(|(a, b)| a * b).sum::<f64>();
+            let along = |one: &Matched| dot(*axis, one.step.axis);
             let stated = DMatrix::from_fn(steps.len(), 1, |i, _| {
                 3600.0 * steps[i].step.rate_deg_per_s * along(steps[i])
             });

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::finding::Kind;
 use crate::lsq::linear::{self, Linear, Weak};
+use crate::numbers::{dot, norm, real};
 
 /// Smallest share of the largest singular value that carries information: steps are hardly exact to more digits.
 const SINGULAR: f64 = 1e-7;
@@ -61,7 +62,7 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     if rank == 0 {
         return Err(Kind::NothingTurns);
     }
-    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+
     let spans = rank == 3;
     // Where the steps do not span space the axis is that of the document, and its length alone is fitted.
     let columns = |point: &Point| {
@@ -69,7 +70,7 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     };
     let along = |point: &Point| dot(old, point.rate);
     let most = points.iter().map(|point| along(point).abs()).fold(0.0, f64::max);
-    let total = points.iter().map(|point| dot(point.rate, point.rate).sqrt()).fold(0.0, f64::max);
+    let total = points.iter().map(|point| norm(point.rate)).fold(0.0, f64::max);
     if most < 0.1 * total {
         return Err(Kind::Across);
     }
@@ -96,9 +97,8 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     let found = wide.or_else(narrow).ok_or(Kind::FewSteps { steps: points.len() })?;
     let Linear { coefficients: beta, inverse: mut covariance, residual: left, .. } = found;
     let freedom = points.len() - beta.len();
-    #[expect(clippy::cast_precision_loss, reason = "few steps")]
     let (chi_square, limit) = if freedom > 0 {
-        let freedom = freedom as f64;
+        let freedom = real(freedom);
         (left.norm_squared() / freedom, 1.0 + ALLOWED * (2.0 / freedom).sqrt())
     } else {
         (f64::NAN, f64::INFINITY)
@@ -111,7 +111,7 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     let (gain, gain_sigma, axis, axis_sigma) = if spans {
         let h = [beta[0], beta[1], beta[2]];
         let sign = if dot(h, old) < 0.0 { -1.0 } else { 1.0 };
-        let gain = sign * dot(h, h).sqrt();
+        let gain = sign * norm(h);
         let axis = h.map(|x| x / gain);
         let of = |direction: [f64; 3]| {
             let d = DVector::from_column_slice(&direction);

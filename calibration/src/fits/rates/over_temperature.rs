@@ -18,6 +18,7 @@ use crate::fits::positions::model::Guess;
 use crate::fits::positions::temperature::{levels, reference};
 use crate::fits::thermal::scale::{Holds, put};
 use crate::lsq::linear::{self, Weak};
+use crate::numbers::{dot, ends, mean, norm, once_each, real};
 
 /// Smallest share of the largest singular value of a line.
 const SINGULAR: f64 = 1e-9;
@@ -76,18 +77,7 @@ fn channels(base: &Document) -> Vec<String> {
     if let Some(thermal) = &base.gyro.orientation.thermal {
         return thermal.channels.clone();
     }
-    let mut channels: Vec<String> = Vec::new();
-    for channel in base.gyro.sensor.iter().filter_map(|sensor| sensor.channel.as_ref()) {
-        if !channels.contains(channel) {
-            channels.push(channel.clone());
-        }
-    }
-    channels
-}
-
-#[expect(clippy::cast_precision_loss, reason = "some channels, some runs")]
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+    once_each(base.gyro.sensor.iter().filter_map(|sensor| sensor.channel.clone()))
 }
 
 impl OverTemperature {
@@ -159,7 +149,7 @@ impl OverTemperature {
             let turned = line.slope.map(|slope| slope * away);
             of_one(wanted, runs, run, sensor, walk).into_iter().map(move |point| {
                 // A larger scale factor shows as a smaller gain.
-                let by_axis: f64 = turned.iter().zip(point.rate).map(|(c, rate)| c * rate).sum();
+                let by_axis = dot(turned, point.rate);
                 Point { shown: point.shown * scale - line.gain * by_axis, ..point }
             })
         };
@@ -168,12 +158,7 @@ impl OverTemperature {
 
     /// Puts slopes of axes and scale factors into a document that has what holds at the reference. Gyros that were refused keep theirs.
     pub(super) fn put(&self, document: &mut Document, gyros: &[Result<GyroRates, Kind>]) {
-        let ends = |of: &dyn Fn(&Level) -> f64| {
-            self.levels
-                .iter()
-                .map(of)
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)])
-        };
+        let ends = |of: &dyn Fn(&Level) -> f64| ends(self.levels.iter().map(of));
         let room = |[low, high]: [f64; 2]| [(low - ROOM_DEG_C).floor(), (high + ROOM_DEG_C).ceil()];
         let old = document.gyro.orientation.thermal.take();
         let slopes = (0..self.lines.len()).map(|sensor| {
@@ -243,7 +228,7 @@ fn line(levels: &[Level], sensor: usize, reference_deg_c: f64) -> Option<Line> {
     let of = |level: &Level| level.gyros[sensor].clone();
     let first = of(levels.first()?).axis?;
     let across = Guess::across_of(first);
-    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+
     let away: Vec<f64> = levels.iter().map(|level| level.deg_c - reference_deg_c).collect();
     let (mut axis, mut slope, mut variance) = (first, [0.0; 3], [0.0; 3]);
     let mut chi_square = 0.0;
@@ -264,7 +249,7 @@ fn line(levels: &[Level], sensor: usize, reference_deg_c: f64) -> Option<Line> {
             variance[i] += covariance[(1, 1)] * direction[i] * direction[i];
         }
     }
-    let length = dot(axis, axis).sqrt();
+    let length = norm(axis);
     let own: Vec<f64> = levels.iter().map(|level| level.own_deg_c[sensor] - reference_deg_c).collect();
     let inverse: Vec<f64> = levels.iter().map(|level| 1.0 / of(level).gain[0]).collect();
     let sigma: Vec<f64> = levels
@@ -276,8 +261,7 @@ fn line(levels: &[Level], sensor: usize, reference_deg_c: f64) -> Option<Line> {
         .collect();
     let (scale, covariance, _) = polynomial(&own, &inverse, &sigma, HIGHEST.min(levels.len() - 1))?;
     let at_reference = scale[0];
-    #[expect(clippy::cast_precision_loss, reason = "some temperatures")]
-    let degrees = 2.0 * (levels.len() as f64 - 2.0);
+    let degrees = 2.0 * (real(levels.len()) - 2.0);
     let powers = 1..scale.len();
     Some(Line {
         axis: axis.map(|c| c / length),

@@ -1,6 +1,7 @@
 //! Where the table turned steadily: runs of bins between which no gyro changes by more than noise.
 
 use super::bins::Bin;
+use crate::numbers::norm;
 use crate::robust::scatter_of_steps;
 
 /// Standard deviations, and share of the rate, by which two neighbouring bins may differ.
@@ -26,14 +27,12 @@ pub struct Plateau {
 
 impl Plateau {
     /// Length of what the gyros show in it (°/h).
-    #[must_use]
     pub fn size(&self) -> f64 {
-        self.rate.iter().map(|x| x * x).sum::<f64>().sqrt()
+        norm(self.rate.iter().copied())
     }
 }
 
 /// Standard deviation of a bin's rate by gyro (°/h), from the differences of neighbours; most of a run is steady.
-#[must_use]
 pub fn scatter(bins: &[Bin]) -> Vec<f64> {
     let sensors = bins.first().map_or(0, |bin| bin.rate.len());
     (0..sensors)
@@ -42,11 +41,10 @@ pub fn scatter(bins: &[Bin]) -> Vec<f64> {
 }
 
 /// The plateaus of a run; `count_deg_per_h` is what one count in a bin makes of each gyro's rate.
-#[must_use]
 pub fn find(bins: &[Bin], count_deg_per_h: &[f64]) -> Vec<Plateau> {
     let sigma: Vec<f64> =
         scatter(bins).iter().zip(count_deg_per_h).map(|(sigma, count)| sigma.max(0.3 * count)).collect();
-    let size = |rate: &[f64]| rate.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let size = |rate: &[f64]| norm(rate.iter().copied());
     let near = |a: &[f64], b: &[f64], share: f64| {
         let slack = share * size(a).max(size(b));
         a.iter().zip(b).zip(&sigma).all(|((a, b), sigma)| (a - b).abs() <= slack + SIGMAS * sigma)
@@ -81,7 +79,6 @@ fn cut(bins: &[Bin], begin: usize, end: usize) -> Option<Plateau> {
 }
 
 /// The bins that lie within a window.
-#[must_use]
 pub fn within(bins: &[Bin], [from_s, to_s]: [f64; 2]) -> Option<Plateau> {
     const ROUNDING_S: f64 = 1e-6;
     let begin = bins.iter().position(|bin| bin.begin_s >= from_s - ROUNDING_S)?;
@@ -96,7 +93,6 @@ fn behind(bin: &Bin) -> f64 {
 }
 
 /// Mean rates over some bins, by their good time.
-#[must_use]
 pub fn mean(bins: &[Bin]) -> Vec<f64> {
     let sensors = bins.first().map_or(0, |bin| bin.rate.len());
     let good: f64 = bins.iter().filter(|bin| bin.good_s > 0.0).map(|bin| bin.good_s).sum();

@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::count_arcsec;
 use crate::fits::modes::model::deg_per_h;
+use crate::numbers::real;
 use crate::runs::{Run, Watch};
 
 /// Share of a step's ticks that may be lost.
@@ -87,10 +88,9 @@ pub(super) fn read<W: Watch>(
 }
 
 /// Share of the bins in which ticks are missing, where it is more than a twentieth: no steady stretch is long enough then.
-#[expect(clippy::cast_precision_loss, reason = "bins of a run")]
 fn gaps(bins: &[Bin]) -> Option<f64> {
     let broken = bins.iter().filter(|bin| bin.broken || bin.good_s < (1.0 - LOST) * bin.length_s).count();
-    let share = broken as f64 / bins.len().max(1) as f64;
+    let share = real(broken) / real(bins.len().max(1));
     (share > LOST).then_some(share)
 }
 

@@ -1,7 +1,7 @@
 //! The report of the rates.
 
 use isotherm_correction::units::Angle;
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 
 use super::figure;
 use super::fit::{Made, Measured};
@@ -9,6 +9,7 @@ use super::model::GyroRates;
 use super::over_temperature::OverTemperature;
 use crate::axes::{AXES, main_axis};
 use crate::finding::Kind;
+use crate::numbers::dot;
 use crate::report::figures::{counted, fixed, per_deg_c, short};
 use crate::report::words::{gyros, together};
 use crate::report::{Coefficient, FitReport};
@@ -137,7 +138,7 @@ fn judged(made: &Made) -> Table {
         row.extend(step.error.iter().flatten().map(|error| short(*error)));
         row
     };
-    Table { head: head.map(str::to_owned).to_vec(), rows: made.judged.iter().map(row).collect() }
+    Table::of(head, made.judged.iter().map(row))
 }
 
 fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {
@@ -210,9 +211,7 @@ fn widened(made: &Made) -> Option<String> {
 fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
     let axis =
         found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
-    let input = |step: usize| -> f64 {
-        made.steps.get(step).map_or(0.0, |step| step.rate.iter().zip(axis).map(|(a, b)| a * b).sum())
-    };
+    let input = |step: usize| -> f64 { made.steps.get(step).map_or(0.0, |step| dot(step.rate, axis)) };
     let full = (0..made.steps.len()).map(|step| input(step).abs()).fold(0.0, f64::max);
     let mut rows = Vec::new();
     let mut worst = 0.0_f64;
@@ -235,9 +234,7 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
     }
     let head =
         ["log", "window, s", "table, °/s", "input, °/s", "left, °/h", "ppm of input", "ppm of full scale"];
-    report
-        .tables
-        .push((format!("Linearity of gyro {name}"), Table { head: head.map(str::to_owned).to_vec(), rows }));
+    report.tables.push((format!("Linearity of gyro {name}"), Table::of(head, rows)));
     let chi = if found.chi_square.is_finite() {
         format!("χ² {:.2} per degree of freedom", found.chi_square)
     } else {
@@ -262,28 +259,14 @@ fn chart(made: &Made) -> Chart {
         let found = found.as_ref().ok()?;
         let sensor = made.written.document.gyro.sensor.get(index)?;
         let axis = made.written.document.gyro.orientation.rows.get(index)?;
-        let input = |rate: &[f64; 3]| rate.iter().zip(axis).map(|(a, b)| a * b).sum::<f64>() / 3600.0;
+        let input = |rate: &[f64; 3]| dot(*rate, *axis) / 3600.0;
         let mut points: Vec<(f64, f64)> =
             made.steps.iter().zip(&found.left).map(|(step, left)| (input(&step.rate), *left)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let series = Series {
-            name: "left".to_owned(),
-            ink: Ink::First,
-            form: Form::Dots,
-            samples: Samples::points(points),
-        };
-        Some(Panel {
-            title: format!("gyro {}", sensor.name),
-            unit: "°/h".to_owned(),
-            height: HEIGHT,
-            logarithmic: false,
-            content: Content::Series(vec![series]),
-        })
+        let series = Series::dots("left", Ink::First, points);
+        Some(Panel::of(format!("gyro {}", sensor.name), "°/h", HEIGHT, vec![series]))
     };
-    Chart {
-        caption: "Residual of each step from the straight line, over the input rate.".to_owned(),
-        x: Axis::of("input rate", "°/s"),
-        panels: made.gyros.iter().enumerate().filter_map(panel).collect(),
-        marks: Vec::new(),
-    }
+    let caption = "Residual of each step from the straight line, over the input rate.";
+    let panels = made.gyros.iter().enumerate().filter_map(panel).collect();
+    Chart::of(caption, Axis::of("input rate", "°/s"), panels)
 }

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::error::Error;
+use crate::numbers::norm;
 use crate::report::figures::counted;
 
 /// Fastest table (°/s).
@@ -79,8 +80,8 @@ pub fn axis(text: &str) -> Result<[f64; 3], String> {
 }
 
 fn unit(axis: [f64; 3]) -> Option<[f64; 3]> {
-    let norm = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-    (norm.is_finite() && norm > 0.0).then(|| axis.map(|x| x / norm))
+    let size = norm(axis);
+    (size.is_finite() && size > 0.0).then(|| axis.map(|x| x / size))
 }
 
 /// Steps by lists of rates: run k turns about axis k. Both rates and runs are those of the fit, then those that it is judged on.

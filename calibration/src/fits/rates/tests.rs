@@ -6,16 +6,16 @@ use isotherm_cli::Exit;
 use isotherm_correction::earth::Place;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Document, GyroOutput};
+use isotherm_protocol::document::{Document, GyroOutput, Temperature};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path;
 use isotherm_simulator::presets::mems_chamber;
 use isotherm_simulator::{Scenario, Simulation};
 
-use super::document::nominal;
 use super::fit::{Made, Wanted, make};
 use super::steps::{Step, listed};
+use crate::document::plain::plain;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::runs::Run;
@@ -88,7 +88,8 @@ fn run_of(
 const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 fn base() -> Document {
-    nominal("MEMS-0001", GyroOutput::Mean)
+    let temperature = Temperature { assumed_deg_c: 20.0, filter: None, channel: Vec::new() };
+    plain("MEMS-0001", GyroOutput::Mean, temperature, None)
 }
 
 fn place() -> Vec<Place> {

@@ -3,12 +3,12 @@
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{
-    Accel, AccelOutput, AccelSensor, Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor,
-    Orientation, Shape, Temperature,
+    AccelOutput, Channel, Document, Filter, GyroOutput, Orientation, Temperature,
 };
 
 use super::checks::median_step_s;
 use crate::axes::AXES;
+use crate::document::plain::{follows, plain};
 use crate::error::Error;
 use crate::runs::{self, series::Series};
 
@@ -23,7 +23,6 @@ const DEG_C: [f64; 2] = [-100.0, 200.0];
 
 /// The document without what the fit finds: static and thermal terms of the gyros, bias and lags of the accelerometers.
 /// Scale, axes, mode and magnetic terms stay.
-#[must_use]
 pub fn bare(document: &Document) -> Document {
     let mut document = document.clone();
     for sensor in &mut document.gyro.sensor {
@@ -39,7 +38,6 @@ pub fn bare(document: &Document) -> Document {
 
 /// The document with sensors along the case axes by threes, some of them turned round, so that what comes out along an axis is
 /// the mean of its sensors. Pattern 0 turns none; pattern p turns the sensors 3·p to 3·p + 2.
-#[must_use]
 pub fn along_axes(document: &Document, pattern: usize) -> Document {
     let mut document = document.clone();
     let rows = |count: usize| {
@@ -96,17 +94,19 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
-    let names: Vec<&String> = series.temperatures.keys().collect();
-    let channel_of = |kind: &str, index: usize| -> Option<String> {
-        let own = format!("{kind}{index}");
-        match names.as_slice() {
-            [only] => Some((*only).clone()),
-            _ => names.iter().find(|name| ***name == own).map(|name| (*name).clone()),
-        }
+    let channel = |(name, readings): (&String, &runs::series::Channel)| Channel {
+        name: name.clone(),
+        conversion_deg_c: vec![0.0, 1.0],
+        range_deg_c: DEG_C,
+        spike_limit_deg_c: spike_limit(&readings.raw),
     };
-    if names.is_empty() || (0..3).any(|index| channel_of("gyro", index).is_none()) {
-        let list = names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
-        return Err(Error::Refused(vec![if names.is_empty() {
+    let mut channels: Vec<Channel> = series.temperatures.iter().map(channel).collect();
+    let of = |kind: &str| -> Option<Vec<String>> {
+        (0..AXES.len()).map(|index| follows(&channels, kind, index)).collect()
+    };
+    let Some(gyros) = of("gyro") else {
+        let list = series.temperatures.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        return Err(Error::refused(if list.is_empty() {
             "the log has no temperature: a thermal fit needs at least one channel; name it in the mapping"
                 .to_owned()
         } else {
@@ -114,70 +114,19 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
                 "the names of the temperature channels ({list}) do not tell which gyro follows which: name them \
                  gyro0, gyro1, gyro2 (and accel0 …) in the mapping, or give a document (--calibration)"
             )
-        }]));
-    }
-    let has_accel = !series.accels.is_empty() && (0..3).all(|index| channel_of("accel", index).is_some());
-    Ok(document(series, &channel_of, has_accel))
-}
-
-fn document(
-    series: &Series,
-    channel_of: &dyn Fn(&str, usize) -> Option<String>,
-    has_accel: bool,
-) -> Document {
-    let gyro = |(index, name): (usize, &&str)| GyroSensor {
-        channel: channel_of("gyro", index),
-        increment_weight_rad_per_rad: Some(1.0),
-        ..GyroSensor::bare(name)
+        }));
     };
-    let accel = |(index, name): (usize, &&str)| AccelSensor {
-        channel: channel_of("accel", index),
-        ..AccelSensor::bare(
-            name,
-            Curve::new(Shape::Constant { value: 1.0 })
-                .in_unit(AccelOutput::MetresPerSecondSquared.scale_unit()),
-        )
-    };
-    let mut used: Vec<String> = (0..3).filter_map(|index| channel_of("gyro", index)).collect();
-    if has_accel {
-        used.extend((0..3).filter_map(|index| channel_of("accel", index)));
-    }
-    let channels = series.temperatures.iter().filter(|(name, _)| used.contains(name));
-    let channels: Vec<Channel> = channels
-        .map(|(name, readings)| Channel {
-            name: name.clone(),
-            conversion_deg_c: vec![0.0, 1.0],
-            range_deg_c: DEG_C,
-            spike_limit_deg_c: spike_limit(&readings.raw),
-        })
-        .collect();
+    let accels = of("accel").filter(|_| !series.accels.is_empty());
+    let accel = accels.is_some().then_some(AccelOutput::MetresPerSecondSquared);
+    let used: Vec<String> = gyros.into_iter().chain(accels.into_iter().flatten()).collect();
+    channels.retain(|channel| used.contains(&channel.name));
     let step =
         series.temperatures.values().map(|channel| median_step_s(&channel.time_ns)).fold(0.0, f64::max);
-    Document {
-        schema: isotherm_protocol::document::CURRENT_SCHEMA,
-        unit: series.unit.to_string(),
-        created: None,
-        note: None,
-        origin: None,
-        auxiliary: Vec::new(),
-        temperature: Temperature { assumed_deg_c: 25.0, filter: Some(filter(step)), channel: channels },
-        gyro: Gyro {
-            output: GyroOutput::Mean,
-            sensor: AXES.iter().enumerate().map(gyro).collect(),
-            orientation: Orientation::along_case_axes(),
-        },
-        accel: has_accel.then(|| Accel {
-            output: AccelOutput::MetresPerSecondSquared,
-            sensor: AXES.iter().enumerate().map(accel).collect(),
-            orientation: Orientation::along_case_axes(),
-        }),
-        mode_reversal: None,
-        self_test: None,
-    }
+    let temperature = Temperature { assumed_deg_c: 25.0, filter: Some(filter(step)), channel: channels };
+    Ok(plain(series.unit.as_str(), GyroOutput::Mean, temperature, accel))
 }
 
 /// A filter for readings that come every so many seconds.
-#[must_use]
 pub fn filter(step_s: f64) -> Filter {
     // Readings about a second apart belong on a grid of a second; lags need some points between those that come seldom.
     let own_s = if step_s > FINEST_GRID { step_s / FINEST_GRID } else { step_s };

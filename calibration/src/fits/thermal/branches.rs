@@ -1,5 +1,6 @@
 //! Plateaus, ramps between turning points, and the pieces that cross-validation leaves out.
 
+use crate::numbers::{ends, real};
 use crate::robust::median;
 
 /// Share of the range of temperature by which a turning point must stand out.
@@ -53,11 +54,9 @@ pub struct History {
 
 impl History {
     /// Of runs one after the other: each run's windows with their temperatures (°C).
-    #[must_use]
     pub fn of(runs: &[(&[f64], f64)]) -> Self {
-        let all = || runs.iter().flat_map(|(t, _)| t.iter().copied()).filter(|t| t.is_finite());
-        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
-        let mut history = Self { range_deg_c: [low, high], ..Self::default() };
+        let all = runs.iter().flat_map(|(t, _)| t.iter().copied()).filter(|t| t.is_finite());
+        let mut history = Self { range_deg_c: ends(all), ..Self::default() };
         let slopes: Vec<Vec<f64>> = runs.iter().map(|(t, window)| slopes(t, *window)).collect();
         let mut sizes: Vec<f64> =
             slopes.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()).collect();
@@ -84,8 +83,7 @@ impl History {
             while to < temperature.len() && self.at_rest[first + to] == rest {
                 to += 1;
             }
-            #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-            let (count, length_s) = ((to - from) as f64, (to - from) as f64 * window_s);
+            let (count, length_s) = (real(to - from), real(to - from) * window_s);
             if rest && length_s >= PLATEAU_S {
                 let deg_c = temperature[from..to].iter().sum::<f64>() / count;
                 self.plateaus.push(Plateau { deg_c, length_s });
@@ -103,17 +101,15 @@ impl History {
             let part = &temperature[from..to];
             // Before the first reading there is no temperature.
             let known = || part.iter().copied().filter(|t| t.is_finite());
-            let (low, high) =
-                known().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+            let [low, high] = ends(known());
             for &t in part {
                 #[expect(
                     clippy::cast_possible_truncation,
                     clippy::cast_sign_loss,
-                    clippy::cast_precision_loss,
                     reason = "a share of a few"
                 )]
-                let third = ((t - low) / (high - low).max(1e-9) * PIECES as f64)
-                    .clamp(0.0, PIECES as f64 - 1.0) as usize;
+                let third = ((t - low) / (high - low).max(1e-9) * real(PIECES)).clamp(0.0, real(PIECES) - 1.0)
+                    as usize;
                 self.piece.push(piece + third);
                 self.ramp.push(index);
             }
@@ -125,7 +121,6 @@ impl History {
     }
 
     /// Number of plateaus whose temperatures differ by a tenth of the range and more.
-    #[must_use]
     pub fn levels(&self) -> usize {
         let apart = (STANDS_OUT * (self.range_deg_c[1] - self.range_deg_c[0])).max(0.5);
         let mut levels: Vec<f64> = Vec::new();
@@ -138,7 +133,6 @@ impl History {
     }
 
     /// Whether there are ramps upwards and downwards that cross a good part of the range.
-    #[must_use]
     pub fn both_directions(&self) -> bool {
         let span = 0.2 * (self.range_deg_c[1] - self.range_deg_c[0]);
         let moves = |sign: f64| {
@@ -149,13 +143,11 @@ impl History {
 
     /// Whether the log can tell several lags, and gains that follow temperature, from the static bias: by what stands still at
     /// two levels, or by a third pass. Two passes alone fit any hysteresis with them, and the next run none.
-    #[must_use]
     pub fn tells_dynamics(&self) -> bool {
         self.levels() >= 2 || self.passes() >= 3
     }
 
     /// How often the middle temperatures were crossed: the median over the range.
-    #[must_use]
     pub fn passes(&self) -> usize {
         let [low, high] = self.range_deg_c;
         let counts: Vec<f64> = (1..10)
@@ -165,9 +157,7 @@ impl History {
                     let [a, b] = ramp.from_to_deg_c;
                     (a.min(b)..=a.max(b)).contains(&at)
                 });
-                #[expect(clippy::cast_precision_loss, reason = "ramps of a run")]
-                let count = crossed.count() as f64;
-                count
+                real(crossed.count())
             })
             .collect();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
@@ -181,8 +171,7 @@ fn slopes(temperature: &[f64], window_s: f64) -> Vec<f64> {
     let last = temperature.len().saturating_sub(1);
     let slope = |at: usize| {
         let (from, to) = (at.saturating_sub(REACH), (at + REACH).min(last));
-        #[expect(clippy::cast_precision_loss, reason = "a few windows")]
-        let over = (to - from).max(1) as f64 * window_s;
+        let over = real((to - from).max(1)) * window_s;
         (temperature[to] - temperature[from]) / over
     };
     (0..temperature.len()).map(slope).collect()

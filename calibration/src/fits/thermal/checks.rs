@@ -8,6 +8,7 @@ use super::samples::Samples;
 use super::stand::Stand;
 use crate::axes::sensor_name;
 use crate::fits::drift::pieces::checks::moves;
+use crate::numbers::{dot, ends, norm, real, seconds};
 use crate::report::Rest;
 use crate::report::figures::{counted, short};
 use crate::robust::{median, median_if_any};
@@ -46,16 +47,12 @@ pub struct Findings {
 }
 
 /// Median distance of times (s).
-#[must_use]
 pub fn median_step_s(times_ns: &[i64]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
-    let steps: Vec<f64> =
-        times_ns.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * 1e-9).collect();
+    let steps: Vec<f64> = times_ns.windows(2).map(|pair| seconds(pair[1].saturating_sub(pair[0]))).collect();
     median(&steps)
 }
 
 /// Looks at the raw readings of a run.
-#[must_use]
 pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
     let mut found = Findings::default();
     for (gyro, kind, ticks) in [(true, "gyro", &series.gyros), (false, "accelerometer", &series.accels)] {
@@ -90,7 +87,6 @@ pub fn raw(name: &str, series: &Series, stand: &Stand) -> Findings {
 }
 
 /// What is wrong with the readings of a run that judges: it is said, and what can be judged is.
-#[must_use]
 pub fn judging(name: &str, series: &Series, stand: &Stand) -> Vec<String> {
     let Findings { mut refusals, warnings, dead } = raw(name, series, stand);
     refusals.extend(warnings);
@@ -101,10 +97,9 @@ pub fn judging(name: &str, series: &Series, stand: &Stand) -> Vec<String> {
     refusals
 }
 
-#[expect(clippy::cast_precision_loss, reason = "readings of a log are far below 2⁵³")]
 fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usize), readings: &[f64]) {
     let bad = faults::missing(readings);
-    let share = bad as f64 / readings.len().max(1) as f64;
+    let share = real(bad) / real(readings.len().max(1));
     if share > 0.5 {
         let why = format!(
             "{name}: {of}: {:.0} % of its readings are not numbers: check the sensor, and the column in the mapping",
@@ -130,9 +125,7 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let (mut count, mut longest, mut at) = (0, 0.0, 0.0);
     let first = ticks.end_ns.first().copied().unwrap_or_default();
     for pair in ticks.end_ns.windows(2) {
-        #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
-        let (gap, since) =
-            (pair[1].saturating_sub(pair[0]) as f64 * 1e-9, pair[0].saturating_sub(first) as f64 * 1e-9);
+        let (gap, since) = (seconds(pair[1].saturating_sub(pair[0])), seconds(pair[0].saturating_sub(first)));
         if gap > 3.0 * step {
             count += 1;
             missing += gap - step;
@@ -141,8 +134,7 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
             }
         }
     }
-    #[expect(clippy::cast_precision_loss, reason = "steps of a log")]
-    let whole = ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first) as f64 * 1e-9;
+    let whole = seconds(ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first));
     if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
         found.warnings.push(format!(
             "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags \
@@ -190,8 +182,7 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
         ));
     }
     // A temperature moves slowly: from reading to reading it changes by a small share of what it does over the run.
-    let (low, high) =
-        good.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+    let [low, high] = ends(good.iter().copied());
     let steps: Vec<f64> = good.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let usual = median(&steps);
     if usual > 0.5 && usual > 0.05 * (high - low) {
@@ -204,14 +195,13 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
 }
 
 /// Whether a run on a rate table turns as it was stated, all the time; why not, and what to do.
-#[must_use]
 pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<String> {
     let turning = stand.turning.as_ref()?;
     let stated = turning.rate_deg_per_h();
     let allowed = (TABLE_SHARE * turning.rate_deg_per_s.abs() + TABLE_DEG_PER_S) * 3600.0;
     let mut off: Vec<usize> = Vec::new();
     for (index, (shown, row)) in samples.gyros.iter().zip(&document.gyro.orientation.rows).enumerate() {
-        let along: f64 = row.iter().zip(stated).map(|(r, s)| r * s).sum();
+        let along = dot(*row, stated);
         let away: Vec<usize> =
             (0..shown.len()).filter(|&window| (shown[window] - along).abs() > allowed).collect();
         if 2 * away.len() > shown.len() {
@@ -239,14 +229,13 @@ pub fn turning(samples: &Samples, document: &Document, stand: &Stand) -> Option<
 }
 
 /// Whether a run at rest stands as was stated: columns that look swapped, and gravity that is somewhere else.
-#[must_use]
 pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &Stand)) -> Findings {
     let mut found = Findings::default();
     if stand.turning.is_some() {
         return found;
     }
     let along = |rows: &[[f64; 3]], vector: [f64; 3]| -> Option<[f64; 3]> {
-        let along = |row: &[f64; 3]| row.iter().zip(vector).map(|(r, v)| r * v).sum();
+        let along = |row: &[f64; 3]| dot(*row, vector);
         <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
     };
     let sizes = |columns: &[Vec<f64>]| -> Option<[Size; 3]> {
@@ -277,7 +266,7 @@ fn turned(samples: &Samples) -> Option<String> {
         }
         Some(force)
     };
-    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+
     let turn = |at: usize| {
         let (before, after) = (middle(at.checked_sub(BESIDE)?..at)?, middle(at + 1..at + 1 + BESIDE)?);
         let cosine = dot(before, after) / (dot(before, before) * dot(after, after)).sqrt();
@@ -296,7 +285,6 @@ fn turned(samples: &Samples) -> Option<String> {
 }
 
 /// Looks at a run that went through the corrector: the accelerometers must feel about one g.
-#[must_use]
 pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
     let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
     let mut found = Findings { warnings, ..Findings::default() };
@@ -306,7 +294,7 @@ pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)
         found.refusals.extend(turned(samples));
         let forces: Option<Vec<f64>> = samples.forces.iter().map(|values| median_if_any(values)).collect();
         if let Some(forces) = forces {
-            let size = forces.iter().map(|f| f * f).sum::<f64>().sqrt();
+            let size = norm(forces);
             let share = size / STANDARD_GRAVITY_M_PER_S2;
             if !(GRAVITY[0]..=GRAVITY[1]).contains(&share) {
                 let guess = if (0.9..1.1).contains(&size) {

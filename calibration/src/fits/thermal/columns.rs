@@ -24,6 +24,7 @@ use isotherm_protocol::document::{
 use super::samples::Samples;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::{real, seconds};
 
 /// Which thermal branches a term acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,17 +53,14 @@ pub enum Term {
 }
 
 /// Time constant in the form that terms are told apart by.
-#[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0.001 to 1e7 s")]
 pub fn millis(tau_s: f64) -> u64 {
     libm::round(tau_s * 1e3).clamp(1.0, 1e10) as u64
 }
 
 /// Time constant (s) of a lag term.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "at most 1e10")]
-pub fn seconds(millis: u64) -> f64 {
-    millis as f64 / 1e3
+pub fn tau_s(millis: u64) -> f64 {
+    real(millis) / 1e3
 }
 
 /// Channel, filter and the range of what follows them: what columns are made with.
@@ -91,6 +89,11 @@ impl Basis {
     pub(super) fn power(&self, power: usize, value: f64) -> Curve {
         let mut coefficients = vec![0.0; power + 1];
         coefficients[power] = value;
+        self.curve(coefficients)
+    }
+
+    /// A polynomial over its range.
+    pub(super) fn curve(&self, coefficients: Vec<f64>) -> Curve {
         let (reference, range) = (self.reference_deg_c, self.range_deg_c);
         Curve::new(Shape::Polynomial { reference, coefficients, range })
     }
@@ -117,7 +120,7 @@ impl Basis {
                 }
                 Term::Lag(tau, power) => {
                     let gain = self.power(power, 1.0);
-                    gyro.put(StatedTerm::with_parameter(Feature::Lag, seconds(tau), gain));
+                    gyro.put(StatedTerm::with_parameter(Feature::Lag, tau_s(tau), gain));
                 }
             }
             gyro
@@ -219,8 +222,7 @@ impl<'a> Windows<'a> {
     }
 
     fn take(&mut self, seen: &Observation, length_s: f64) {
-        #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
-        let middle = seen.end_time.as_ns().saturating_sub(self.run.start_ns) as f64 * 1e-9 - 0.5 * length_s;
+        let middle = seconds(seen.end_time.as_ns().saturating_sub(self.run.start_ns)) - 0.5 * length_s;
         self.known |= seen.gyros.iter().all(|gyro| !gyro.flags.contains(SensorFlags::STALE_TEMPERATURE));
         let half = 0.5 * self.run.window_s;
         while self.run.time_s.get(self.at).is_some_and(|window| window + half < middle) {
@@ -253,13 +255,11 @@ impl<'a> Windows<'a> {
 
 impl<'a> Columns<'a> {
     /// Columns over the windows of runs.
-    #[must_use]
     pub fn new(basis: Basis, runs: &'a [Samples]) -> Self {
         Self { basis, runs, known: BTreeMap::new() }
     }
 
     /// What they are made with.
-    #[must_use]
     pub fn basis(&self) -> &Basis {
         &self.basis
     }
@@ -290,7 +290,6 @@ impl<'a> Columns<'a> {
     }
 
     /// The column of a term that was made.
-    #[must_use]
     pub fn get(&self, term: Term) -> &[f64] {
         self.known.get(&term).map_or(&[], Vec::as_slice)
     }

@@ -9,12 +9,14 @@ use super::columns::Term;
 use super::outcome::{Outcome, axis_of};
 use super::stand::Stand;
 use crate::axes::output_name;
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::report::{Curve, Rest};
 use crate::robust::scatter_of_steps;
-use crate::runs::table::{Rows as Windows, Table, Takes};
+use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
 
 /// Axes: gyros, then accelerometers.
@@ -128,7 +130,7 @@ impl Compared {
             rows.push(row);
         }
         let head = ["", "white noise", "from the thermometer"].into_iter().chain(HEAD);
-        Rows { head: head.map(str::to_owned).collect(), rows }
+        Rows::of(head, rows)
     }
 }
 
@@ -160,8 +162,7 @@ impl Outcome {
 
     /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
     pub(super) fn take_simpler(&mut self, compared: &Compared) -> bool {
-        let sensors =
-            [self.base.accel.as_ref().map_or(0, |accel| accel.sensor.len()), self.base.gyro.sensor.len()];
+        let sensors = [accelerometers(&self.base).len(), self.base.gyro.sensor.len()];
         let mut changed = false;
         for (sensor, _, found) in &mut self.found {
             // Of more than three sensors none stands for an axis.
@@ -188,9 +189,7 @@ impl Outcome {
 
 impl Stage<'_> {
     fn tables(&self, loaded: &[Loaded], watch: impl Watch) -> Result<Vec<Table>, Error> {
-        let rows = Windows { length_s: self.window_s, takes: Takes::Valid };
-        let tables = Table::together(self.run, loaded, rows, watch)?;
-        Ok(tables.into_iter().map(|table| table.whole(0.999)).collect())
+        Table::together(self.run, loaded, Windows::valid(self.window_s), watch)
     }
 
     /// On a table the accelerometers feel its turning, too.
@@ -211,8 +210,7 @@ fn add(
     let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
     let good: Vec<usize> =
         (0..count).filter(|&row| columns.iter().all(|column| column[row].is_finite())).collect();
-    #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-    let own = |column: &[f64]| good.iter().map(|&row| column[row]).sum::<f64>() / good.len() as f64;
+    let own = |column: &[f64]| good.iter().map(|&row| column[row]).sum::<f64>() / real(good.len());
     let off = |document: usize| match truth {
         Some(truth) => truth,
         None if shared => levels[document],

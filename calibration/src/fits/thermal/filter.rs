@@ -14,6 +14,7 @@ use super::samples::Samples;
 use super::select::Target;
 use super::settings::{Method, Settings};
 use crate::error::Error;
+use crate::numbers::real;
 
 /// For the stepwise methods, whose derivatives know nothing of lags: smoothing, its delay being all the lag that there is, and
 /// derivative step (s).
@@ -97,8 +98,7 @@ fn on_grid(filter: &Filter, smoothings_s: &[f64], steps_s: &[f64]) -> Vec<Filter
 
 /// Length of the longest run (s).
 pub(super) fn longest_run_s(samples: &[Samples]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "windows of a log")]
-    let length_s = |run: &Samples| run.time_s.len() as f64 * run.window_s;
+    let length_s = |run: &Samples| real(run.time_s.len()) * run.window_s;
     samples.iter().map(length_s).fold(0.0, f64::max)
 }
 

@@ -6,8 +6,7 @@ use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
 use super::columns::{Columns, Term};
 use super::filter::{choose_filter, longest_run_s};
-use super::found::Found;
-use super::joint::{CUBIC, Joint, rivals};
+use super::joint::{CUBIC, Found, Joint, rivals};
 use super::known::{Known, channel, histories};
 use super::ladder::lags;
 use super::outcome::Outcome;
@@ -17,6 +16,7 @@ use super::sequential;
 use super::settings::{Method, Settings};
 use super::stand::Stand;
 use super::target::{rest, target};
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::figures::six;
@@ -83,7 +83,7 @@ pub fn fit(
         warnings.extend(checks::judging(&run.name, &series, &stand));
         judging.push((series, stand));
     }
-    let first = series.first().ok_or_else(|| Error::Refused(vec!["there is no run to fit to".to_owned()]))?;
+    let first = series.first().ok_or_else(|| Error::refused("there is no run to fit to"))?;
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));
     }
@@ -93,10 +93,9 @@ pub fn fit(
     };
     let mut plain = bare(&base);
     if plain.temperature.channel.is_empty() {
-        return Err(Error::Refused(vec![
-            "the document has no temperature channel: a thermal fit needs one; add [[temperature.channel]]"
-                .to_owned(),
-        ]));
+        return Err(Error::refused(
+            "the document has no temperature channel: a thermal fit needs one; add [[temperature.channel]]",
+        ));
     }
     let all: Vec<&Series> = series.iter().chain(judging.iter().map(|(series, _)| series)).collect();
     let channels = all.iter().flat_map(|series| series.temperatures.values());
@@ -179,24 +178,15 @@ fn stands_as_stated(
 
 /// Every sensor that follows a channel.
 fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
-    let why = |gyro: bool, index: usize| {
-        dead.iter().find(|(g, i, _)| (*g, *i) == (gyro, index)).map(|(_, _, why)| why.clone())
+    let sensor = |gyro: bool, index: usize, name: &str, channel: Option<&String>| {
+        let dead = dead.iter().find(|(g, i, _)| (*g, *i) == (gyro, index)).map(|(_, _, why)| why.clone());
+        let kind = if gyro { "gyro" } else { "accelerometer" };
+        Some(Sensor { gyro, index, name: format!("{kind} {name}"), channel: channel?.clone(), dead })
     };
-    let gyros = bare.gyro.sensor.iter().enumerate().filter_map(|(index, sensor)| {
-        let name = format!("gyro {}", sensor.name);
-        Some(Sensor { gyro: true, index, name, channel: sensor.channel.clone()?, dead: why(true, index) })
-    });
-    let accels =
-        bare.accel.iter().flat_map(|accel| &accel.sensor).enumerate().filter_map(|(index, sensor)| {
-            let name = format!("accelerometer {}", sensor.name);
-            Some(Sensor {
-                gyro: false,
-                index,
-                name,
-                channel: sensor.channel.clone()?,
-                dead: why(false, index),
-            })
-        });
+    let gyros = bare.gyro.sensor.iter().enumerate();
+    let gyros = gyros.filter_map(|(index, own)| sensor(true, index, &own.name, own.channel.as_ref()));
+    let accels = accelerometers(bare).iter().enumerate();
+    let accels = accels.filter_map(|(index, own)| sensor(false, index, &own.name, own.channel.as_ref()));
     gyros.chain(accels).collect()
 }
 

@@ -1,23 +1,26 @@
-//! All terms at once: what the sensors of a channel are explained best by together, and each by itself.
+//! All terms at once: what the sensors of a channel are explained best by together, and each by itself; what came of a sensor by any
+//! method.
 
+use super::branches::History;
 use super::columns::{Branch, Columns, Term};
 use super::compare::Rivals;
 use super::fit::Sensor;
-use super::found::Found;
 use super::known::Known;
 use super::ladder::{Plan, lags, statics};
 use super::model::{Dynamics, Spec};
 use super::noise::Noise;
-use super::passes;
 use super::samples::Samples;
-use super::select::{Target, Trials, WORTH_IT, together};
+use super::select::{Choice, Target, Trials, WORTH_IT, together};
 use super::settings::Terms;
 use crate::error::Error;
+use crate::lsq::weighted::Solution;
 
 /// Highest power of temperature in any model.
 const HIGHEST: usize = 5;
 /// Power of the static bias that a document is compared with.
 pub(super) const CUBIC: usize = 3;
+/// Share of the mean's beyond which passes through the same temperatures disagree.
+const DISAGREE: f64 = 0.7;
 
 /// The sensors of one channel with every model that is tried.
 pub(super) struct Joint<'a> {
@@ -98,8 +101,8 @@ impl<'a> Joint<'a> {
             );
             return Ok(Found { choice: Some(choice), ..Found::refused(&why) });
         }
-        let share = passes::share(target, &self.columns, (history, &self.known.temperature));
-        let doubt = passes::doubt(share).filter(|_| !best.spec.dynamics.terms.is_empty());
+        let doubt = doubt_of_passes(target, &self.columns, (history, &self.known.temperature))
+            .filter(|_| !best.spec.dynamics.terms.is_empty());
         let Some(solution) = trials.solve(&self.columns, &best.spec) else {
             return Ok(Found {
                 choice: Some(choice),
@@ -142,4 +145,119 @@ pub(super) fn rivals(
         cubic: solved(CUBIC, Vec::new()),
         with_rate: solved(CUBIC, rate),
     })
+}
+
+/// What is to be known of a sensor whose passes through the same temperatures disagree; `None` where the log tells lags from
+/// hysteresis anyway, or nothing can be judged.
+///
+/// A log of one cooling and one heating can have any difference between the two explained by a lag: cross-validation on pieces of
+/// the same two passes finds nothing wrong with it, and the next run may. What the log can say is how much of a sensor's output the
+/// passes have in common: what a static bias, fitted to the other passes, leaves of a pass, as a share of what their mean leaves.
+fn doubt_of_passes(
+    target: &Target,
+    columns: &Columns<'_>,
+    (history, temperature): (&History, &[f64]),
+) -> Option<String> {
+    if history.tells_dynamics() || !history.both_directions() {
+        return None;
+    }
+    let terms: Vec<Term> = (0..=CUBIC).map(Term::Static).collect();
+    let trials = Trials::of(target, columns, &terms, &Noise::default(), (&history.ramp, temperature));
+    let left =
+        |degree: usize| trials.score(&Spec { degree, scale: target.widest_scale(), ..Spec::default() });
+    let share = left(CUBIC)? / left(0)?;
+    (share > DISAGREE).then(|| {
+        format!(
+            "its passes through the same temperatures disagree: a static bias of one leaves {:.0} % of what its mean \
+             leaves on the other. A lag can explain any such difference, right or wrong: judge on another run \
+             (--judge), or add a third pass",
+            100.0 * share
+        )
+    })
+}
+
+/// What came of one sensor.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Found {
+    /// Coefficients and their standard errors.
+    pub(super) terms: Vec<(Term, f64, f64)>,
+    /// The model in words.
+    pub(super) words: String,
+    /// Cross-validation, where it was asked.
+    pub(super) choice: Option<Choice>,
+    /// Why there are no terms.
+    pub(super) refused: Option<String>,
+    /// What is to be known.
+    pub(super) remarks: Vec<String>,
+    /// What they are compared with.
+    pub(super) rivals: Option<Rivals>,
+    /// Root mean square of the thermometer's noise that they pass on.
+    pub(super) passed_on: Option<f64>,
+    /// Whether the sensor does not work at all.
+    pub(super) dead: bool,
+    /// Whether temperature does nothing to it.
+    pub(super) flat: bool,
+}
+
+impl Found {
+    pub(super) fn refused(why: &str) -> Self {
+        Self { refused: Some(why.to_owned()), ..Self::default() }
+    }
+
+    pub(super) fn dead(why: &str) -> Self {
+        Self { dead: true, ..Self::refused(why) }
+    }
+
+    /// Coefficients of a solution with their standard errors.
+    pub(super) fn terms_of(spec: &Spec, solution: &Solution, level: bool) -> Vec<(Term, f64, f64)> {
+        let terms = spec.terms(level).into_iter().zip(solution.coefficients.iter().zip(&solution.sigmas));
+        terms.map(|(term, (value, sigma))| (term, *value, *sigma)).collect()
+    }
+
+    /// A sensor that temperature does nothing to; where its level is known, that is its bias.
+    pub(super) fn flat(level: &Solution, known: bool) -> Self {
+        let constant = level.coefficients.first().zip(level.sigmas.first()).filter(|_| known);
+        Self {
+            terms: constant.map(|(value, sigma)| (Term::Static(0), *value, *sigma)).into_iter().collect(),
+            words: "constant".to_owned(),
+            flat: true,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn sequential(terms: Vec<(Term, f64, f64)>, left: f64, mean: f64) -> Self {
+        if left <= WORTH_IT * mean {
+            let mut words = "plateaus".to_owned();
+            let has = |is: fn(Term) -> bool| terms.iter().any(|(term, ..)| is(*term));
+            let steps = [
+                (", then Ṫ±", has(|term| matches!(term, Term::Rate(..)))),
+                (", then T̈±", has(|term| matches!(term, Term::Acceleration(..)))),
+                (", then a lag", has(|term| matches!(term, Term::Lag(..)))),
+            ];
+            steps.iter().filter(|(_, has)| *has).for_each(|(step, _)| words.push_str(step));
+            return Self { terms, words, ..Self::default() };
+        }
+        Self::refused(&format!(
+            "no model beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"
+        ))
+    }
+
+    pub(super) fn chosen(choice: Choice, spec: &Spec, solution: &Solution, level: bool) -> Self {
+        let mut remarks = Vec::new();
+        // A few are the fit's own business; more are somebody's.
+        if 10 * solution.outliers > solution.residual.len() {
+            remarks.push(format!(
+                "{} of {} windows were left out as spikes: something disturbs the sensor, check the log",
+                solution.outliers,
+                solution.residual.len()
+            ));
+        }
+        Self {
+            terms: Self::terms_of(spec, solution, level),
+            words: spec.words(),
+            choice: Some(choice),
+            remarks,
+            ..Self::default()
+        }
+    }
 }

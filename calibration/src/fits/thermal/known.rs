@@ -39,9 +39,9 @@ impl Known {
 pub(super) fn channel(document: &Document, name: &str) -> Result<Channel, Error> {
     let channel = document.temperature.channel.iter().find(|channel| channel.name == name);
     channel.cloned().ok_or_else(|| {
-        Error::Refused(vec![format!(
+        Error::refused(format!(
             "the document has no temperature channel {name:?}: add [[temperature.channel]]"
-        )])
+        ))
     })
 }
 

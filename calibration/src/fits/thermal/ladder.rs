@@ -42,7 +42,6 @@ pub struct Plan {
 impl Plan {
     /// The plans that a log can tell: with lags where the temperature goes both ways; with gains that follow temperature, and T̈, where
     /// holds or a third pass tell them from hysteresis.
-    #[must_use]
     pub fn all(history: &History, grid_step_s: f64, longest_run_s: f64) -> Vec<Self> {
         if !history.both_directions() {
             return Vec::new();
@@ -62,7 +61,6 @@ impl Plan {
     }
 
     /// The model of a sensor.
-    #[must_use]
     pub fn spec(&self, gyro: bool, scale: Option<usize>, shrink: f64) -> Spec {
         let mut dynamics = lags(&self.taus_s, self.gain_degree);
         if self.leads && gyro {
@@ -74,20 +72,17 @@ impl Plan {
 }
 
 /// Smoothings of the temperature that logs can tell (s).
-#[must_use]
 pub fn smoothings_s(tells_dynamics: bool) -> &'static [f64] {
     SMOOTHINGS_S.get(usize::from(!tells_dynamics)..).unwrap_or(&[])
 }
 
 /// Models of the static bias alone.
-#[must_use]
 pub fn statics(history: &History, scale: Option<usize>) -> Vec<Spec> {
     let degrees = STATIC_DEGREES[usize::from(!history.tells_dynamics())];
     degrees.iter().map(|&degree| Spec { degree, scale, ..Spec::default() }).collect()
 }
 
 /// Lags with gains of some degree in temperature.
-#[must_use]
 pub fn lags(taus_s: &[f64], gain_degree: usize) -> Dynamics {
     let list: Vec<String> = taus_s.iter().map(|tau| format!("{}", libm::round(*tau))).collect();
     let plural = if taus_s.len() == 1 { "lag" } else { "lags" };

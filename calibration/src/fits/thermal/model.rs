@@ -1,9 +1,11 @@
 //! Which terms a sensor has, and their place in the document.
 
+use std::collections::BTreeSet;
+
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{AccelSensor, Curve, GyroSensor, Shape, StatedTerm};
 
-use super::columns::{Basis, Branch, Term, seconds};
+use super::columns::{Basis, Branch, Term, tau_s};
 use super::scale::{Holds, put};
 use crate::document::written::tidy;
 use crate::report::figures::per_deg_c;
@@ -32,7 +34,6 @@ pub struct Spec {
 
 impl Spec {
     /// All terms. The constant is one of them only where the level is known.
-    #[must_use]
     pub fn terms(&self, level: bool) -> Vec<Term> {
         let first = usize::from(!level);
         let scale = self.scale.into_iter().flat_map(|highest| (first..=highest).map(Term::Scale));
@@ -41,7 +42,6 @@ impl Spec {
     }
 
     /// In words.
-    #[must_use]
     pub fn words(&self) -> String {
         let of_degree = |degree: usize| match degree {
             0 => "constant".to_owned(),
@@ -62,7 +62,6 @@ impl Spec {
 }
 
 /// Name and unit of a term's coefficient.
-#[must_use]
 pub fn described(term: Term, output: &str) -> (String, String) {
     let power = |j: usize| per_deg_c("", j);
     let branch = |branch: Branch| match branch {
@@ -81,78 +80,60 @@ pub fn described(term: Term, output: &str) -> (String, String) {
         ),
         Term::Scale(j) => (format!("scale factor error, power {j}"), format!("ppm{}", power(j))),
         Term::Lag(tau, j) => {
-            (format!("lag of {} s, power {j}", seconds(tau)), format!("({output})/(°C/s){}", power(j)))
+            (format!("lag of {} s, power {j}", tau_s(tau)), format!("({output})/(°C/s){}", power(j)))
         }
     }
 }
 
-/// A curve from the coefficients of its powers; `None` without any.
-fn curve(basis: &Basis, found: &[(usize, f64)]) -> Option<Curve> {
-    let highest = found.iter().map(|(power, _)| *power).max()?;
-    let mut coefficients = vec![0.0; highest + 1];
-    for (power, value) in found {
-        coefficients[*power] = tidy(*value);
+/// Coefficients of one kind of term, by power from 0; `None` without any.
+fn coefficients(found: &[(Term, f64)], of: impl Fn(Term) -> Option<usize>) -> Option<Vec<f64>> {
+    let powers = || found.iter().filter_map(|(term, value)| Some((of(*term)?, *value)));
+    let mut coefficients = vec![0.0; powers().map(|(power, _)| power).max()? + 1];
+    powers().for_each(|(power, value)| coefficients[power] = value);
+    Some(coefficients)
+}
+
+/// A curve from one kind of term; `None` without any.
+fn curve(basis: &Basis, found: &[(Term, f64)], of: impl Fn(Term) -> Option<usize>) -> Option<Curve> {
+    coefficients(found, of).map(|found| basis.curve(found.into_iter().map(tidy).collect()))
+}
+
+fn of_static(term: Term) -> Option<usize> {
+    match term {
+        Term::Static(power) => Some(power),
+        _ => None,
     }
-    let (reference, range) = (basis.reference_deg_c, basis.range_deg_c);
-    Some(Curve::new(Shape::Polynomial { reference, coefficients, range }))
 }
 
-/// Coefficients of one kind of term, by power.
-fn powers(found: &[(Term, f64)], of: impl Fn(Term) -> Option<usize>) -> Vec<(usize, f64)> {
-    found.iter().filter_map(|(term, value)| Some((of(*term)?, *value))).collect()
-}
-
-/// Time constants of the lags, ascending.
-fn taus(found: &[(Term, f64)]) -> Vec<u64> {
+/// The lags, with ascending time constants.
+fn lags(basis: &Basis, found: &[(Term, f64)]) -> impl Iterator<Item = StatedTerm> {
     let tau = |(term, _): &(Term, f64)| match term {
         Term::Lag(tau, _) => Some(*tau),
         _ => None,
     };
-    let mut taus: Vec<u64> = found.iter().filter_map(tau).collect();
-    taus.sort_unstable();
-    taus.dedup();
-    taus
-}
-
-fn of_lag(found: &[(Term, f64)], tau: u64) -> Vec<(usize, f64)> {
-    powers(found, |term| match term {
-        Term::Lag(this, power) if this == tau => Some(power),
-        _ => None,
+    let taus: BTreeSet<u64> = found.iter().filter_map(tau).collect();
+    taus.into_iter().filter_map(|tau| {
+        let gain = curve(basis, found, |term| match term {
+            Term::Lag(this, power) if this == tau => Some(power),
+            _ => None,
+        })?;
+        Some(StatedTerm::with_parameter(Feature::Lag, tau_s(tau), gain))
     })
 }
 
-fn lags(basis: &Basis, found: &[(Term, f64)]) -> impl Iterator<Item = StatedTerm> {
-    taus(found).into_iter().filter_map(|tau| {
-        let gain = curve(basis, &of_lag(found, tau))?;
-        Some(StatedTerm::with_parameter(Feature::Lag, seconds(tau), gain))
-    })
-}
-
-fn of_static(found: &[(Term, f64)]) -> Vec<(usize, f64)> {
-    powers(found, |term| match term {
-        Term::Static(power) => Some(power),
-        _ => None,
-    })
-}
-
-/// Coefficients of the scale factor error (ppm), by power from 0; `None` where the scale factor stays.
-fn scale_error(found: &[(Term, f64)]) -> Option<Vec<f64>> {
-    let powers = powers(found, |term| match term {
+/// A scale factor, or its error, times the error that was found; `None` where none was.
+fn scaled(old: &Curve, basis: &Basis, found: &[(Term, f64)], holds: Holds) -> Option<Curve> {
+    let error = coefficients(found, |term| match term {
         Term::Scale(power) => Some(power),
         _ => None,
-    });
-    let highest = powers.iter().map(|(power, _)| *power).max()?;
-    let mut coefficients = vec![0.0; highest + 1];
-    for (power, value) in powers {
-        coefficients[power] = value;
-    }
-    Some(coefficients)
+    })?;
+    Some(put(old, (basis.reference_deg_c, basis.range_deg_c), &error, holds))
 }
 
 /// Puts found coefficients (°/h and so on) into a gyro that has none of these terms; its scale factor keeps what it has, times the
 /// error that was found.
 pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.set(Feature::One, curve(basis, &of_static(found)));
+    sensor.set(Feature::One, curve(basis, found, of_static));
     let rate = branches(basis, found, |term| match term {
         Term::Rate(branch, power) => Some((branch, power)),
         _ => None,
@@ -167,10 +148,9 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
         }
     }
     lags(basis, found).for_each(|lag| sensor.put(lag));
-    if let Some(error) = scale_error(found) {
-        let none = Curve::new(Shape::Constant { value: 0.0 });
-        let old = sensor.terms.curve(Feature::Reading).unwrap_or(&none);
-        let new = put(old, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Error);
+    let none = Curve::new(Shape::Constant { value: 0.0 });
+    let old = sensor.terms.curve(Feature::Reading).unwrap_or(&none);
+    if let Some(new) = scaled(old, basis, found, Holds::Error) {
         sensor.set(Feature::Reading, new);
     }
 }
@@ -181,27 +161,21 @@ fn branches(
     found: &[(Term, f64)],
     of: impl Fn(Term) -> Option<(Branch, usize)>,
 ) -> Option<[Curve; 2]> {
-    let side = |side: Branch| {
-        let found =
-            powers(found, |term| of(term).filter(|(on, _)| *on == Branch::Both || *on == side).map(|x| x.1));
-        curve(basis, &found)
-    };
-    match (side(Branch::RunUp), side(Branch::Braking)) {
-        (None, None) => None,
-        (up, down) => {
-            let zero = || curve(basis, &[(0, 0.0)]);
-            Some([up.or_else(zero)?, down.or_else(zero)?])
-        }
-    }
+    let sides = [Branch::RunUp, Branch::Braking].map(|side| {
+        curve(basis, found, |term| {
+            of(term).filter(|(on, _)| *on == Branch::Both || *on == side).map(|(_, power)| power)
+        })
+    });
+    let zero = || basis.curve(vec![0.0]);
+    sides.iter().any(Option::is_some).then(|| sides.map(|side| side.unwrap_or_else(zero)))
 }
 
 /// Puts found coefficients (output units and so on) into an accelerometer, which has a static bias and lags only; its scale factor
 /// keeps what it has, times the error that was found.
 pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.set(Feature::One, curve(basis, &of_static(found)));
+    sensor.set(Feature::One, curve(basis, found, of_static));
     lags(basis, found).for_each(|lag| sensor.put(lag));
-    if let Some(error) = scale_error(found) {
-        sensor.scale_factor =
-            put(&sensor.scale_factor, (basis.reference_deg_c, basis.range_deg_c), &error, Holds::Factor);
+    if let Some(new) = scaled(&sensor.scale_factor, basis, found, Holds::Factor) {
+        sensor.scale_factor = new;
     }
 }

@@ -8,14 +8,16 @@ use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
 use super::compare;
 use super::fit::{Fitted, Sensor};
-use super::found::Found;
+use super::joint::Found;
 use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
 use crate::axes::output_name;
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
+use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
 use crate::size::Size;
 
@@ -108,7 +110,7 @@ impl Outcome {
                     sample,
                     (&before.loaded, &written.loaded),
                     (&written.document, &rest),
-                    stand.window_s(window_s),
+                    Rows::valid(stand.window_s(window_s)),
                     &mut watch,
                 )?;
                 troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));
@@ -171,7 +173,7 @@ impl Outcome {
             } else if let Some(accel) =
                 document.accel.as_mut().and_then(|accel| accel.sensor.get_mut(sensor.index))
             {
-                let old = self.base.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index));
+                let old = accelerometers(&self.base).get(sensor.index);
                 match old.filter(|_| found.refused.is_some()) {
                     Some(old) => accel.clone_from(old),
                     None => put_accel(accel, basis, &terms),
@@ -222,7 +224,7 @@ impl Outcome {
                     following.into_iter().any(|feature| gyro.terms.has(feature))
                 })
             } else {
-                let accel = self.base.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index));
+                let accel = accelerometers(&self.base).get(sensor.index);
                 accel.is_some_and(|accel| accel.terms.has(Feature::Lag))
             }
         };
@@ -246,13 +248,11 @@ impl Outcome {
 
     /// Whether a sensor of the document at hand has terms of the kind that is fitted.
     fn had_terms(&self, sensor: &Sensor) -> bool {
-        let accel = |document: &Document| {
-            document.accel.as_ref().and_then(|accel| accel.sensor.get(sensor.index).cloned())
-        };
+        let (base, bare, index) = (&self.base, &self.bare, sensor.index);
         if sensor.gyro {
-            self.base.gyro.sensor.get(sensor.index) != self.bare.gyro.sensor.get(sensor.index)
+            base.gyro.sensor.get(index) != bare.gyro.sensor.get(index)
         } else {
-            accel(&self.base) != accel(&self.bare)
+            accelerometers(base).get(index) != accelerometers(bare).get(index)
         }
     }
 

@@ -12,11 +12,13 @@ use super::bare::along_axes;
 use super::checks::median_step_s;
 use super::noise::Thermometer;
 use super::thermometer::{noise_of, without_noise};
+use crate::document::accelerometers;
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::real;
 use crate::robust::median;
 use crate::runs::series::Series;
-use crate::runs::table::{Rows, Table, Takes};
+use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Troubles, Watch};
 
 /// One run.
@@ -59,7 +61,7 @@ impl Samples {
         watch: impl Watch,
     ) -> Result<Self, Error> {
         let gyro_count = bare.gyro.sensor.len();
-        let accel_count = bare.accel.as_ref().map_or(0, |accel| accel.sensor.len());
+        let accel_count = accelerometers(bare).len();
         // Patterns of turned sensors, then the same with a bias of one on every accelerometer.
         let patterns = gyro_count.max(accel_count).div_ceil(3);
         let biased = with_unit_bias(bare);
@@ -68,9 +70,7 @@ impl Samples {
             kinds.iter().flat_map(|document| (0..patterns).map(|pattern| along_axes(document, pattern)));
         let loaded: Vec<Loaded> =
             documents.map(|document| Written::compiled(&document)).collect::<Result<_, Error>>()?;
-        let rows = Rows { length_s: window_s, takes: Takes::Valid };
-        let tables = Table::together(run, &loaded, rows, watch)?;
-        let tables: Vec<Table> = tables.into_iter().map(|table| table.whole(0.999)).collect();
+        let tables = Table::together(run, &loaded, Rows::valid(window_s), watch)?;
         let rates: Vec<[&[f64]; 3]> =
             tables.iter().take(patterns).map(|table| [0, 1, 2].map(|axis| table.rate(axis))).collect();
         let forces: Vec<[&[f64]; 3]> =
@@ -100,7 +100,6 @@ impl Samples {
 }
 
 /// Begin of the first gyro tick (ns).
-#[must_use]
 pub fn start_ns(series: &Series) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a tick is at most some seconds")]
     let first = series.gyros.duration_s.first().map_or(0, |length| (length * 1e9) as i64);
@@ -108,7 +107,6 @@ pub fn start_ns(series: &Series) -> i64 {
 }
 
 /// The temperature readings of a series by channel, without the noise of the thermometers: see [`without_noise`].
-#[must_use]
 pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
     let channel = |(name, channel): (&String, &crate::runs::series::Channel)| {
         let known = ChannelName::from(name).ok()?;
@@ -152,8 +150,7 @@ fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
     let mut sensors = vec![Vec::new(); count];
     for axis in 0..3.min(count) {
         let mine: Vec<usize> = (axis..count).step_by(3).collect();
-        #[expect(clippy::cast_precision_loss, reason = "at most three")]
-        let shared = mine.len() as f64;
+        let shared = real(mine.len());
         let Some(mean) = patterns.first().map(|pattern| pattern[axis]) else { continue };
         let mut rest: Vec<f64> = mean.iter().map(|mean| shared * mean).collect();
         for (pattern, sensor) in patterns.iter().skip(1).zip(mine.iter().skip(1)) {

@@ -14,6 +14,7 @@ use isotherm_protocol::document::{Curve, Shape};
 
 use crate::document::written::tidy;
 use crate::lsq::weighted::once;
+use crate::numbers::real;
 use crate::report::figures::short;
 
 /// Highest power of temperature in a scale factor error.
@@ -47,14 +48,8 @@ pub fn told(gyro: bool, inputs: &[f64], temperature: &[f64], [low, high]: [f64; 
     let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
     let mut whole = [f64::INFINITY, f64::NEG_INFINITY];
     for (input, t) in inputs.iter().zip(temperature).filter(|(input, t)| input.is_finite() && t.is_finite()) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "0 to 9"
-        )]
-        let part =
-            ((t - low) / (high - low).max(1e-9) * PARTS as f64).clamp(0.0, PARTS as f64 - 1.0) as usize;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 9")]
+        let part = ((t - low) / (high - low).max(1e-9) * real(PARTS)).clamp(0.0, real(PARTS) - 1.0) as usize;
         for ends in [&mut parts[part], &mut whole] {
             *ends = [ends[0].min(*input), ends[1].max(*input)];
         }
@@ -91,7 +86,6 @@ pub fn told(gyro: bool, inputs: &[f64], temperature: &[f64], [low, high]: [f64; 
 }
 
 /// What a gyro showed without its noise: a cubic over temperature for each run.
-#[must_use]
 pub fn smoothed(shown: &[f64], run: &[usize], temperature: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
     let middle = 0.5 * (low + high);
     let half = (0.5 * (high - low)).max(1e-9);
@@ -151,7 +145,6 @@ impl Holds {
 ///
 /// Polynomials stay polynomials and splines keep their knots; what has no such form over the fitted range becomes straight lines
 /// between knots near enough.
-#[must_use]
 pub fn put(old: &Curve, (reference_deg_c, range): (f64, [f64; 2]), s: &[f64], how: Holds) -> Curve {
     let at = |t: f64| {
         let away = t.clamp(range[0], range[1]) - reference_deg_c;

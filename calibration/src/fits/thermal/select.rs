@@ -12,6 +12,7 @@ use super::noise::Noise;
 use super::scale::{self, Kept};
 use crate::lsq::folds::{Folds, Shrink};
 use crate::lsq::weighted::{Solution, once, solve};
+use crate::numbers::{ends, hull};
 use crate::robust::{block_length, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
@@ -64,7 +65,6 @@ pub struct Choice {
 
 impl Choice {
     /// The chosen model.
-    #[must_use]
     pub fn best(&self) -> Option<&Tried> {
         self.chosen.and_then(|index| self.tried.get(index))
     }
@@ -79,19 +79,17 @@ impl Target {
     }
 
     /// The largest scale factor error that the runs can tell.
-    #[must_use]
     pub fn widest_scale(&self) -> Option<usize> {
         self.scale.as_ref().map(|_| scale::HIGHEST)
     }
 
     /// Columns of terms, and behind them those that stay out of the document.
-    fn design<'a>(&self, columns: &'a Columns<'_>, terms: &[Term]) -> Vec<Cow<'a, [f64]>> {
+    pub(super) fn design<'a>(&self, columns: &'a Columns<'_>, terms: &[Term]) -> Vec<Cow<'a, [f64]>> {
         let levels = self.levels().into_iter().map(Cow::Owned);
         terms.iter().map(|term| self.column(columns, *term)).chain(levels).collect()
     }
 
     /// The column of a term that was made; those of the scale factor are the sensor's own.
-    #[must_use]
     pub fn column<'a>(&self, columns: &'a Columns<'_>, term: Term) -> Cow<'a, [f64]> {
         match (term, &self.scale) {
             (Term::Scale(power), Some(scale)) => {
@@ -103,7 +101,6 @@ impl Target {
     }
 
     /// Solves for a model without shrinking; the coefficients come in the order of its terms, those that stay out of the document behind.
-    #[must_use]
     pub fn solve(&self, columns: &Columns<'_>, spec: &Spec, robust: bool) -> Option<Solution> {
         self.held(columns, spec, robust, None)
     }
@@ -122,7 +119,6 @@ impl Target {
     }
 
     /// The level, and nothing else, where what it leaves is no more than noise.
-    #[must_use]
     pub fn flat(&self, columns: &Columns<'_>) -> Option<Solution> {
         self.solve(columns, &Spec::default(), true).filter(|level| is_white(&level.residual))
     }
@@ -142,7 +138,6 @@ pub struct Trials<'a> {
 impl<'a> Trials<'a> {
     /// Of a sensor with all terms that are to be tried, whose columns were made; windows by piece and temperature (°C), the point about
     /// which powers are taken.
-    #[must_use]
     pub fn of(
         target: &'a Target,
         columns: &Columns<'_>,
@@ -161,7 +156,7 @@ impl<'a> Trials<'a> {
         let block = block_length(target.values.len());
         let known = ranges(target, piece, temperature);
         let is_judged = |row: usize| {
-            let [low, high] = known.get(piece[row]).copied().unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+            let [low, high] = known.get(piece[row]).copied().unwrap_or(ends([]));
             (low..=high).contains(&temperature[row])
         };
         let folds = Folds::of(&all, (&target.values, &target.weights), piece, is_judged, block);
@@ -192,21 +187,18 @@ impl<'a> Trials<'a> {
 
     /// Root mean square of what a model leaves on pieces that were left out one by one, over temperatures that the others have too, with
     /// the noise that it passes on. `None` where too little can be judged.
-    #[must_use]
     pub fn score(&self, spec: &Spec) -> Option<f64> {
         let share = self.shares(spec);
         self.folds.score(&self.places(spec), Shrink { share: &share, noise: &self.noise })
     }
 
     /// A model with its score.
-    #[must_use]
     pub fn tried(&self, spec: Spec) -> Option<Tried> {
         let (score, count) = (self.score(&spec)?, spec.terms(self.target.level).len());
         Some(Tried { spec, count, score })
     }
 
     /// Solves for a model, its coefficients held as it says.
-    #[must_use]
     pub fn solve(&self, columns: &Columns<'_>, spec: &Spec) -> Option<Solution> {
         let share = self.shares(spec);
         let shrink = Shrink { share: &share, noise: &self.noise };
@@ -215,7 +207,6 @@ impl<'a> Trials<'a> {
     }
 
     /// Root mean square of the thermometer's noise that found coefficients of terms pass on.
-    #[must_use]
     pub fn passed_on(&self, found: &[(Term, f64)]) -> f64 {
         let placed: Vec<(usize, f64)> = found
             .iter()
@@ -227,7 +218,6 @@ impl<'a> Trials<'a> {
     }
 
     /// Chooses a sensor's model: what its channel has chosen for all, or a static bias alone where that is plainly better.
-    #[must_use]
     pub fn choose(&self, tried: Vec<Tried>, plan: Option<Spec>, history: &History, largest: bool) -> Choice {
         let widest = self.target.widest_scale();
         let mean = self.score(&Spec::default()).unwrap_or(f64::NAN);
@@ -272,7 +262,6 @@ impl<'a> Trials<'a> {
 
 /// What all sensors of a channel are explained best by together: the plan, how much it is shrunk, and the mean logarithm of their scores.
 /// One log tells little of how much to believe; what conducts heat to one sensor does so to all.
-#[must_use]
 pub fn together(plans: &[Plan], trials: &[(bool, &Trials<'_>)]) -> Option<(usize, f64, f64)> {
     let mut best: Option<(usize, f64, f64)> = None;
     for (index, plan) in plans.iter().enumerate() {
@@ -293,7 +282,7 @@ pub fn together(plans: &[Plan], trials: &[(bool, &Trials<'_>)]) -> Option<(usize
 /// By piece: the range of temperatures (°C) that the other pieces have.
 fn ranges(target: &Target, piece: &[usize], temperature: &[f64]) -> Vec<[f64; 2]> {
     let count = piece.iter().max().map_or(0, |last| last + 1);
-    let mut own = vec![[f64::INFINITY, f64::NEG_INFINITY]; count];
+    let mut own = vec![ends([]); count];
     for (row, piece) in piece.iter().enumerate() {
         let t = temperature[row];
         if t.is_finite() && target.weights[row] > 0.0 {
@@ -302,9 +291,7 @@ fn ranges(target: &Target, piece: &[usize], temperature: &[f64]) -> Vec<[f64; 2]
     }
     let of_others = |left_out: usize| {
         let others = own.iter().enumerate().filter(|(piece, _)| *piece != left_out);
-        others.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, own)| {
-            [low.min(own[0]), high.max(own[1])]
-        })
+        hull(others.map(|(_, own)| *own)).unwrap_or(ends([]))
     };
     (0..count).map(of_others).collect()
 }
@@ -319,7 +306,6 @@ fn smallest(tried: &[Tried]) -> Option<&Tried> {
 /// Weights that keep slow parts from dominating: no temperature counts for more than `CROWDED` times what is usual, so that a hold of
 /// hours weighs no more than some passes. Limited to a tenth, because what a plateau knows well is not to be thrown away. What is on
 /// a plateau and at rest is counted for itself: the ends of the ramps, which alone tell of the fast lags, have the same temperatures.
-#[must_use]
 pub fn equal_temperature(temperature: &[f64], at_rest: &[bool], [low, high]: [f64; 2]) -> Vec<f64> {
     const BINS: f64 = 25.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 25")]

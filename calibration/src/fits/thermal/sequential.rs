@@ -18,7 +18,6 @@ const STILL: f64 = 1e-6;
 pub type Found = Result<Vec<(Term, f64, f64)>, String>;
 
 /// The terms of the rate and of the acceleration of a gyro.
-#[must_use]
 pub fn gyro_terms() -> [Vec<Term>; 2] {
     [
         [0, 1]
@@ -30,7 +29,6 @@ pub fn gyro_terms() -> [Vec<Term>; 2] {
 }
 
 /// Power of the static bias that so many levels of plateaus allow.
-#[must_use]
 pub fn degree(history: &History) -> usize {
     history.levels().saturating_sub(1).min(2)
 }
@@ -53,10 +51,6 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
     }
     let first = usize::from(!target.level);
     let statics: Vec<Term> = (first..=degree(history)).map(Term::Static).collect();
-    let runs = target.run.last().map_or(0, |last| last + 1);
-    let levels = (0..if target.level { 0 } else { runs })
-        .map(|of| target.run.iter().map(|run| f64::from(u8::from(*run == of))).collect::<Vec<f64>>());
-    let levels: Vec<Vec<f64>> = levels.collect();
     let resting: Vec<f64> =
         target.weights.iter().zip(&history.at_rest).map(|(w, rest)| if *rest { *w } else { 0.0 }).collect();
     let moving: Vec<f64> =
@@ -66,9 +60,8 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
     let (mut found, rest) = loop {
         let powers = scale.into_iter().flat_map(|highest| (first..=highest).map(Term::Scale));
         let terms: Vec<Term> = statics.iter().copied().chain(powers).collect();
-        let own: Vec<_> = terms.iter().map(|term| target.column(columns, *term)).collect();
-        let all: Vec<&[f64]> =
-            own.iter().map(AsRef::as_ref).chain(levels.iter().map(Vec::as_slice)).collect();
+        let design = target.design(columns, &terms);
+        let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
         let solution = solve(&all, &target.values, &resting, None).ok_or("too few windows on plateaus")?;
         let found: Vec<(Term, f64, f64)> = terms
             .iter()
@@ -110,7 +103,6 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
 }
 
 /// What a found model leaves (weighted root mean square), each run's own mean taken off where the level is not known.
-#[must_use]
 pub fn left(columns: &Columns<'_>, target: &Target, found: &[(Term, f64, f64)]) -> f64 {
     let mut residual = target.values.clone();
     for (term, value, _) in found {

@@ -1,23 +1,24 @@
 //! What may be asked of a thermal fit.
 
+use clap::ValueEnum;
 use isotherm_protocol::document::Created;
 
 use super::stand::{Site, Stand};
 
 /// Method of the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Method {
-    /// 000: the static bias from the plateaus, then the rate's share, then the acceleration's, one after the other.
+    /// Plateaus, then rate, then acceleration of temperature (paper 000)
     Sequential,
-    /// The method that 000 compares with: as [`Method::Sequential`], without the acceleration's share of gyros.
+    /// Plateaus, then the rate alone
     Rate,
-    /// All terms at once: static bias, lags on a ladder of time constants with gains that follow temperature, T̈.
+    /// All terms at once, shrunk by cross-validation
+    #[value(alias = "lag")]
     Joint,
 }
 
 impl Method {
     /// Its name, in documents and reports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Sequential => "sequential",
@@ -27,18 +28,17 @@ impl Method {
     }
 
     /// Whether static bias and what follows the change are found one after the other.
-    #[must_use]
     pub const fn is_stepwise(self) -> bool {
         matches!(self, Self::Sequential | Self::Rate)
     }
 }
 
 /// Who chooses the terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Terms {
-    /// Cross-validation.
+    /// Cross-validation across thermal branches
     Auto,
-    /// The largest model of the method; it is not asked whether it survives cross-validation.
+    /// The largest model
     All,
 }
 
@@ -77,14 +77,12 @@ impl Default for Settings {
 
 impl Settings {
     /// How the unit stands in a run: those of the fit are counted first, then those that judge.
-    #[must_use]
     pub fn stand(&self, run: usize) -> Stand {
         let stand = if self.stands.len() == 1 { self.stands.first() } else { self.stands.get(run) };
         stand.copied().unwrap_or_default()
     }
 
     /// Whether the mean of some run is taken off because its attitude is not known.
-    #[must_use]
     pub fn removes_mean(&self) -> bool {
         self.stands.is_empty() || self.stands.iter().any(|stand| stand.site == Site::Unknown)
     }

@@ -55,7 +55,6 @@ pub struct Turning {
 
 impl Turning {
     /// The table's rate in case axes (°/h).
-    #[must_use]
     pub fn rate_deg_per_h(&self) -> [f64; 3] {
         self.axis.map(|part| part * 3600.0 * self.rate_deg_per_s)
     }
@@ -79,7 +78,6 @@ impl From<Site> for Stand {
 impl Stand {
     /// The shortest windows that are no shorter than so many seconds (s): of a turning run whole turns, over which the horizontal
     /// part of the Earth's rate is nothing.
-    #[must_use]
     pub fn window_s(&self, at_least_s: f64) -> f64 {
         match &self.turning {
             None => at_least_s,

@@ -13,6 +13,7 @@ use super::select::{Target, equal_temperature};
 use super::stand::{Site, Stand};
 use crate::document::written::Written;
 use crate::error::Error;
+use crate::numbers::{dot, real};
 use crate::report::Rest;
 use crate::runs::table::Table;
 use crate::runs::{Run, Watch};
@@ -38,7 +39,7 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
         None => None,
     };
     let rate = place.earth_rate_in_case(mean_force).ok_or_else(|| {
-        Error::Refused(vec![format!(
+        Error::refused(format!(
             "{}: the unit cannot be levelled{}. State --roll and --pitch, or remove the mean with --remove-mean",
             run.name,
             mean_force.map_or_else(
@@ -48,13 +49,13 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
                      2 %, with x not vertical"
                 )
             )
-        )])
+        ))
     })?;
     let deg_per_h = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
     Ok(match &stand.turning {
         None => Rest { rate_deg_per_h: Some(deg_per_h), force_m_per_s2: *force_m_per_s2, ..Rest::default() },
         Some(turning) => {
-            let along: f64 = turning.axis.iter().zip(deg_per_h).map(|(a, e)| a * e).sum();
+            let along = dot(turning.axis, deg_per_h);
             let table = turning.rate_deg_per_h();
             let rate = [0, 1, 2].map(|axis| table[axis] + along * turning.axis[axis]);
             Rest { rate_deg_per_h: Some(rate), ..Rest::default() }
@@ -115,7 +116,7 @@ pub(super) fn target(
             let response =
                 if sensor.gyro { 1.0 } else { responses.and_then(|r| r.get(row)).copied().unwrap_or(1.0) };
             let axis = rows.get(row).copied().unwrap_or_default();
-            let along = |vector: [f64; 3]| vector.iter().zip(axis).map(|(v, a)| v * a).sum::<f64>();
+            let along = |vector: [f64; 3]| dot(vector, axis);
             let (input, expected) = match input {
                 Input::Unknown => (f64::NAN, usual),
                 Input::NoPart => (f64::NAN, f64::NAN),
@@ -167,8 +168,7 @@ pub(crate) fn axes<P>(orientation: &Orientation<P>, sensor: usize, run: &Samples
     let slopes = slopes.map(|slope| Angle::from_arcsec(slope).as_rad());
     let channels: Vec<&Vec<f64>> = thermal.channels.iter().filter_map(|name| run.deg_c.get(name)).collect();
     let at = |window: usize| {
-        #[expect(clippy::cast_precision_loss, reason = "a few channels")]
-        let count = channels.len() as f64;
+        let count = real(channels.len());
         let mean = channels.iter().filter_map(|column| column.get(window)).sum::<f64>() / count;
         let [low, high] = thermal.range_deg_c;
         let away = if mean.is_finite() { mean.clamp(low, high) - thermal.reference_deg_c } else { 0.0 };

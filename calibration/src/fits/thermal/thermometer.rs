@@ -7,6 +7,7 @@
 //! Nemirovski 1997]: long on plateaus and ramps, none at all where a ramp begins.
 
 use crate::lsq::local::parabola;
+use crate::numbers::{ends, real};
 use crate::robust::{SIGMA_PER_MAD, median, median_if_any};
 
 /// Length of the bins whose means are smoothed (s); one reading where they come more seldom.
@@ -40,7 +41,6 @@ struct Local {
 
 /// Readings of a thermometer (as it has them: V, counts or °C) at times (s), without their noise. What is no number stays none;
 /// spikes, and readings that come again or too late, stay as they are.
-#[must_use]
 pub fn without_noise(time_s: &[f64], readings: &[f64]) -> Vec<f64> {
     let rows = sound(time_s, readings);
     let bins = bins(&rows, time_s, readings);
@@ -66,13 +66,11 @@ pub fn without_noise(time_s: &[f64], readings: &[f64]) -> Vec<f64> {
 }
 
 /// Standard deviation of the white noise of a reading; zero for too few.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "readings of a log")]
 pub fn noise_of(time_s: &[f64], readings: &[f64]) -> f64 {
     let rows = sound(time_s, readings);
     let bins = bins(&rows, time_s, readings);
     let good: Vec<f64> = rows.iter().map(|&row| readings[row]).collect();
-    let in_a_bin = rows.len() as f64 / bins.len().max(1) as f64;
+    let in_a_bin = real(rows.len()) / real(bins.len().max(1));
     sigma(&bins, &good).map_or(0.0, |sigma| sigma * in_a_bin.sqrt())
 }
 
@@ -104,17 +102,15 @@ fn is_spike(readings: &[f64], row: usize) -> bool {
         .map(|other| readings[other])
         .collect();
     let Some(middle) = median_if_any(&others) else { return false };
-    let (low, high) =
-        others.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let [low, high] = ends(others.iter().copied());
     let away = |x: f64| (x - middle).abs();
     away(readings[row]) > SPIKE * SIGMA_PER_MAD * median(&others.iter().map(|x| away(*x)).collect::<Vec<_>>())
         && away(readings[row]) > 2.0 * (high - low)
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a handful")]
 fn bins(rows: &[usize], time_s: &[f64], readings: &[f64]) -> Vec<Bin> {
     let bin = |rows: &[usize]| {
-        let count = rows.len() as f64;
+        let count = real(rows.len());
         Bin {
             time_s: rows.iter().map(|&row| time_s[row]).sum::<f64>() / count,
             mean: rows.iter().map(|&row| readings[row]).sum::<f64>() / count,

@@ -5,7 +5,7 @@ use isotherm_protocol::document::{Document, Origin};
 
 use super::columns::Basis;
 use super::fit::Sensor;
-use super::found::Found;
+use super::joint::Found;
 use super::model::described;
 use super::outcome::Outcome;
 use super::scale::Kept;
@@ -26,14 +26,12 @@ impl Outcome {
                 None => {}
             }
         }
-        let kinds: Vec<&str> = [
+        let kinds = [
             (true, "gyros on a rate table (--axis, --rate)"),
             (false, "accelerometers in several attitudes (--roll, --pitch)"),
-        ]
-        .into_iter()
-        .filter(|(gyro, _)| without.contains(gyro))
-        .map(|(_, words)| words)
-        .collect();
+        ];
+        let kinds: Vec<&str> =
+            kinds.into_iter().filter(|(gyro, _)| without.contains(gyro)).map(|(_, words)| words).collect();
         if !kinds.is_empty() {
             self.notes.push(format!(
                 "Scale factors without runs are kept: of {}, each log with its own.",
@@ -53,17 +51,12 @@ impl Outcome {
             }
             let sigmas = found.terms.iter().map(|(term, value, sigma)| {
                 let (name, unit) = described(*term, output(&self.base, sensor));
-                let row = [
-                    ("of", name.into()),
-                    ("unit", unit.into()),
-                    ("value", (*value).into()),
-                    ("sigma", (*sigma).into()),
-                ];
-                toml::Value::Table(
-                    row.into_iter()
-                        .map(|(key, value): (&str, toml::Value)| (key.to_owned(), value))
-                        .collect(),
-                )
+                let mut row = toml::Table::new();
+                row.insert("of".into(), name.into());
+                row.insert("unit".into(), unit.into());
+                row.insert("value".into(), (*value).into());
+                row.insert("sigma".into(), (*sigma).into());
+                toml::Value::Table(row)
             });
             of_sensor.insert("coefficient".into(), toml::Value::Array(sigmas.collect()));
             if let Some((choice, best)) =
@@ -115,12 +108,8 @@ impl Outcome {
         for (sensor, _, found) in &self.found {
             for (term, value, sigma) in &found.terms {
                 let (name, unit) = described(*term, output(&self.base, sensor));
-                report.coefficients.push(Coefficient::new(
-                    format!("{} {name}", sensor.name),
-                    unit,
-                    *value,
-                    Some(*sigma),
-                ));
+                let name = format!("{} {name}", sensor.name);
+                report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
             }
         }
         report.validation = validation(&self.found);
@@ -175,5 +164,5 @@ fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
             ]);
         }
     }
-    (!rows.is_empty()).then(|| Table { head: head.map(str::to_owned).to_vec(), rows })
+    (!rows.is_empty()).then(|| Table::of(head, rows))
 }

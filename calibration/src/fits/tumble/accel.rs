@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::lsq::nonlinear::{NoSolution, Solution, solve};
+use crate::numbers::{ends, norm, real, unit};
 
 /// Accelerometers of a unit without a stand.
 pub const SENSORS: usize = 3;
@@ -37,7 +38,6 @@ pub struct AccelFit {
 
 impl AccelFit {
     /// Specific force along the case axes (m/s²) that three outputs stand for.
-    #[must_use]
     pub fn force(&self, outputs: &[f64]) -> [f64; 3] {
         let mut along = [0.0; 3];
         for (index, value) in along.iter_mut().enumerate() {
@@ -58,10 +58,6 @@ fn resolve(rows: &[[f64; 3]; 3], s: [f64; 3]) -> [f64; 3] {
 
 /// Input axes from the three angles.
 fn rows_of(angles: [f64; 3]) -> [[f64; 3]; 3] {
-    let unit = |v: [f64; 3]| {
-        let norm = libm::sqrt(v.iter().map(|c| c * c).sum());
-        v.map(|c| c / norm)
-    };
     [unit([1.0, angles[0], angles[1]]), unit([0.0, 1.0, angles[2]]), [0.0, 0.0, 1.0]]
 }
 
@@ -85,8 +81,7 @@ pub fn fit(poses: &[Vec<f64>], gravity: f64) -> Result<AccelFit, NoSolution> {
         poses.iter().map(|outputs| norm(fit.force(outputs)) / gravity - 1.0).collect()
     };
     let Solution { parameters, covariance, residuals, chi_square, degrees } = solve(&[0.0; 9], residuals)?;
-    #[expect(clippy::cast_precision_loss, reason = "poses")]
-    let variance = chi_square / degrees.max(1) as f64;
+    let variance = chi_square / real(degrees.max(1));
     let covariance = covariance * variance;
     let mut fit = of(&parameters);
     for (index, sigma) in fit.sigma.iter_mut().enumerate() {
@@ -102,12 +97,9 @@ pub fn fit(poses: &[Vec<f64>], gravity: f64) -> Result<AccelFit, NoSolution> {
 /// and brought to the size of one.
 fn ellipsoid(poses: &[Vec<f64>], gravity: f64) -> Result<([f64; 3], [f64; 3]), NoSolution> {
     let column = |i: usize| poses.iter().map(move |pose| pose.get(i).copied().unwrap_or(f64::NAN));
-    let ends = |i: usize| {
-        column(i)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-    };
-    let centre = [0, 1, 2].map(|i| 0.5 * (ends(i).0 + ends(i).1));
-    let half = [0, 1, 2].map(|i| 0.5 * (ends(i).1 - ends(i).0));
+    let ends = [0, 1, 2].map(|i| ends(column(i)));
+    let centre = ends.map(|[low, high]| 0.5 * (low + high));
+    let half = ends.map(|[low, high]| 0.5 * (high - low));
     if let Some(index) = half.iter().position(|half| half.is_nan() || *half <= 0.0) {
         return Err(NoSolution::NotDetermined(index));
     }
@@ -129,9 +121,4 @@ fn ellipsoid(poses: &[Vec<f64>], gravity: f64) -> Result<([f64; 3], [f64; 3]), N
     } else {
         (half.map(|half| half / gravity), centre)
     })
-}
-
-/// Length of a vector.
-pub(super) fn norm(v: [f64; 3]) -> f64 {
-    libm::sqrt(v.iter().map(|c| c * c).sum())
 }

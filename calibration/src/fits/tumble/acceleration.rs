@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fits::positions::pose::Pose;
 use crate::lsq::linear::{SINGULAR, Weak, solve};
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::size::Size;
 
@@ -35,14 +36,12 @@ pub struct GyroDrift {
 
 impl Response {
     /// What the gyro reads at a specific force (m/s², in case axes).
-    #[must_use]
     pub fn reading(&self, force: [f64; 3]) -> f64 {
         self.by_force.iter().zip(force).fold(self.bias, |sum, (coefficient, force)| sum + coefficient * force)
     }
 }
 
 /// Fits one gyro over the poses of `among`; `force` has the specific force of each pose. `None` where the poses do not tell.
-#[must_use]
 pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> Option<Response> {
     // A mean over twice the time has half the variance.
     let weight = |pose: usize| poses[pose].duration_s.sqrt();
@@ -55,8 +54,7 @@ pub fn fit(poses: &[Pose], force: &[[f64; 3]], gyro: usize, among: &[usize]) -> 
     let readings = DVector::from_iterator(among.len(), among.iter().map(reading));
     let found = solve(&design, &readings, Weak::Refuse(SINGULAR)).ok()?;
     let c = &found.coefficients;
-    #[expect(clippy::cast_precision_loss, reason = "poses")]
-    let degrees = among.len().checked_sub(COEFFICIENTS).filter(|degrees| *degrees > 0)? as f64;
+    let degrees = real(among.len().checked_sub(COEFFICIENTS).filter(|degrees| *degrees > 0)?);
     let deviation = (found.chi_square() / degrees).sqrt();
     let sigma = std::array::from_fn(|index| found.sigma(index) * deviation);
     Some(Response { bias: c[0], by_force: [c[1], c[2], c[3]], sigma })

@@ -80,7 +80,6 @@ fn gyros(
 
 /// The document that "before" stands for, and what that is in words: the one that was given; readings in m/s² as they are; or else one
 /// scale factor and one zero for all accelerometers, for readings in V or counts alone are no specific force.
-#[must_use]
 pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'static str) {
     let mut document = base.clone();
     let mean = |values: [f64; 3]| tidy(values.iter().sum::<f64>() / 3.0);
@@ -101,9 +100,7 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'sta
             sensor.set(Feature::One, Curve::new(constant(mean(tumble.accel.bias))));
         }
     }
-    if let Ok(gyro) =
-        tumble.gyro.as_ref().map_err(|_| ()).and_then(|gyro| if given { Err(()) } else { Ok(gyro) })
-    {
+    if let (Ok(gyro), false) = (&tumble.gyro, given) {
         // Without the mean at rest the gyros would be judged by their bias, which nobody leaves in.
         for (sensor, rest) in document.gyro.sensor.iter_mut().zip(gyro.rest) {
             let rest = AngularRate::from_rad_per_s(rest).as_deg_per_h();

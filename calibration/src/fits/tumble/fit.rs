@@ -8,10 +8,11 @@ use crate::fits::positions::faults;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::still::{StillLimits, still};
 use crate::fits::positions::track::Track;
+use crate::numbers::{dot, ends, norm, real, unit};
 use crate::report::figures::{counted, short};
 use crate::size::Size;
 
-use super::accel::{self, AccelFit, SENSORS, norm};
+use super::accel::{self, AccelFit, SENSORS};
 use super::acceleration::{self, GyroDrift};
 use super::gyro::{self, GyroFit, Transition};
 
@@ -64,7 +65,6 @@ pub struct Tumble {
 
 impl Tumble {
     /// Mean temperature of a channel over all poses (°C).
-    #[must_use]
     pub fn mean_temperature(&self, channel: &str) -> Option<f64> {
         let of =
             |pose: &Pose| Some((pose.temperature_deg_c.get(channel)? * pose.duration_s, pose.duration_s));
@@ -189,22 +189,14 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
 /// Outputs are brought to the size of one by the largest half range of all axes: an axis that never points up or down has a
 /// small one, and must not be blown up to the size of the others.
 fn flat(poses: &[Pose]) -> Option<String> {
-    let ends = [0, 1, 2].map(|i| {
-        poses.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), pose| {
-            let value = pose.outputs.get(i).copied().unwrap_or(f64::NAN);
-            (low.min(value), high.max(value))
-        })
-    });
-    let half = ends.iter().map(|(low, high)| 0.5 * (high - low)).fold(0.0, f64::max);
+    let ends = [0, 1, 2].map(|i| ends(poses.iter().map(|pose| pose.output(i))));
+    let half = ends.iter().map(|[low, high]| 0.5 * (high - low)).fold(0.0, f64::max);
     let mut scatter = nalgebra::Matrix3::<f64>::zeros();
     for pose in poses {
-        let v = nalgebra::Vector3::from_fn(|i, _| {
-            (pose.outputs.get(i).copied().unwrap_or(f64::NAN) - 0.5 * (ends[i].0 + ends[i].1)) / half
-        });
+        let v = nalgebra::Vector3::from_fn(|i, _| (pose.output(i) - 0.5 * (ends[i][0] + ends[i][1])) / half);
         scatter += v * v.transpose();
     }
-    #[expect(clippy::cast_precision_loss, reason = "poses")]
-    let eigen = (scatter / poses.len() as f64).symmetric_eigen();
+    let eigen = (scatter / real(poses.len())).symmetric_eigen();
     let (index, least) = eigen.eigenvalues.argmin();
     if least.is_nan() || least >= THINNEST {
         return None;
@@ -238,14 +230,6 @@ fn apart(directions: &[[f64; 3]], a: usize, b: usize) -> bool {
     dot(directions[a], directions[b]) < libm::cos(ALIKE_RAD)
 }
 
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    v.map(|c| c / norm(v))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 /// Mean output of each gyro over all poses.
 fn at_rest(poses: &[Pose]) -> [f64; 3] {
     let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
@@ -277,7 +261,6 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Res
 }
 
 /// Turns between neighbouring poses, by the specific force that each has.
-#[must_use]
 pub fn transitions(poses: &[Pose], force: impl Fn(&Pose) -> [f64; 3]) -> Vec<Transition> {
     let direction = |pose: &Pose| unit(force(pose));
     let between = |pair: &[Pose]| {

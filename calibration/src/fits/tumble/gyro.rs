@@ -7,9 +7,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::fits::positions::track::Track;
 use crate::lsq::nonlinear::{NoSolution, solve};
+use crate::numbers::{norm, real};
 use crate::size::Size;
 
-use super::accel::norm;
 use search::Start;
 
 /// Largest angle (°, rms) by which fitted gyros may miss the direction of gravity after a turn; half a degree is usual by hand.
@@ -33,14 +33,12 @@ pub struct GyroFit {
 
 impl GyroFit {
     /// The two case axes that a gyro's input axis lies across, whichever way round it is: those that its angles are along.
-    #[must_use]
     pub fn across(&self, gyro: usize) -> [usize; 2] {
         let along = Vector3::from(self.rows.get(gyro).copied().unwrap_or_default()).iamax();
         others(along)
     }
 
     /// Angle that is left after a turn (°, rms).
-    #[must_use]
     pub fn left_deg(&self) -> f64 {
         Size::of(&self.angle).rms.to_degrees()
     }
@@ -106,8 +104,7 @@ fn from(
     };
     let found = solve(&[0.0; 9], residuals)?;
     // Two of the three components of a unit vector are free.
-    #[expect(clippy::cast_precision_loss, reason = "transitions")]
-    let degrees = (2 * transitions.len()).saturating_sub(9).max(1) as f64;
+    let degrees = real((2 * transitions.len()).saturating_sub(9).max(1));
     let size = (found.chi_square / degrees).sqrt();
     let p = &found.parameters;
     // Residuals are differences of unit vectors: chords.
@@ -140,7 +137,6 @@ fn turned(track: &Track, rest: [f64; 3], inverse: &Matrix3<f64>, transition: &Tr
 
 /// Angle (rad) between the direction that corrected rates predict after a transition and the one that corrected accelerometers
 /// find there.
-#[must_use]
 pub fn angle_of(track: &Track, transition: &Transition) -> f64 {
     let mut seen = Vector3::from(transition.directions[0]);
     for tick in transition.ticks[0]..transition.ticks[1] {

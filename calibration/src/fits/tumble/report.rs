@@ -1,24 +1,25 @@
 //! What is said of a tumbled unit.
 
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Panel, Samples, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use isotherm_protocol::document::{Document, Sample};
 use serde_json::json;
 use std::sync::Arc;
 
-use super::accel::norm;
 use super::acceleration::GyroDrift;
 use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
 use crate::axes::AXES;
+use crate::document::accelerometers;
 use crate::document::written::tidy;
 use crate::error::Error;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
+use crate::numbers::{norm, unit};
 use crate::report::figures::{counted, fixed, short, six};
-use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict};
+use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict, output_unit};
 use crate::size::Size;
 
 /// Times by which the rms may grow in poses that the fit has not seen.
@@ -39,14 +40,13 @@ pub struct Left {
 
 impl Left {
     /// Of the same ticks as the poses.
-    #[must_use]
     pub fn of(track: &Track, poses: &[Pose], gravity: f64) -> Self {
         let own: Vec<Pose> = poses.iter().map(|pose| Pose::over(track, pose.run, pose.interval)).collect();
         let force: Vec<[f64; 3]> = own.iter().map(|pose| pose.force_m_per_s2).collect();
         let turns = transitions(&own, |pose| pose.force_m_per_s2);
         Self {
             length: force.iter().map(|force| norm(*force) - gravity).collect(),
-            direction: force.iter().map(|force| force.map(|c| c / norm(*force))).collect(),
+            direction: force.iter().map(|force| unit(*force)).collect(),
             angle_deg: turns.iter().map(|turn| angle_of(track, turn).to_degrees()).collect(),
             turn_s: turns
                 .iter()
@@ -57,7 +57,6 @@ impl Left {
 }
 
 /// Everything that is said of a run.
-#[must_use]
 pub fn report(
     document: &Document,
     tumble: &Tumble,
@@ -67,7 +66,7 @@ pub fn report(
 ) -> FitReport {
     let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit)
         .counting("poses, turns");
-    let accel = accelerometers(tumble, [&before.length, &after.length], settings.gravity);
+    let accel = of_accelerometers(tumble, [&before.length, &after.length], settings.gravity);
     let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
     let gyro = gyro.stated_as(Figure::Rms);
     let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);
@@ -106,7 +105,7 @@ pub fn report(
 }
 
 /// What came of the accelerometers: held-out poses decide.
-fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
+fn of_accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
     let sizes = [before, after].map(|values| Size::of(values));
     let outside = Size::of(&tumble.held_out);
     let verdict = Verdict::new("|f|−g", "m/s²", sizes).out_of_sample(Some([sizes[0], outside]));
@@ -136,30 +135,18 @@ fn accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64
 /// What is left by itself: beside what was there before, it is a line at zero.
 fn left_chart(tumble: &Tumble, after: &Left) -> Chart {
     let times = tumble.poses.iter().map(Pose::middle_s);
-    let own: Vec<(f64, f64)> = times.zip(after.length.iter().map(|length| length * 1e3)).collect();
-    let turns: Vec<(f64, f64)> = after.turn_s.iter().copied().zip(after.angle_deg.iter().copied()).collect();
-    let panel = |title: &str, unit: &str, points: Vec<(f64, f64)>| Panel {
-        title: title.to_owned(),
-        unit: unit.to_owned(),
-        height: 170,
-        logarithmic: false,
-        content: Content::Series(vec![Series {
-            name: "after".to_owned(),
-            ink: Ink::Corrected,
-            form: Form::Dots,
-            samples: Samples::points(points),
-        }]),
-    };
-    Chart {
-        caption: "|f| − g of each pose, and the angle by which the gyros miss the direction of gravity after each turn.".to_owned(),
-        x: Axis::of("time since the run's beginning", "s"),
-        panels: vec![panel("|f|−g", "mm/s²", own), panel("gyros", "°", turns)],
-        marks: Vec::new(),
-    }
+    let own =
+        Series::dots("after", Ink::Corrected, times.zip(after.length.iter().map(|length| length * 1e3)));
+    let turns = after.turn_s.iter().copied().zip(after.angle_deg.iter().copied());
+    let turns = Series::dots("after", Ink::Corrected, turns);
+    Chart::of(
+        "|f| − g of each pose, and the angle by which the gyros miss the direction of gravity after each turn.",
+        Axis::of("time since the run's beginning", "s"),
+        vec![Panel::of("|f|−g", "mm/s²", 170, vec![own]), Panel::of("gyros", "°", 170, vec![turns])],
+    )
 }
 
 fn rows(tumble: &Tumble, after: &Left) -> Table {
-    let head = ["pose", "from, s", "to, s", "x", "y", "z", "|f|−g, mm/s²"].map(str::to_owned).to_vec();
     let poses = tumble.poses.iter().zip(&after.direction).zip(&after.length).enumerate();
     let row = |(index, ((pose, direction), length)): (usize, ((&Pose, &[f64; 3]), &f64))| {
         let mut row = vec![(index + 1).to_string()];
@@ -168,7 +155,7 @@ fn rows(tumble: &Tumble, after: &Left) -> Table {
         row.push(fixed(length * 1e3, 3));
         row
     };
-    Table { head, rows: poses.map(row).collect() }
+    Table::of(["pose", "from, s", "to, s", "x", "y", "z", "|f|−g, mm/s²"], poses.map(row))
 }
 
 /// Reading of a gyro at rest without specific force, or its mean over the poses where that is not known (rad/s of the log).
@@ -205,11 +192,10 @@ fn at_rest(tumble: &Tumble) -> Option<String> {
 
 fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
     let accel = &tumble.accel;
-    let output = document.accel.as_ref().map_or("", |accel| match accel.output {
-        isotherm_protocol::document::AccelOutput::Counts => "counts/s",
-        isotherm_protocol::document::AccelOutput::Volts => "V or raw",
-        isotherm_protocol::document::AccelOutput::MetresPerSecondSquared => "m/s²",
-    });
+    let output = match output_unit(document) {
+        "V" => "V or raw",
+        other => other,
+    };
     let mut all = Vec::new();
     for (axis, name) in AXES.iter().enumerate() {
         let of = |what: &str| format!("accelerometer {name} {what}");
@@ -265,13 +251,6 @@ fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
 /// # Errors
 /// [`Error::Document`] where it cannot be written, which would be a mistake here.
 pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Result<toml::Table, Error> {
-    let coefficients: serde_json::Map<String, serde_json::Value> = report
-        .coefficients
-        .iter()
-        .map(|c| {
-            (c.name.clone(), json!({ "value": c.value, "sigma": c.sigma.unwrap_or(0.0), "unit": c.unit }))
-        })
-        .collect();
     let covariance: Vec<Vec<f64>> =
         tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
     let about = json!({
@@ -282,15 +261,14 @@ pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Resu
         "held_out_rms_m_per_s2": Size::of(&tumble.held_out).rms,
         "verdict": report.headline(),
         "warnings": report.warnings,
-        "coefficients": coefficients,
+        "coefficients": report.coefficients_by_name(),
         // Scale factors (relative), biases over K·g, angles xy, xz, yz (rad).
         "accelerometer_covariance": covariance,
     });
-    toml::Table::try_from(about).map_err(|error| Error::Document(vec![error.to_string()]))
+    toml::Table::try_from(about).map_err(|error| Error::document(&error))
 }
 
 /// Standard errors of scale factors, biases and axes, for what compares documents.
-#[must_use]
 pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
     let mut sigmas = Sigmas::default();
     let accel = &tumble.accel;
@@ -302,8 +280,7 @@ pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
         _ => 0.0,
     };
     let arcsec = |rad: f64| tidy(rad * ARCSEC_PER_RAD);
-    let sensors = document.accel.iter().flat_map(|accel| &accel.sensor);
-    for (axis, sensor) in sensors.enumerate().take(AXES.len()) {
+    for (axis, sensor) in accelerometers(document).iter().enumerate().take(AXES.len()) {
         let scale = tidy(accel.scale[axis].abs() * accel.sigma[axis]);
         sigmas.put("accel", &sensor.name, "scale_factor", vec![scale]);
         sigmas.put("accel", &sensor.name, "bias", vec![tidy(accel.sigma[3 + axis])]);

@@ -7,6 +7,7 @@
 //! averaging times give what a fit over all of them needs, which the paper does not need and does not have.
 
 use super::deviation::Estimator;
+use crate::numbers::real;
 
 /// Kinds of noise by the power of frequency that the rate's spectrum goes with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,10 +60,8 @@ fn kernel(law: PowerLaw, smooth: bool, t: f64) -> f64 {
 
 /// Equivalent degrees of freedom of a variance over means of `m` ticks that rests on so many differences: ν in
 /// "ν·σ̂²/σ² is distributed as χ²".
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 pub fn degrees_of_freedom(estimator: Estimator, law: PowerLaw, m: usize, differences: usize) -> f64 {
-    let count = differences.max(1) as f64;
+    let count = real(differences.max(1));
     // Differences per averaging time, and how many of them one sample of the kernel stands for.
     let per_time = if estimator == Estimator::Plain { 1 } else { m.max(1) };
     let smooth = estimator == Estimator::Modified;
@@ -71,16 +70,16 @@ pub fn degrees_of_freedom(estimator: Estimator, law: PowerLaw, m: usize, differe
     let middle = kernel(law, smooth, 0.0);
     let share = |lag: f64| (1.0 - lag / count).max(0.0);
     let lags: Vec<f64> = if spikes {
-        vec![per_time as f64, 2.0 * per_time as f64]
+        vec![real(per_time), 2.0 * real(per_time)]
     } else {
-        let last = (REACH * per_time as f64).min(count - 1.0);
-        (1..=u32::MAX).map(|k| f64::from(k) * stride as f64).take_while(|lag| *lag <= last).collect()
+        let last = (REACH * real(per_time)).min(count - 1.0);
+        (1..=u32::MAX).map(|k| f64::from(k) * real(stride)).take_while(|lag| *lag <= last).collect()
     };
     let square = |lag: f64| {
-        let value = kernel(law, smooth, lag / per_time as f64) / middle;
+        let value = kernel(law, smooth, lag / real(per_time)) / middle;
         share(lag) * value * value
     };
-    let sum = stride as f64 * (1.0 + 2.0 * lags.into_iter().map(square).sum::<f64>());
+    let sum = real(stride) * (1.0 + 2.0 * lags.into_iter().map(square).sum::<f64>());
     // A stride says nothing where there are fewer differences than that.
     (count / sum.min(count)).max(1.0)
 }
@@ -123,8 +122,6 @@ impl Mixture {
     }
 
     /// Covariance of two overlapping variances, over means of so many ticks (first) from so many differences (second).
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
     pub fn covariance(&self, one: (usize, usize), other: (usize, usize)) -> f64 {
         let (short, long) = (one.0.min(other.0), one.0.max(other.0));
         if long > FARTHEST_RATIO * short {
@@ -133,16 +130,16 @@ impl Mixture {
         let stride = (short / SAMPLES).max(1);
         // Spikes fall between samples that are far apart; quantization is nothing at such times.
         let smooth = Self { quantization: if stride == 1 { self.quantization } else { 0.0 }, ..*self };
-        let (a, b) = (one.0 as f64, other.0 as f64);
-        let (differences, others) = (one.1 as f64, other.1 as f64);
+        let (a, b) = (real(one.0), real(other.0));
+        let (differences, others) = (real(one.1), real(other.1));
         let ramps = self.ramp * self.ramp * a * a * b * b;
         let pairs = |lag: f64| (differences.min(others + lag) - lag.max(0.0)).max(0.0);
         let middle = b - a;
-        let reach = (3.0 * (a + b) / stride as f64).ceil();
+        let reach = (3.0 * (a + b) / real(stride)).ceil();
         let mut sum = 0.0;
         let mut k = -reach;
         while k <= reach {
-            let lag = middle.round() + k * stride as f64;
+            let lag = middle.round() + k * real(stride);
             let count = pairs(lag);
             if count > 0.0 {
                 let c = smooth.between(a, b, lag);
@@ -150,7 +147,7 @@ impl Mixture {
             }
             k += 1.0;
         }
-        sum * stride as f64 / (4.0 * a * a * b * b * differences * others)
+        sum * real(stride) / (4.0 * a * a * b * b * differences * others)
     }
 }
 

@@ -9,6 +9,8 @@
 //!
 //! A gap in a log ends a piece: no difference reaches over it, and the sums of all pieces are pooled.
 
+use crate::numbers::real;
+
 /// Which variance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
@@ -42,7 +44,6 @@ const LANES: usize = 8;
 
 impl Phase {
     /// From pieces of readings; `mean` is subtracted from each so that the sums stay small.
-    #[must_use]
     pub fn new<'a>(pieces: impl IntoIterator<Item = &'a [f64]>, mean: f64) -> Self {
         let sums = |piece: &[f64]| {
             let mut sums = Vec::with_capacity(piece.len() + 1);
@@ -58,14 +59,11 @@ impl Phase {
     }
 
     /// Readings of the longest piece.
-    #[must_use]
     pub fn longest(&self) -> usize {
         self.pieces.iter().map(|piece| piece.len().saturating_sub(1)).max().unwrap_or(0)
     }
 
     /// The variance over means of `m` (≥ 1) ticks; `None` where no piece is long enough.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
     pub fn variance(&self, estimator: Estimator, m: usize) -> Option<Variance> {
         let m = m.max(1);
         let (mut sum, mut differences) = (0.0, 0);
@@ -81,10 +79,10 @@ impl Phase {
         if differences == 0 {
             return None;
         }
-        let width = m as f64;
+        let width = real(m);
         let power =
             if estimator == Estimator::Modified { width * width * width * width } else { width * width };
-        Some(Variance { ticks: m, variance: sum / (2.0 * power * differences as f64), differences })
+        Some(Variance { ticks: m, variance: sum / (2.0 * power * real(differences)), differences })
     }
 }
 
@@ -141,7 +139,6 @@ fn modified(x: &[f64], m: usize) -> (f64, usize) {
 }
 
 /// Averaging lengths in octaves or decades, as far as a log of `ticks` allows.
-#[must_use]
 pub fn lengths(ticks: usize, factor: usize) -> Vec<usize> {
     let lengths = std::iter::successors(Some(1_usize), |m| m.checked_mul(factor.max(2)));
     lengths.take_while(|m| 3 * m <= ticks).collect()

@@ -17,6 +17,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::confidence::{Mixture, PowerLaw, degrees_of_freedom};
 use super::deviation::{Estimator, Variance};
 use crate::lsq::linear::{self, SINGULAR, Weak};
+use crate::numbers::real;
 
 /// One coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,20 +45,17 @@ impl Term {
     ];
 
     /// Its letter.
-    #[must_use]
     pub const fn symbol(self) -> &'static str {
         ["Q", "N", "B", "K", "R"][self as usize]
     }
 
     /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         ["quantization", "angle random walk", "bias instability", "rate random walk", "rate ramp"]
             [self as usize]
     }
 
     /// σ²(τ) for a coefficient of one, τ in s.
-    #[must_use]
     pub fn variance(self, tau_s: f64) -> f64 {
         match self {
             Self::Quantization => 3.0 / (tau_s * tau_s),
@@ -69,7 +67,6 @@ impl Term {
     }
 
     /// The kind of noise whose degrees of freedom hold where it dominates; a ramp counts as random walk.
-    #[must_use]
     pub const fn law(self) -> PowerLaw {
         match self {
             Self::Quantization => PowerLaw::Quantization,
@@ -99,7 +96,6 @@ pub enum Coefficient {
 
 impl Coefficient {
     /// The value, or what it is below.
-    #[must_use]
     pub const fn value_or_limit(&self) -> f64 {
         match *self {
             Self::Observed { value, .. } => value,
@@ -134,7 +130,6 @@ const SIGMAS_95: f64 = 1.96;
 
 impl NoiseFit {
     /// Fits overlapping variances of readings every `tick_s`; `None` with fewer than three.
-    #[must_use]
     pub fn of(variances: &[Variance], tick_s: f64) -> Option<Self> {
         let problem = Problem::new(variances, tick_s)?;
         let exact = problem.fit(0.0)?;
@@ -144,19 +139,16 @@ impl NoiseFit {
 
     /// Whether the five terms describe the log, if only within the model error; otherwise something else than noise is in it, and its
     /// coefficients say nothing.
-    #[must_use]
     pub fn describes(&self) -> bool {
         self.chi_square_per_degree <= LARGEST_CHI_SQUARE
     }
 
     /// What the fit says of a coefficient.
-    #[must_use]
     pub const fn of_term(&self, term: Term) -> &Coefficient {
         &self.coefficients[term as usize]
     }
 
     /// σ²(τ) of the fit, by term.
-    #[must_use]
     pub fn variances(&self, tau_s: f64) -> [f64; 5] {
         Term::ALL.map(|term| match self.of_term(term) {
             Coefficient::Observed { value, .. } => value * value * term.variance(tau_s),
@@ -165,7 +157,6 @@ impl NoiseFit {
     }
 
     /// The term that dominates at τ; angle random walk where nothing is observable.
-    #[must_use]
     pub fn dominant(&self, tau_s: f64) -> Term {
         let of = self.variances(tau_s);
         let largest = Term::ALL.into_iter().max_by(|a, b| of[*a as usize].total_cmp(&of[*b as usize]));
@@ -181,7 +172,6 @@ fn observed(square: f64, sigma: f64) -> Coefficient {
 }
 
 /// Factors to the ends of the 95 % interval of a variance with so many degrees of freedom.
-#[must_use]
 pub fn interval(degrees: f64) -> [f64; 2] {
     if degrees > 1e5 {
         let half = SIGMAS_95 * (2.0 / degrees).sqrt();
@@ -203,13 +193,12 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    #[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
     fn new(variances: &'a [Variance], tick_s: f64) -> Option<Self> {
         let count = variances.len();
         if count < 3 || variances.iter().any(|v| v.variance <= 0.0 || !v.variance.is_finite()) {
             return None;
         }
-        let tau = |row: usize| variances.get(row).map_or(1.0, |v| v.ticks as f64) * tick_s;
+        let tau = |row: usize| variances.get(row).map_or(1.0, |v| real(v.ticks)) * tick_s;
         let design = DMatrix::from_fn(count, 5, |row, column| Term::ALL[column].variance(tau(row)));
         let values = DVector::from_iterator(count, variances.iter().map(|v| v.variance));
         Some(Self { variances, tick_s, design, values })
@@ -226,8 +215,7 @@ impl<'a> Problem<'a> {
         let (squares, kept) = whitened.eliminate()?;
         let (_, cost, sigmas) = whitened.solve(&kept)?;
         let degrees = self.variances.len().saturating_sub(kept.len()).max(1);
-        #[expect(clippy::cast_precision_loss, reason = "a handful")]
-        let chi_square_per_degree = cost / degrees as f64;
+        let chi_square_per_degree = cost / real(degrees);
         let mut coefficients = [Coefficient::NotObservable { below: 0.0 }; 5];
         for (place, coefficient) in coefficients.iter_mut().enumerate() {
             let square = squares[place];

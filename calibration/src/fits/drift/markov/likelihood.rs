@@ -6,6 +6,7 @@ use super::{Beside, Noise};
 use crate::fits::drift::slow::Slow;
 use crate::lsq::correlated::{self, Data};
 use crate::lsq::search::compass;
+use crate::numbers::real;
 
 /// Step of the numeric second derivatives, in natural logarithms.
 const DIFFERENCE: f64 = 0.05;
@@ -35,9 +36,8 @@ impl Solution {
         count * libm::log(self.squares / count) + self.own_determinant
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "at most seven")]
     fn count_of_columns(&self) -> f64 {
-        self.beta.len() as f64
+        real(self.beta.len())
     }
 
     /// The same at a given variance.
@@ -92,8 +92,7 @@ impl<'a> Problem<'a> {
             coefficients, covariance, chi_square, log_variance, log_determinant, ..
         } = self.data.solve(noise)?;
         let determinant = log_variance + log_determinant;
-        #[expect(clippy::cast_precision_loss, reason = "at most some hundred")]
-        let degrees = (self.data.len() - coefficients.len()) as f64;
+        let degrees = real(self.data.len() - coefficients.len());
         (chi_square > 0.0 && determinant.is_finite()).then_some(Solution {
             beta: coefficients,
             inverse: covariance,

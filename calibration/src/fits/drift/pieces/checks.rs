@@ -5,6 +5,7 @@ use super::{Spacing, steps};
 use crate::axes::sensor_name;
 use crate::error::Error;
 use crate::fits::drift::columns::{Columns, Kind};
+use crate::numbers::{real, seconds};
 use crate::report::figures::{short, six};
 use crate::robust::{median, middle_and_scatter, scatter_of_steps};
 use crate::runs::faults::{self, Fault};
@@ -50,18 +51,16 @@ pub fn raw(kind: Kind, ticks: &Ticks) -> Result<Vec<String>, Error> {
 }
 
 /// Where a reading stays exactly the same for long, though elsewhere it changes from tick to tick.
-#[must_use]
 #[expect(
-    clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "counts of ticks are far below 2⁵³"
 )]
 pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
     let (first, last) = (*end_ns.first()?, *end_ns.last()?);
-    let length_s = last.saturating_sub(first) as f64 * 1e-9;
-    let tick_s = length_s / (column.len().max(2) - 1) as f64;
-    let limit = (FROZEN_SHARE * column.len() as f64).min(FROZEN_S / tick_s).max(FROZEN_TICKS as f64) as usize;
+    let length_s = seconds(last.saturating_sub(first));
+    let tick_s = length_s / real(column.len().max(2) - 1);
+    let limit = (FROZEN_SHARE * real(column.len())).min(FROZEN_S / tick_s).max(real(FROZEN_TICKS)) as usize;
     let (mut long, mut repeated, mut changed) = (Vec::new(), 0_usize, 0_usize);
     let mut start = 0;
     for run in column.chunk_by(|a, b| (a - b).abs() <= 0.0) {
@@ -75,10 +74,10 @@ pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
     }
     // What never changes at all is refused as dead.
     let &(from, to) = long.first().filter(|_| long.len() + changed > 1)?;
-    if repeated as f64 > LARGEST_REPEATED * (repeated + changed) as f64 {
+    if real(repeated) > LARGEST_REPEATED * real(repeated + changed) {
         return None;
     }
-    let since = |at: usize| end_ns.get(at).map_or(0.0, |end| end.saturating_sub(first) as f64 * 1e-9);
+    let since = |at: usize| end_ns.get(at).map_or(0.0, |end| seconds(end.saturating_sub(first)));
     let further = match long.len() {
         1 => String::new(),
         count => format!(", and {} times more, until {:.2} s at last", count - 1, since(long[count - 1].1)),
@@ -149,7 +148,6 @@ fn gravity(columns: &Columns) -> Option<String> {
 }
 
 /// Words where the median rate of a gyro (°/s) is not that of a unit at rest.
-#[must_use]
 pub fn moves(called: &str, deg_per_s: f64) -> Option<String> {
     (deg_per_s.abs() > FASTEST_DEG_PER_S).then(|| {
         format!(
@@ -162,11 +160,9 @@ pub fn moves(called: &str, deg_per_s: f64) -> Option<String> {
 }
 
 /// How much of a log is missing, where that is more than a little.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 pub fn missing(spacing: &Spacing, count: usize) -> Option<String> {
     let missing = spacing.missing();
-    let share = missing as f64 / (count + missing) as f64;
+    let share = real(missing) / real(count + missing);
     (share > LARGEST_MISSING).then(|| {
         format!(
             "warning: {missing} of {} ticks ({:.1} %) are missing: find out what loses them",
@@ -186,18 +182,18 @@ fn timing(columns: &Columns, spacing: &Spacing) -> Result<Option<String>, Error>
     let words = format!(
         "ticks are {} apart and last {} by the mapping or the producer: is the unit of the time column right, or is every other tick \
          missing?",
-        seconds(spacing.tick_s),
-        seconds(lasts_s)
+        length(spacing.tick_s),
+        length(lasts_s)
     );
     // A hundredth more, so that what was meant to be twice is twice.
     let limit = UNLIKE_FACTOR * (1.0 + UNLIKE);
     if ratio > limit || ratio < 1.0 / limit {
-        return Err(Error::Refused(vec![words]));
+        return Err(Error::refused(words));
     }
     Ok(Some(format!("warning: {words}")))
 }
 
-fn seconds(seconds: f64) -> String {
+fn length(seconds: f64) -> String {
     if seconds < 1.0 { format!("{} ms", short(seconds * 1e3)) } else { format!("{} s", short(seconds)) }
 }
 

@@ -1,6 +1,7 @@
 //! A step in readings that are otherwise steady: no drift, but a log of two states.
 
 use crate::fits::drift::columns::Columns;
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::robust::{SIGMA_PER_MAD, median};
 
@@ -68,8 +69,7 @@ pub(super) fn words(called: &str, columns: &Columns, column: &[f64]) -> Option<S
 }
 
 /// Of the good readings; no number without any.
-#[expect(clippy::cast_precision_loss, reason = "counts of ticks are far below 2⁵³")]
 fn mean(readings: &[f64]) -> f64 {
     let good = || readings.iter().copied().filter(|reading| reading.is_finite());
-    good().sum::<f64>() / good().count() as f64
+    good().sum::<f64>() / real(good().count())
 }

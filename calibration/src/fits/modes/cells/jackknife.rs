@@ -7,6 +7,7 @@ use isotherm_protocol::document::{Document, OrientationThermal};
 
 use super::{Cell, Cut, Gathered, MAX_POWER, Second, temperature};
 use crate::fits::modes::switches::dither_hz;
+use crate::numbers::seconds;
 
 /// Flags of a tick whose readings are not those of a settled instrument.
 const UNSETTLED: TickFlags = TickFlags::INTERPOLATED
@@ -80,7 +81,6 @@ impl Jackknife {
         }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a run is far below 2⁵³ ns")]
     pub(super) fn take(
         &mut self,
         raw: &GyroTick,
@@ -91,7 +91,7 @@ impl Jackknife {
         let Some(bare) = ticks.first() else { return };
         let begin_ns = bare.end_time.as_ns().saturating_sub(bare.duration.as_ns());
         let first_ns = *self.first_ns.get_or_insert(begin_ns);
-        let since_s = (begin_ns - first_ns) as f64 * 1e-9;
+        let since_s = seconds(begin_ns - first_ns);
         let signs = bare.mode.map(|mode| (mode, raw.meander));
         if signs != self.signs {
             self.close(gathered);
@@ -102,8 +102,7 @@ impl Jackknife {
             }
             self.signs = signs;
         }
-        let settling =
-            self.switched_ns.is_some_and(|switch| ((begin_ns - switch) as f64 * 1e-9) < self.cut.settle_s);
+        let settling = self.switched_ns.is_some_and(|switch| seconds(begin_ns - switch) < self.cut.settle_s);
         let flags = |any: SensorFlags| bare.gyro_flags.iter().any(|flags| flags.intersects(any));
         let invalid = bare.gyro_flags.iter().any(|flags| !flags.contains(SensorFlags::VALID));
         let stale = flags(SensorFlags::STALE_TEMPERATURE);

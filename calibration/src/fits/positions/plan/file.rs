@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Attitude, Plan, Position, mounting};
+use crate::numbers::{norm, unit};
 
 /// Reads the text of a file with a plan: CSV or TOML. What is wrong is told with the name.
 pub(super) fn read(text: &str, name: &str, is_csv: bool) -> Result<Plan, String> {
@@ -67,11 +68,11 @@ impl Written {
                     Attitude::Stand([first.to_radians(), second.to_radians()])
                 }
                 (None, None, Some(up)) => {
-                    let norm = libm::sqrt(up.iter().map(|c| c * c).sum());
-                    if !(norm.is_finite() && norm > 0.0) {
+                    let size = norm(up);
+                    if !(size.is_finite() && size > 0.0) {
                         return Err(format!("position {:?}: up is {up:?}, not a direction", position.name));
                     }
-                    Attitude::Up(up.map(|c| c / norm))
+                    Attitude::Up(unit(up))
                 }
                 _ => {
                     return Err(format!(

@@ -10,6 +10,7 @@ use crate::fits::positions::track::Track;
 use crate::fits::tumble::gyro::LARGEST_LEFT_DEG;
 use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::lsq::nonlinear::NoSolution;
+use crate::numbers::real;
 use crate::report::figures::short;
 use crate::size::Size;
 
@@ -114,8 +115,7 @@ pub(super) fn beyond_noise(track: &Track, poses: &[Pose], fit: &AccelFit) -> Opt
         let of = |(i, along): (usize, f64)| (along / fit.scale[i]).powi(2) * intensity[i];
         along(pose).into_iter().enumerate().map(of).sum::<f64>() / pose.duration_s
     };
-    #[expect(clippy::cast_precision_loss, reason = "poses")]
-    let noise = (poses.iter().map(variance).sum::<f64>() / poses.len() as f64).sqrt();
+    let noise = (poses.iter().map(variance).sum::<f64>() / real(poses.len())).sqrt();
     let left = Size::of(&fit.residual).rms;
     if noise.is_nan() || left <= (LARGEST_BEYOND_NOISE * noise).max(LITTLE * gravity) {
         return None;
@@ -159,8 +159,7 @@ fn follows_time(poses: &[Pose], fit: &AccelFit, along: impl Fn(&Pose) -> [f64; 3
     };
     let design = DMatrix::from_fn(poses.len(), OWN + WITH_TIME, |pose, column| row(pose)[column]);
     let left = DVector::from_column_slice(&fit.residual);
-    #[expect(clippy::cast_precision_loss, reason = "poses")]
-    let per_degree = |squares: f64, taken: usize| squares / (poses.len() - taken) as f64;
+    let per_degree = |squares: f64, taken: usize| squares / real(poses.len() - taken);
     linear::solve(&design, &left, Weak::Refuse(SINGULAR)).map_or(0.0, |found| {
         let more = per_degree(found.chi_square(), OWN + WITH_TIME);
         1.0 - more / per_degree(left.norm_squared(), OWN)

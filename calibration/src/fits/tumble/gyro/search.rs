@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Matrix3;
 
-use super::{Track, Transition, norm, others, turned};
+use super::{Track, Transition, others, turned};
+use crate::numbers::unit;
 use crate::runs::swapped::ORDERS;
 
 /// Factors between the log's unit of measure and rad/s that are tried: rad/s, °/s and rad/s for each other, hours for seconds,
@@ -45,7 +46,7 @@ impl Start {
             for (which, axis) in others(self.along[gyro]).into_iter().enumerate() {
                 row[axis] = angle(2 * gyro + which);
             }
-            row.map(|c| c / norm(row))
+            unit(row)
         })
     }
 
