@@ -69,7 +69,7 @@ pub fn show(written: &Written) -> Result<Shown, Error> {
     charts::charts(&mut sheet, written, &terms, range);
     let json = json!({
         "verdict": sheet.headline,
-        "document": serde_json::to_value(document).map_err(|error| Error::Document(vec![error.to_string()]))?,
+        "document": serde_json::to_value(&tree).map_err(|error| Error::Document(vec![error.to_string()]))?,
         "warnings": written.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "terms": terms.iter().map(|term| term_json(term, range)).collect::<Vec<_>>(),
     });
