@@ -24,8 +24,8 @@ use serde::{Deserialize, Serialize};
 pub use check::MAX_SELF_TEST_READINGS;
 pub use defect::{Defect, DefectKind, Section};
 pub use parts::{
-    AccelParts, BranchArgument, BranchedParts, CalibrationParts, CoefficientParts, GyroParts, RegressorParts,
-    Source, TermParts, TrendParts,
+    AccelParts, BranchArgument, BranchedParts, CalibrationParts, CoefficientParts, EVERYWHERE_DEG_C,
+    GyroParts, NO_LIMIT, RegressorParts, Source, TermParts, TrendParts,
 };
 pub use steady::{Jump, Steady};
 

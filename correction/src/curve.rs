@@ -4,6 +4,9 @@
 //! A curve is never extrapolated: outside its fitted range the argument is clamped to the range and the
 //! result says so (models §2). The unit of argument and value is that of the term that owns the curve.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use arrayvec::ArrayVec;
@@ -96,6 +99,17 @@ pub enum CurveError {
         /// Where: first argument of the offending stretch.
         near: f64,
     },
+}
+
+impl CurveError {
+    /// Where in the curve it lies, as a path below that of the curve.
+    pub(crate) fn place(&self) -> String {
+        match self {
+            Self::KnotsNotIncreasing { index, .. } => format!(".knots[{index}]"),
+            Self::EmptyRange { .. } => ".range".to_owned(),
+            _ => String::new(),
+        }
+    }
 }
 
 /// A curve's value at one argument.

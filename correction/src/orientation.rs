@@ -22,6 +22,8 @@ use serde::{Deserialize, Serialize};
 pub(crate) use linear::Rows;
 use linear::{condition_number, is_conditioned, orthonormal_columns};
 
+use parts::norm;
+
 pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
 pub use parts::{
     AxesPlay, CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
@@ -115,16 +117,9 @@ impl Orientation {
         }
 
         let mut rows = Rows::default();
-        for (row, (to, from)) in rows.iter_mut().zip(&parts.rows).enumerate() {
-            let norm = libm::sqrt(from.iter().map(|c| c * c).sum());
-            if (norm - 1.0).abs() <= ROW_NORM_TOLERANCE {
-                *to = from.map(|c| c / norm);
-            } else {
-                errors.push(OrientationError::RowNorm { row, norm, tolerance: ROW_NORM_TOLERANCE });
-            }
-        }
-        if !errors.is_empty() {
-            return Err(errors);
+        for (to, from) in rows.iter_mut().zip(&parts.rows) {
+            let norm = norm(from);
+            *to = from.map(|c| c / norm);
         }
 
         let mut slopes_per_deg_c = Rows::default();

@@ -30,6 +30,14 @@ pub struct OutOfRange<T = f64> {
     pub max: T,
 }
 
+impl<T> OutOfRange<T> {
+    /// Its name without the unit of measure.
+    pub(crate) fn quantity(&self) -> &'static str {
+        let end = self.name.find("_rad").unwrap_or(self.name.len());
+        self.name.get(..end).unwrap_or_default().trim_end_matches("_s")
+    }
+}
+
 /// Those of the stated numbers, each with its name and its range, that are outside it; what is no number is outside any.
 pub(crate) fn outside<T: PartialOrd + Copy, const N: usize>(
     stated: [(&'static str, T, [T; 2]); N],

@@ -81,6 +81,26 @@ impl<'t> Reader<'t> {
         self.places.contains_key(path)
     }
 
+    /// The path of what stands where only a stem of each key is known, the unit left out: `drift.sigma` for
+    /// `drift.sigma_deg_per_h`. What stands nowhere keeps its stem.
+    #[must_use]
+    pub fn spelled(&self, stems: &str) -> String {
+        let spell = |path: String, stem: &str| {
+            let (name, index) = stem.split_at(stem.find('[').unwrap_or(stem.len()));
+            let at = join(&path, name);
+            let longer = format!("{at}_");
+            let others = self.places.range(longer.clone()..).map(|(path, _)| path.as_str());
+            let others = others.take_while(|path| path.starts_with(&longer));
+            let mut keys = others.filter(|path| !path.split_at(longer.len()).1.contains(['.', '[']));
+            let key = match (self.has(&at), keys.next(), keys.next()) {
+                (false, Some(only), None) => only.to_owned(),
+                _ => at.clone(),
+            };
+            format!("{key}{index}")
+        };
+        stems.split('.').fold(String::new(), spell)
+    }
+
     /// Reports, and marks what was reported, so that later checks say nothing about it.
     pub fn refuse(&mut self, path: &str, message: impl Into<String>) {
         self.report(path, message);

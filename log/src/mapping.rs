@@ -76,24 +76,50 @@ pub enum OnBadRow {
 }
 
 /// How bytes become rows and cells.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 pub struct Layout {
     /// Encoding of the text.
+    #[serde(default)]
     pub encoding: Encoding,
     /// What stands between two cells.
     pub delimiter: Delimiter,
     /// Lines that begin with this are passed over.
+    #[schemars(
+        regex(pattern = r"^[^0-9\s+\-.]"),
+        extend("x-must-be" = "a prefix that no row of numbers begins with, and not empty")
+    )]
     pub comment: Option<String>,
     /// Lines in front, neither blank nor comments, that are passed over.
+    #[serde(default)]
+    #[schemars(range(max = 1_000_000))]
     pub skip_lines: u64,
     /// Whether the next line names the columns.
+    #[serde(default)]
     pub header: bool,
     /// Rows of data in front that are passed over.
+    #[serde(default)]
+    #[schemars(range(max = 1_000_000))]
     pub drop_rows: u64,
-    /// Decimal mark: `.` or `,`.
-    pub decimal_mark: u8,
+    /// Decimal mark.
+    #[serde(default)]
+    pub decimal_mark: DecimalMark,
     /// What happens to a row that cannot be read.
+    #[serde(default)]
     pub on_bad_row: OnBadRow,
+}
+
+/// Decimal mark of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[schemars(inline)]
+#[repr(u8)]
+pub enum DecimalMark {
+    /// A point.
+    #[default]
+    #[serde(rename = ".")]
+    Point = b'.',
+    /// A comma.
+    #[serde(rename = ",")]
+    Comma = b',',
 }
 
 /// A column, by name or by place.
@@ -260,22 +286,48 @@ pub struct GyroMapping {
     /// Phase of the slow meander.
     pub meander: Option<ModeMapping>,
     /// Half-period counts, positive and negative, one pair per sensor, or none.
-    pub half_periods: Vec<(Column, Column)>,
+    pub half_periods: Vec<HalfPeriodMapping>,
+}
+
+/// Half-period counts of one gyro.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct HalfPeriodMapping {
+    /// Column of the positive half.
+    pub positive: Column,
+    /// Column of the negative half.
+    pub negative: Column,
 }
 
 /// One temperature channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct TemperatureMapping {
     /// Name, as the calibration document spells it.
+    #[schemars(
+        with = "String",
+        length(min = 1, max = 24),
+        regex(pattern = r"\S"),
+        extend("x-must-be" = "a name of 1 to 24 bytes")
+    )]
     pub channel: ChannelName,
     /// Which column.
     pub column: Column,
-    /// Added to the cell to get what the channel takes: 0, or −273.15 for kelvin.
-    pub shift: f64,
+    /// Its unit.
+    pub unit: TemperatureUnit,
     /// Every how many rows a reading is taken, from the first on.
+    #[serde(default = "TemperatureMapping::every_row")]
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub every_rows: u64,
     /// A row whose cell is empty has no reading.
+    #[serde(default)]
     pub may_be_empty: bool,
+}
+
+impl TemperatureMapping {
+    fn every_row() -> u64 {
+        1
+    }
 }
 
 impl Mapping {
@@ -389,7 +441,9 @@ impl FileMapping {
             Some(SwitchMapping::Column(column)) => Some(column),
             _ => None,
         });
-        let halves = gyro.into_iter().flat_map(|gyro| gyro.half_periods.iter().flat_map(|(a, b)| [a, b]));
+        let halves = gyro
+            .into_iter()
+            .flat_map(|gyro| gyro.half_periods.iter().flat_map(|half| [&half.positive, &half.negative]));
         let stamps = self.time.stamps.as_ref().map(|stamps| &stamps.column);
         let temperatures = self.temperatures.iter().map(|temperature| &temperature.column);
         let status = self.status.iter().map(|status| &status.column);

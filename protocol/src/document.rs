@@ -108,7 +108,7 @@ impl Document {
         check::check(&mut reader, &document);
         let compiled = Calibration::new(&document.to_parts());
         if let Err(defects) = &compiled {
-            defects::report(&mut reader, &document, defects);
+            defects::report(&mut reader, defects);
         }
         let warnings = warnings::warnings(&reader, &document);
         match (reader.into_problems(), compiled) {

@@ -70,7 +70,7 @@ pub fn show(written: &Written) -> Result<Shown, Error> {
     charts::charts(&mut sheet, written, &terms, range);
     let json = json!({
         "verdict": sheet.headline,
-        "document": serde_json::to_value(document).map_err(|error| Error::document(&error))?,
+        "document": serde_json::to_value(&tree).map_err(|error| Error::document(&error))?,
         "warnings": written.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "terms": terms.iter().map(|term| term_json(term, range)).collect::<Vec<_>>(),
     });

@@ -5,6 +5,7 @@ mod self_test;
 mod sensors;
 
 use alloc::boxed::Box;
+use alloc::format;
 use alloc::vec::Vec;
 
 use super::Calibration;
@@ -13,7 +14,7 @@ use super::parts::CalibrationParts;
 use crate::channel::{Channel, ChannelParts, MAX_GRID_POINTS, ThermalFilter, ThermalFilterParts};
 use crate::drift::DriftModel;
 use crate::lanes::Lanes;
-use crate::reversal::{Reversal, ReversalError};
+use crate::reversal::Reversal;
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 use crate::servo::Servo;
 use crate::sigma::SigmaModel;
@@ -32,7 +33,7 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     let filter = ThermalFilter::new(&parts.filter);
     check_channels(checker, &parts.channels, &parts.auxiliaries);
 
-    checker.at(Section::Gyros).count("sensors", parts.gyros.len(), MIN_SENSORS, MAX_SENSORS);
+    checker.at(Section::Gyros).count("sensor", parts.gyros.len(), MIN_SENSORS, MAX_SENSORS);
     let gyros = parts.gyros.iter().enumerate();
     let models: Vec<_> =
         gyros.clone().filter_map(|(i, gyro)| gyro_model(checker, i, gyro, &filter, parts)).collect();
@@ -40,12 +41,12 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
         .clone()
         .filter_map(|(i, gyro)| {
             let checker = checker.at(Section::Gyro(i));
-            MotionTerms::of_gyro(gyro, &filter, &mut |key, error| checker.push(key, error))
+            MotionTerms::of_gyro(gyro, &filter, &mut |key, error| checker.curve(key, error))
         })
         .collect();
     let drifts = gyros.map(|(i, gyro)| {
         let drift = gyro.drift.as_ref().map(DriftModel::new)?;
-        checker.at(Section::Gyro(i)).compiled(drift, |error| error.name)
+        checker.at(Section::Gyro(i)).compiled(drift, |error| format!("drift.{}", error.quantity()))
     });
     let drifts = drifts.collect();
     let gyro_orientation = orientation(
@@ -56,14 +57,14 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     );
 
     if !parts.accels.is_empty() {
-        checker.at(Section::Accels).count("sensors", parts.accels.len(), MIN_SENSORS, MAX_SENSORS);
+        checker.at(Section::Accels).count("sensor", parts.accels.len(), MIN_SENSORS, MAX_SENSORS);
     }
     let accels = parts.accels.iter().enumerate();
     let accels_in_motion: Vec<_> = accels
         .clone()
         .filter_map(|(i, accel)| {
             let checker = checker.at(Section::Accel(i));
-            MotionTerms::of_accel(accel, &filter, &mut |key, error| checker.push(key, error))
+            MotionTerms::of_accel(accel, &filter, &mut |key, error| checker.curve(key, error))
         })
         .collect();
     let accels: Vec<_> =
@@ -77,7 +78,7 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     });
     checker.at(Section::Reversal);
     let reversal = parts.reversal.as_ref().map(Reversal::new);
-    let reversal = reversal.and_then(|reversal| checker.compiled(reversal, ReversalError::field));
+    let reversal = reversal.and_then(|reversal| checker.compiled(reversal, |error| error.field().into()));
     check_self_test(checker, &parts.self_test);
     let servos = models.iter().filter_map(|gyro| gyro.servo.as_ref());
     match gyro_orientation {
@@ -149,12 +150,13 @@ fn check_filter(checker: &mut Checker, filter: &ThermalFilterParts) {
 }
 
 fn check_channels(checker: &mut Checker, temperatures: &[ChannelParts], auxiliaries: &[ChannelParts]) {
-    let temperatures = temperatures.iter().enumerate().map(|(i, channel)| ("channel", i, channel));
+    let temperatures =
+        temperatures.iter().enumerate().map(|(i, channel)| ("temperature.channel", i, channel));
     let all =
         temperatures.chain(auxiliaries.iter().enumerate().map(|(i, channel)| ("auxiliary", i, channel)));
     let names = all.clone().map(|(kind, i, channel)| (kind, i, channel.name));
     for (before, (kind, i, channel)) in all.enumerate() {
-        let section = if kind == "channel" { Section::Channel(i) } else { Section::Auxiliary(i) };
+        let section = if kind == "auxiliary" { Section::Auxiliary(i) } else { Section::Channel(i) };
         checker.at(section).unique(channel.name, names.clone().take(before));
         checker.coefficients("conversion", &channel.conversion, 8);
         checker.range("range", channel.range_deg_c, -HUGE, HUGE);

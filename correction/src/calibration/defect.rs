@@ -1,5 +1,8 @@
 //! What can be wrong with a set of parts, and where.
 
+use alloc::format;
+use alloc::string::String;
+
 use thiserror::Error;
 
 use crate::curve::CurveError;
@@ -44,16 +47,49 @@ pub enum Section {
 pub struct Defect {
     /// Where.
     pub section: Section,
-    /// Which field of the part.
-    pub field: &'static str,
+    /// Which field of the part, as in [`Defect::path`]; empty for the part as a whole.
+    pub field: String,
     /// What.
     pub kind: DefectKind,
+}
+
+impl Defect {
+    /// Path of its key in a calibration document, but for the unit that keys end with: `gyro.sensor[1].static_bias.knots[2]`.
+    #[must_use]
+    pub fn path(&self) -> String {
+        let (table, index) = match self.section {
+            Section::Filter if self.field == "assumed_deg_c" => ("temperature", None),
+            Section::Filter => ("temperature.filter", None),
+            Section::Channel(index) => ("temperature.channel", Some(index)),
+            Section::Auxiliary(index) => ("auxiliary", Some(index)),
+            Section::Gyros => ("gyro", None),
+            Section::Gyro(index) => ("gyro.sensor", Some(index)),
+            Section::GyroOrientation => ("gyro.orientation", None),
+            Section::Accels => ("accel", None),
+            Section::Accel(index) => ("accel.sensor", Some(index)),
+            Section::AccelOrientation => ("accel.orientation", None),
+            Section::Reversal => ("mode_reversal", None),
+            Section::SelfTest => ("self_test", None),
+            Section::SelfTestVoltage(index) => ("self_test.voltage", Some(index)),
+            Section::SelfTestCounter(index) => ("self_test.counter", Some(index)),
+        };
+        let table = index.map_or_else(|| table.into(), |index| format!("{table}[{index}]"));
+        if self.field.is_empty() { table } else { format!("{table}.{}", self.field) }
+    }
 }
 
 /// Kinds of wrongness.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DefectKind {
+    /// A time that the filter's grid cannot resolve.
+    #[error("is {} s, must be at least temperature.filter.grid_step_s, {} s", Shown(*time_s), Shown(*grid_step_s))]
+    BelowGridStep {
+        /// The time (s).
+        time_s: f64,
+        /// Step of the grid (s).
+        grid_step_s: f64,
+    },
     /// Not a finite number, or outside its limits.
     #[error("is {}, must be {} to {}", Shown(*value), Shown(*low), Shown(*high))]
     OutOfRange {
@@ -91,9 +127,9 @@ pub enum DefectKind {
         channels: usize,
     },
     /// Two things of one name.
-    #[error("is also the name of {of} {other}: names must differ")]
+    #[error("is also the name of {of}[{other}]: names must differ")]
     DuplicateName {
-        /// What the earlier one is.
+        /// What list the earlier one is in.
         of: &'static str,
         /// Its index.
         other: usize,

@@ -46,6 +46,63 @@ pub struct CalibrationParts {
     pub self_test: SelfTestParts,
 }
 
+/// Range of what temperature does not change (°C): nothing lies outside.
+pub const EVERYWHERE_DEG_C: [f64; 2] = [-1e9, 1e9];
+/// Input limit where there is none: beyond every reading.
+pub const NO_LIMIT: f64 = 1e100;
+
+impl CalibrationParts {
+    /// A unit of gyros, three to eight, that all follow one channel, each with the terms that it is given and nothing else: of readings
+    /// of zero it takes what they are. With coefficients of one that is a column of a fit for each gyro, with filter, grid and the
+    /// ramps between temperature readings as they are in operation.
+    #[must_use]
+    pub fn columns(
+        filter: ThermalFilterParts,
+        channel: ChannelParts,
+        terms: impl IntoIterator<Item = Vec<TermParts>>,
+    ) -> Self {
+        let gyro = |terms| GyroParts {
+            channel: Some(0),
+            increment_weight: 1.0,
+            input_limit: NO_LIMIT,
+            terms,
+            increment_weight_over_rate: None,
+            trend: None,
+            servo: None,
+            drift: None,
+            delay_ticks: 0.0,
+            sigma: None,
+        };
+        let gyros: Vec<_> = terms.into_iter().map(gyro).collect();
+        // Any axes that span space: what is looked at is not resolved along them.
+        let row = |gyro: usize| [0, 1, 2].map(|axis| if axis == gyro % 3 { 1.0 } else { 0.0 });
+        Self {
+            filter,
+            channels: [channel].into(),
+            auxiliaries: Vec::new(),
+            gyro_output: OutputKind::Mean,
+            gyro_orientation: OrientationParts {
+                reference_deg_c: 0.0,
+                rows: (0..gyros.len()).map(row).collect(),
+                slopes_per_deg_c: Vec::new(),
+                plays: Vec::new(),
+                weights: Vec::new(),
+                range_deg_c: EVERYWHERE_DEG_C,
+                parity_limit: None,
+                parity_confirm_ticks: 1,
+            },
+            gyros,
+            gyro_orientation_channels: Vec::new(),
+            accel_output: OutputKind::Mean,
+            accels: Vec::new(),
+            accel_orientation: None,
+            accel_orientation_channels: Vec::new(),
+            reversal: None,
+            self_test: SelfTestParts::default(),
+        }
+    }
+}
+
 /// One gyro (models §2): θ = K(T)·P − Ω·Δt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GyroParts {

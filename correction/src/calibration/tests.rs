@@ -342,10 +342,10 @@ fn limits_of_the_self_test_and_numbers_of_the_drift_are_checked_at_once() {
     assert_eq!(found(Section::SelfTestVoltage(1), "range_v"), 1);
     assert_eq!(found(Section::SelfTestVoltage(1), "name"), 1);
     assert_eq!(found(Section::SelfTestVoltage(2), "name"), 1);
-    assert_eq!(found(Section::SelfTest, "counters"), 1);
+    assert_eq!(found(Section::SelfTest, "counter"), 1);
     assert_eq!(found(Section::SelfTestCounter(0), "name"), 1);
     assert_eq!(found(Section::SelfTestCounter(32), "max_increase"), 1);
-    assert_eq!(found(Section::Gyro(2), "sigma_rad_per_s"), 1);
-    assert_eq!(found(Section::Gyro(2), "trend_correlation_time_s"), 1);
+    assert_eq!(found(Section::Gyro(2), "drift.sigma"), 1);
+    assert_eq!(found(Section::Gyro(2), "drift.trend_correlation_time"), 1);
     assert_eq!(defects.len(), 5 + 33 + 33 + 2);
 }

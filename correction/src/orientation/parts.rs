@@ -1,5 +1,8 @@
 //! An orientation as a calibration states it, and the checks that need no matrix.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::sample::{MAX_SENSORS, MIN_SENSORS};
@@ -58,14 +61,14 @@ pub enum OrientationError {
         max: usize,
     },
     /// A list has neither one entry per sensor nor none.
-    #[error("{got} {name} for {rows} rows; one per row, or none")]
+    #[error("has {got} entries, must have {sensors}: one for each sensor")]
     ListCount {
         /// What the list holds.
         name: &'static str,
         /// Entries stated.
         got: usize,
-        /// Rows of `C_0`.
-        rows: usize,
+        /// Sensors that there are.
+        sensors: usize,
     },
     /// A number is NaN or infinite.
     #[error("{name} {index} is {got}; a finite number is needed")]
@@ -78,7 +81,7 @@ pub enum OrientationError {
         got: f64,
     },
     /// A row of `C_0` is not a unit vector.
-    #[error("row {row} has norm {norm}; it must be 1 within {tolerance}")]
+    #[error("has norm {norm:.6}, must be 1 within {tolerance}: a unit vector")]
     RowNorm {
         /// Index of the row, from 0.
         row: usize,
@@ -162,19 +165,26 @@ pub enum OrientationError {
 }
 
 impl OrientationError {
-    /// Field of the parts that it speaks of; of a number in a list, what the number is.
-    pub(crate) fn field(&self) -> &'static str {
-        match self {
+    /// Field that it speaks of, as documents have it but for units; of a number in a list, what the number is.
+    pub(crate) fn field(&self) -> String {
+        let field = match self {
+            Self::RowNorm { row, .. } => return format!("rows[{row}]"),
+            Self::Play { index, .. } => return format!("thermal.hysteresis[{index}]"),
             Self::ListCount { name, .. } | Self::NotFinite { name, .. } => name,
             Self::WeightNotPositive { .. } | Self::WeightRatio { .. } => "weights",
-            Self::EmptyRange { .. } => "range_deg_c",
-            Self::Play { .. } => "plays",
-            Self::ParityLimit { .. } => "parity_limit",
-            Self::ParityConfirm => "parity_confirm_ticks",
-            Self::ConditionInside { .. } => "slopes_per_deg_c",
-            Self::RowCount { .. } | Self::RowNorm { .. } | Self::Condition { .. } => "rows",
-        }
+            Self::EmptyRange { .. } => "thermal.range",
+            Self::ParityLimit { .. } => "parity.limit",
+            Self::ParityConfirm => "parity.confirm_ticks",
+            Self::ConditionInside { .. } => "thermal.slopes",
+            Self::RowCount { .. } | Self::Condition { .. } => "rows",
+        };
+        field.to_owned()
     }
+}
+
+/// Length of a row.
+pub(super) fn norm(row: &[f64; 3]) -> f64 {
+    libm::sqrt(row.iter().map(|c| c * c).sum())
 }
 
 impl OrientationParts {
@@ -185,14 +195,17 @@ impl OrientationParts {
             let (min, max) = (MIN_SENSORS, MAX_SENSORS);
             errors.push(OrientationError::RowCount { got: rows, min, max });
         }
-        for (name, got) in [("slopes", self.slopes_per_deg_c.len()), ("weights", self.weights.len())] {
-            if got != 0 && got != rows {
-                errors.push(OrientationError::ListCount { name, got, rows });
-            }
-        }
+        errors.extend(self.check_lists(rows));
     }
 
-    /// Checks every number by itself, and the weights against each other.
+    /// Lists that have neither an entry for each sensor nor none.
+    pub(crate) fn check_lists(&self, sensors: usize) -> impl Iterator<Item = OrientationError> {
+        let lists = [("thermal.slopes", self.slopes_per_deg_c.len()), ("weights", self.weights.len())];
+        let wrong = lists.into_iter().filter(move |(_, got)| *got != 0 && *got != sensors);
+        wrong.map(move |(name, got)| OrientationError::ListCount { name, got, sensors })
+    }
+
+    /// Checks every number by itself, the norms of rows, and the weights against each other.
     pub(super) fn check_numbers(&self, errors: &mut Vec<OrientationError>) {
         fn named(name: &'static str, rows: &[[f64; 3]]) -> impl Iterator<Item = (&'static str, usize, f64)> {
             rows.iter().enumerate().flat_map(move |(index, row)| row.map(|c| (name, index, c)))
@@ -213,6 +226,12 @@ impl OrientationParts {
         let broken = numbers.filter(|(.., got)| !got.is_finite());
         errors.extend(broken.map(|(name, index, got)| OrientationError::NotFinite { name, index, got }));
 
+        for (row, values) in self.rows.iter().enumerate() {
+            let norm = norm(values);
+            if norm.is_finite() && (norm - 1.0).abs() > ROW_NORM_TOLERANCE {
+                errors.push(OrientationError::RowNorm { row, norm, tolerance: ROW_NORM_TOLERANCE });
+            }
+        }
         if first.is_finite() && last.is_finite() && first > last {
             errors.push(OrientationError::EmptyRange { first, last });
         }

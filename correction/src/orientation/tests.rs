@@ -135,7 +135,7 @@ fn every_error_is_reported_at_once() {
     assert!(matches!(
         errors[..],
         [
-            OrientationError::ListCount { name: "slopes", got: 1, rows: 3 },
+            OrientationError::ListCount { name: "thermal.slopes", got: 1, sensors: 3 },
             OrientationError::NotFinite { name: "slope", index: 0, .. },
             OrientationError::EmptyRange { .. },
             OrientationError::ParityLimit { .. },

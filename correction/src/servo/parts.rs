@@ -1,5 +1,8 @@
 //! The servo as a calibration states it, and its checks.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
@@ -48,8 +51,18 @@ pub enum ServoError {
     #[error(transparent)]
     OutOfRange(OutOfRange),
     /// The rest frequency is not a valid curve.
-    #[error("rest_frequency: {0}")]
+    #[error(transparent)]
     RestFrequency(CurveError),
+}
+
+impl ServoError {
+    /// Field that it speaks of, and where in it.
+    pub(crate) fn field(&self) -> String {
+        match self {
+            Self::OutOfRange(OutOfRange { name, .. }) => (*name).to_owned(),
+            Self::RestFrequency(error) => format!("rest_frequency{}", error.place()),
+        }
+    }
 }
 
 /// A validated servo of one gyro.

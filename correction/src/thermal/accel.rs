@@ -27,7 +27,7 @@ impl AccelModel {
     pub(crate) fn new(
         parts: &AccelParts,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&'static str, CurveError),
+        report: &mut dyn FnMut(&str, CurveError),
     ) -> Option<Self> {
         let mut curve = |field, parts: Option<&CurveParts>, absent| match parts.map(Curve::new) {
             None => Some(Curve::constant(absent)),
@@ -38,7 +38,7 @@ impl AccelModel {
             }
         };
         let scale_factor = curve("scale_factor", Some(&parts.scale_factor), 1.0);
-        let board_ratio = curve("board_ratio", parts.board_ratio.as_ref(), 1.0);
+        let board_ratio = curve("board_ratio_error", parts.board_ratio.as_ref(), 1.0);
         let terms = Terms::new(&ACCEL_TERMS, &parts.terms, false, filter, report);
         Some(Self {
             channel: parts.channel,

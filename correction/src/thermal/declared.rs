@@ -1,10 +1,15 @@
 //! The terms of the sensors' models: each is a coefficient times a feature. All that is said of a term but its mathematics is said here:
 //! documents, their schema and its pages, checks, comparisons and fits go through these tables.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
+
 use serde::{Deserialize, Serialize};
 
 use super::terms::MAX_REGRESSORS;
 use super::trail::{MAX_LAGS, MAX_PLAYS, PLAY_WIDTHS_DEG_C};
+use crate::units::STANDARD_GRAVITY_M_PER_S2;
 
 /// What a coefficient is multiplied by. Terms are added up in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -96,24 +101,33 @@ pub enum Makes {
 }
 
 /// Unit of a feature, as documents state what is per it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Per {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Per {
+    /// Its spelling at the end of a key.
+    pub key: &'static str,
+    /// Its symbol.
+    pub symbol: &'static str,
+    /// How much of the core's unit it is (°C, °C/s, °C/s², m/s²).
+    pub size: f64,
+}
+
+impl Per {
     /// None.
-    One,
+    pub const ONE: Self = Self { key: "", symbol: "", size: 1.0 };
     /// °C.
-    DegC,
+    pub const DEG_C: Self = Self { key: "_per_deg_c", symbol: "°C", size: 1.0 };
     /// °C/s.
-    DegCPerS,
+    pub const DEG_C_PER_S: Self = Self { key: "_per_deg_c_per_s", symbol: "°C/s", size: 1.0 };
     /// °C/s².
-    DegCPerS2,
+    pub const DEG_C_PER_S2: Self = Self { key: "_per_deg_c_per_s2", symbol: "°C/s²", size: 1.0 };
     /// m/s².
-    MPerS2,
+    pub const M_PER_S2: Self = Self { key: "_per_m_per_s2", symbol: "m/s²", size: 1.0 };
     /// Standard gravity.
-    G,
-    /// Its square.
-    G2,
+    pub const G: Self = Self { key: "_per_g", symbol: "g", size: STANDARD_GRAVITY_M_PER_S2 };
+    /// Its square. What is multiplied by it is a force in standard gravities: of both, one remains.
+    pub const G2: Self = Self { key: "_per_g2", symbol: "g²", size: STANDARD_GRAVITY_M_PER_S2 };
     /// Whatever a channel's unit is.
-    Unit,
+    pub const UNIT: Self = Self { key: "_per_unit", symbol: "unit", size: 1.0 };
 }
 
 impl TermForm {
@@ -124,6 +138,24 @@ impl TermForm {
             Self::Curve | Self::Branches | Self::PartOf(_) => 1,
             Self::Each(Parameter { most, .. }) | Self::Regressors(most) => *most,
         }
+    }
+
+    /// Keys of its curves, in the table at its own key; none for a curve that stands there by itself.
+    #[must_use]
+    pub const fn curves(&self) -> &'static [&'static str] {
+        match self {
+            Self::Curve | Self::PartOf(_) => &[],
+            Self::Branches => &["run_up", "braking"],
+            Self::Each(_) | Self::Regressors(_) => &["gain"],
+        }
+    }
+}
+
+impl Term {
+    /// Its path in the table of a sensor, where it is the one of this index of its feature.
+    #[must_use]
+    pub fn path(&self, index: usize) -> String {
+        if self.form.most() > 1 { format!("{}[{index}]", self.key) } else { self.key.to_owned() }
     }
 }
 
@@ -158,55 +190,55 @@ pub const GYRO_TERMS: [Term; 13] = [
     term(
         Feature::Reading,
         ("increment_weight_error", TermForm::Curve),
-        (Makes::ScaleError, Per::One),
+        (Makes::ScaleError, Per::ONE),
         "K(T)/K0 − 1. Source: models §2, 003.",
     ),
     term(
         Feature::One,
         ("static_bias", TermForm::Curve),
-        (Makes::Bias, Per::One),
+        (Makes::Bias, Per::ONE),
         "Static (non-magnetic) bias. Source: 003; K0(T) of 000; 001.",
     ),
     term(
         Feature::LasingMode,
         ("magnetic_bias", TermForm::Curve),
-        (Makes::Bias, Per::One),
+        (Makes::Bias, Per::ONE),
         "Bias with the sign of the lasing mode. Source: 003.",
     ),
     term(
         Feature::Meander,
         ("slow_meander", TermForm::Curve),
-        (Makes::Bias, Per::One),
+        (Makes::Bias, Per::ONE),
         "Bias with the sign of the meander's phase, if reported, else +. Source: 003.",
     ),
     term(
         Feature::ThermalRate,
         ("thermal_rate", TermForm::Branches),
-        (Makes::Bias, Per::DegCPerS),
+        (Makes::Bias, Per::DEG_C_PER_S),
         "K1±, multiplies Ṫ; over T or Ṫ. Source: 000; 001 (x3).",
     ),
     term(
         Feature::ThermalAcceleration,
         ("thermal_acceleration", TermForm::Branches),
-        (Makes::Bias, Per::DegCPerS2),
+        (Makes::Bias, Per::DEG_C_PER_S2),
         "K2±, multiplies T̈; over T or T̈. Source: 000.",
     ),
     term(
         Feature::Lag,
         ("lag", LAG),
-        (Makes::Bias, Per::DegCPerS),
+        (Makes::Bias, Per::DEG_C_PER_S),
         "Thermal lags `Σ g(T)·(T − L_τ[T])/τ`, `L_τ` a first-order low-pass. Source: models §2, §8.",
     ),
     term(
         Feature::Play,
         ("hysteresis", PLAY),
-        (Makes::Bias, Per::DegC),
+        (Makes::Bias, Per::DEG_C),
         "Hysteresis `Σ g(T)·(p_w[T] − T)`, `p_w` a play. Source: models §2.",
     ),
     term(
         Feature::Regressor,
         ("regressor", REGRESSORS),
-        (Makes::Bias, Per::Unit),
+        (Makes::Bias, Per::UNIT),
         "Bias by other channels `Σ g(T)·(x − x₀)`; needs `channel`. Source: models §2.",
     ),
     term(Feature::ForceX, ("acceleration_sensitive_drift.x", FORCE), (Makes::Bias, Per::G), "Along x."),
@@ -215,7 +247,7 @@ pub const GYRO_TERMS: [Term; 13] = [
     term(
         Feature::RateMagnitude,
         ("increment_weight_asymmetry", TermForm::Curve),
-        (Makes::ScaleError, Per::One),
+        (Makes::ScaleError, Per::ONE),
         "Half the difference of K between positive and negative rates, over their mean. Source: models §2, IEEE 528.",
     ),
 ];
@@ -226,20 +258,20 @@ pub const ACCEL_TERMS: [Term; 5] = [
     term(
         Feature::One,
         ("bias", TermForm::Curve),
-        (Makes::Bias, Per::One),
+        (Makes::Bias, Per::ONE),
         "S(T): output at zero specific force. Source: models §3, 001 (z1…z3).",
     ),
     term(
         Feature::Lag,
         ("lag", LAG),
-        (Makes::Bias, Per::DegCPerS),
+        (Makes::Bias, Per::DEG_C_PER_S),
         "Thermal lags of the bias, as for gyros. Source: models §2, §8.",
     ),
-    term(Feature::Play, ("hysteresis", PLAY), (Makes::Bias, Per::DegC), "As for gyros. Source: models §2."),
+    term(Feature::Play, ("hysteresis", PLAY), (Makes::Bias, Per::DEG_C), "As for gyros. Source: models §2."),
     term(
         Feature::Regressor,
         ("regressor", REGRESSORS),
-        (Makes::Bias, Per::Unit),
+        (Makes::Bias, Per::UNIT),
         "As for gyros. Source: models §2.",
     ),
     term(

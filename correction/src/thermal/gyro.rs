@@ -14,7 +14,7 @@ use crate::channel::{ThermalFilter, ThermalState};
 use crate::curve::CurveError;
 use crate::lanes::Lanes;
 use crate::sample::MAX_SENSORS;
-use crate::servo::{Servo, ServoError};
+use crate::servo::Servo;
 
 /// A gyro, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,40 +27,19 @@ pub struct GyroModel {
     pub(crate) servo: Option<Servo>,
 }
 
-/// What can be wrong with one term of a gyro.
-pub(crate) enum TermError {
-    Curve(CurveError),
-    Servo(ServoError),
-}
-
 impl GyroModel {
-    /// Compiles a gyro; `report` hears of every term that is wrong. Plain numbers are checked by the caller.
+    /// Compiles a gyro and its `servo`; `report` hears of every term that is wrong. Plain numbers are checked by the caller.
     pub(crate) fn new(
         parts: &GyroParts,
+        servo: Option<Servo>,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&'static str, TermError),
+        report: &mut dyn FnMut(&str, CurveError),
     ) -> Option<Self> {
-        let terms = Terms::new(&GYRO_TERMS, &parts.terms, false, filter, &mut |key, error| {
-            report(key, TermError::Curve(error));
-        });
-        let mut sound = true;
-        let servo = match parts.servo.as_ref().map(Servo::new) {
-            None => None,
-            Some(Ok(servo)) => Some(servo),
-            Some(Err(errors)) => {
-                sound = false;
-                for error in errors {
-                    report("servo", TermError::Servo(error));
-                }
-                None
-            }
-        };
-        let terms = terms.filter(|_| sound)?;
         Some(Self {
             channel: parts.channel,
             increment_weight: parts.increment_weight,
             input_limit: parts.input_limit,
-            terms,
+            terms: Terms::new(&GYRO_TERMS, &parts.terms, false, filter, report)?,
             trend: parts.trend.as_ref().map(|trend| TrendModel {
                 coefficients: trend.coefficients.iter().copied().take(3).collect(),
                 interval_s: trend.interval_s,

@@ -25,11 +25,11 @@ pub(crate) struct MotionTerms {
 }
 
 impl MotionTerms {
-    /// Compiles those of a gyro; `report` hears of every one that is wrong, by its key.
+    /// Compiles those of a gyro; `report` hears of every one that is wrong, by its path.
     pub(crate) fn of_gyro(
         parts: &GyroParts,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&'static str, CurveError),
+        report: &mut dyn FnMut(&str, CurveError),
     ) -> Option<Self> {
         let terms = Terms::new(&GYRO_TERMS, &parts.terms, true, filter, report);
         let over_rate = match parts.increment_weight_over_rate.as_ref().map(Curve::new) {
@@ -43,11 +43,11 @@ impl MotionTerms {
         Some(Self { channel: parts.channel, terms: terms?, over_rate })
     }
 
-    /// Compiles those of an accelerometer; `report` hears of every one that is wrong, by its key.
+    /// Compiles those of an accelerometer; `report` hears of every one that is wrong, by its path.
     pub(crate) fn of_accel(
         parts: &AccelParts,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&'static str, CurveError),
+        report: &mut dyn FnMut(&str, CurveError),
     ) -> Option<Self> {
         let terms = Terms::new(&ACCEL_TERMS, &parts.terms, true, filter, report);
         Some(Self { channel: parts.channel, terms: terms?, over_rate: None })

@@ -3,6 +3,7 @@
 //! A coefficient is a curve over the sensor's temperature, or one for either thermal branch over temperature or the feature
 //! itself. Terms of one line are added up at each thermal evaluation; a tick multiplies the lines, not the terms.
 
+use alloc::format;
 use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
@@ -86,23 +87,31 @@ pub(crate) struct SensorState<'a> {
 
 impl Terms {
     /// Compiles the terms whose features follow motion, or the others, in the order of the features; `report` hears of every one that
-    /// is wrong, by its key.
+    /// is wrong, by its path.
     pub(crate) fn new(
         declared: &[Term],
         parts: &[TermParts],
         follow_motion: bool,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&'static str, CurveError),
+        report: &mut dyn FnMut(&str, CurveError),
     ) -> Option<Self> {
         let mut compiled = Self::default();
         let mut sound = true;
-        let key = |feature| declared.iter().find(|term| term.feature == feature).map(|term| term.key);
-        let among = parts.iter().filter(|part| part.feature.follows_motion() == follow_motion);
-        let mut among: Vec<_> = among.filter_map(|part| Some((key(part.feature)?, part))).collect();
-        among.sort_by_key(|(_, part)| part.feature);
-        for (key, part) in among {
+        let mut among: Vec<_> =
+            parts.iter().filter(|part| part.feature.follows_motion() == follow_motion).collect();
+        among.sort_by_key(|part| part.feature);
+        let (mut last, mut index) = (None, 0);
+        for part in among {
+            let Some(term) = declared.iter().find(|term| term.feature == part.feature) else { continue };
+            index = if last == Some(part.feature) { index + 1 } else { 0 };
+            last = Some(part.feature);
+            let mut keys = term.form.curves().iter();
             let mut curve = |parts: &CurveParts| {
-                let made = Curve::new(parts).map_err(|error| report(key, error));
+                let key = keys.next();
+                let made = Curve::new(parts).map_err(|error| {
+                    let path = term.path(index);
+                    report(&key.map_or(path.clone(), |key| format!("{path}.{key}")), error);
+                });
                 sound &= made.is_ok();
                 made.ok()
             };

@@ -4,7 +4,9 @@ use isotherm_correction::sample::OutputKind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Column, Delimiter, Encoding, Marks, ModeMapping, OnBadRow, StatusMapping, TimeUnit};
+use super::{
+    Column, HalfPeriodMapping, Layout, Marks, ModeMapping, StatusMapping, TemperatureMapping, TimeUnit,
+};
 
 /// How a text log is read.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -28,34 +30,8 @@ pub(super) struct MappingKeys {
 pub(super) struct FileKeys {
     /// Its name inside the log's folder, where the log is a folder.
     pub(super) name: Option<String>,
-    /// Encoding of the text.
-    #[serde(default)]
-    pub(super) encoding: Encoding,
-    /// What stands between two cells.
-    pub(super) delimiter: Delimiter,
-    /// Lines that begin with this are passed over.
-    #[schemars(
-        regex(pattern = r"^[^0-9\s+\-.]"),
-        extend("x-must-be" = "a prefix that no row of numbers begins with, and not empty")
-    )]
-    pub(super) comment: Option<String>,
-    /// Lines in front that are passed over.
-    #[serde(default)]
-    #[schemars(range(max = 1_000_000))]
-    pub(super) skip_lines: u64,
-    /// Whether the next line names the columns.
-    #[serde(default)]
-    pub(super) header: bool,
-    /// Rows of data in front that are passed over.
-    #[serde(default)]
-    #[schemars(range(max = 1_000_000))]
-    pub(super) drop_rows: u64,
-    /// Decimal mark.
-    #[serde(default)]
-    pub(super) decimal_mark: DecimalMark,
-    /// What happens to a row that cannot be read.
-    #[serde(default)]
-    pub(super) on_bad_row: OnBadRow,
+    #[serde(flatten)]
+    pub(super) layout: Layout,
     /// Where the time of a row comes from.
     pub(super) time: TimeKeys,
     /// The gyros.
@@ -64,19 +40,9 @@ pub(super) struct FileKeys {
     pub(super) accel: Option<TickKeys<AccelUnit>>,
     /// Temperature channels.
     #[serde(default)]
-    pub(super) temperature: Vec<TemperatureKeys>,
+    pub(super) temperature: Vec<TemperatureMapping>,
     /// What says of each row whether it holds.
     pub(super) status: Option<StatusMapping>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
-#[schemars(inline)]
-pub(super) enum DecimalMark {
-    #[default]
-    #[serde(rename = ".")]
-    Point,
-    #[serde(rename = ",")]
-    Comma,
 }
 
 /// Where the time of a row comes from.
@@ -99,16 +65,16 @@ pub(super) struct TimeKeys {
     #[schemars(range(min = -2_305_843_009_213_693_952_i64, max = 2_305_843_009_213_693_951_i64))]
     pub(super) origin_ns: i64,
     /// Nominal tick (ns).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 1.0, max = 3.6e12))]
     pub(super) tick_ns: Option<f64>,
     /// Nominal tick (µs).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 1e-3, max = 3.6e9))]
     pub(super) tick_us: Option<f64>,
     /// Nominal tick (ms).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 1e-6, max = 3.6e6))]
     pub(super) tick_ms: Option<f64>,
     /// Nominal tick (s).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 1e-9, max = 3600.0))]
     pub(super) tick_s: Option<f64>,
 }
 
@@ -153,7 +119,8 @@ pub(super) struct GyroKeys {
     /// Phase of the slow meander.
     pub(super) meander: Option<ModeMapping>,
     /// Half-period counts, one pair per gyro.
-    pub(super) half_periods: Option<Vec<HalfPeriodKeys>>,
+    #[serde(default)]
+    pub(super) half_periods: Vec<HalfPeriodMapping>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
@@ -261,44 +228,6 @@ pub(super) struct SwitchKeys {
 #[schemars(inline)]
 pub(super) enum SwitchFrom {
     ModeChange,
-}
-
-/// Half-period counts of one gyro.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct HalfPeriodKeys {
-    /// Column of the positive half.
-    pub(super) positive: Column,
-    /// Column of the negative half.
-    pub(super) negative: Column,
-}
-
-/// One temperature channel.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct TemperatureKeys {
-    /// Name, as the calibration document spells it.
-    #[schemars(
-        length(min = 1, max = 24),
-        regex(pattern = r"\S"),
-        extend("x-must-be" = "a name of 1 to 24 bytes")
-    )]
-    pub(super) channel: String,
-    /// Which column.
-    pub(super) column: Column,
-    /// Its unit.
-    pub(super) unit: TemperatureUnit,
-    /// Every how many rows a reading is taken, from the first on.
-    #[serde(default = "every_row")]
-    #[schemars(range(min = 1, max = 1_000_000))]
-    pub(super) every_rows: u32,
-    /// A row whose cell is empty has no reading.
-    #[serde(default)]
-    pub(super) may_be_empty: bool,
-}
-
-fn every_row() -> u32 {
-    1
 }
 
 /// Unit of a temperature channel's readings.

@@ -3,24 +3,20 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use isotherm_correction::sample::{ChannelName, OutputKind};
+use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::{Angle, AngularRate, Span, SpecificForce};
 use isotherm_document::{Form, Problem, Reader, element, join};
 
 use super::keys::{
-    AccelUnit, DecimalMark, DurationRule, FileKeys, GyroKeys, GyroUnit, MappingKeys, SensorKeys, SwitchKeys,
-    TemperatureKeys, TickKeys, TimeKeys,
+    AccelUnit, DurationRule, FileKeys, GyroKeys, GyroUnit, MappingKeys, SensorKeys, SwitchKeys, TickKeys,
+    TimeKeys,
 };
 use super::{
-    Column, Conversion, Delimiter, FileMapping, GyroMapping, Layout, Mapping, Marks, ModeMapping,
-    SensorMapping, StatusMapping, SwitchMapping, TemperatureMapping, TickMapping, TimeColumn, TimeMapping,
-    TimeUnit, VERSION,
+    Column, Conversion, Delimiter, FileMapping, GyroMapping, Mapping, Marks, ModeMapping, SensorMapping,
+    StatusMapping, SwitchMapping, TickMapping, TimeColumn, TimeMapping, TimeUnit, VERSION,
 };
 
 static FORM: LazyLock<Form> = LazyLock::new(|| Form::of::<MappingKeys>().versions("version", [VERSION; 2]));
-
-/// Longest nominal tick (ns): one hour.
-const LONGEST_TICK_NS: f64 = 3.6e12;
 
 /// Reads a mapping, or everything that is wrong with it.
 pub(super) fn parse(text: &str, file: &str) -> Result<Mapping, Vec<Problem>> {
@@ -52,14 +48,12 @@ fn mapping(r: &mut Reader<'_>, keys: MappingKeys) -> Mapping {
 }
 
 fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
-    let FileKeys { name, encoding, delimiter, comment, skip_lines, header, drop_rows, on_bad_row, .. } = keys;
-    let decimal_mark = if keys.decimal_mark == DecimalMark::Comma { b',' } else { b'.' };
-    if delimiter == Delimiter::Character(decimal_mark) {
+    let FileKeys { name, layout, .. } = keys;
+    let (delimiter, header) = (layout.delimiter, layout.header);
+    if delimiter == Delimiter::Character(layout.decimal_mark as u8) {
         let why = "is also the delimiter: choose another";
         r.report(&join(path, "decimal_mark"), why);
     }
-    let layout =
-        Layout { encoding, delimiter, comment, skip_lines, header, drop_rows, decimal_mark, on_bad_row };
     if keys.gyro.is_none() && keys.accel.is_none() && keys.temperature.is_empty() {
         let what = "is missing: the file must have a [file.gyro], a [file.accel] or a [[file.temperature]]";
         r.report(&join(path, "gyro"), what);
@@ -72,7 +66,7 @@ fn file(r: &mut Reader<'_>, path: &str, keys: FileKeys) -> FileMapping {
         time: time(r, &join(path, "time"), keys.time, own_durations),
         gyro: keys.gyro.map(|keys| gyro(r, &join(path, "gyro"), keys)),
         accel: keys.accel.map(|keys| ticks(r, &join(path, "accel"), keys)),
-        temperatures: keys.temperature.into_iter().map(temperature).collect(),
+        temperatures: keys.temperature,
         status: keys.status.map(|keys| status(r, &join(path, "status"), keys)),
     };
     if let Some(name) = file.columns().find_map(Column::name).filter(|_| !header) {
@@ -136,21 +130,16 @@ fn nominal(r: &mut Reader<'_>, path: &str, keys: &TimeKeys) -> Option<Span> {
         if tick.is_some() {
             r.report(&at, "gives the tick again: keep one of tick_ns, tick_us, tick_ms, tick_s");
         }
-        if !(1.0..=LONGEST_TICK_NS).contains(&nanoseconds) {
-            r.report(&at, "must be 1 ns to 1 h");
-        }
         tick = Some(Span::from_s(nanoseconds * 1e-9));
     }
     tick
 }
 
 fn gyro(r: &mut Reader<'_>, path: &str, keys: GyroKeys) -> GyroMapping {
-    if let Some(halves) = &keys.half_periods
-        && halves.len() != keys.ticks.sensors.len()
-    {
-        let (pairs, sensors) = (halves.len(), keys.ticks.sensors.len());
-        let message = format!("has {pairs} pairs, must have one for each of the {sensors} sensors");
-        r.report(&join(path, "half_periods"), message);
+    let (pairs, sensors) = (keys.half_periods.len(), keys.ticks.sensors.len());
+    let halves = join(path, "half_periods");
+    if r.has(&halves) && pairs != sensors {
+        r.report(&halves, format!("has {pairs} pairs, must have one for each of the {sensors} sensors"));
     }
     let switch =
         keys.switch.and_then(|switch| self::switch(r, &join(path, "switch"), switch, keys.mode.is_some()));
@@ -162,18 +151,7 @@ fn gyro(r: &mut Reader<'_>, path: &str, keys: GyroKeys) -> GyroMapping {
         }
         mode
     });
-    GyroMapping {
-        ticks: ticks(r, path, keys.ticks),
-        mode,
-        switch,
-        meander,
-        half_periods: keys
-            .half_periods
-            .into_iter()
-            .flatten()
-            .map(|half| (half.positive, half.negative))
-            .collect(),
-    }
+    GyroMapping { ticks: ticks(r, path, keys.ticks), mode, switch, meander, half_periods: keys.half_periods }
 }
 
 fn ticks<U: SensorUnit>(r: &mut Reader<'_>, path: &str, keys: TickKeys<U>) -> TickMapping {
@@ -309,16 +287,6 @@ fn status(r: &mut Reader<'_>, path: &str, keys: StatusMapping) -> StatusMapping 
         r.report(path, "must have either `good = [\"0\"]`, the cells of valid rows, or `bad_bits = 3`");
     }
     StatusMapping { good: keys.good.iter().map(|cell| cell.trim().to_owned()).collect(), ..keys }
-}
-
-fn temperature(keys: TemperatureKeys) -> TemperatureMapping {
-    TemperatureMapping {
-        channel: ChannelName::from(&keys.channel).unwrap_or_default(),
-        column: keys.column,
-        shift: keys.unit.shift(),
-        every_rows: keys.every_rows.into(),
-        may_be_empty: keys.may_be_empty,
-    }
 }
 
 impl ModeMapping {

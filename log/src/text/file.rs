@@ -254,7 +254,8 @@ impl FileReader {
 
     /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
     fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Parts, Fault> {
-        let row = Row { line: self.lines.line(), cells: &self.cells, decimal_mark: self.layout.decimal_mark };
+        let row =
+            Row { line: self.lines.line(), cells: &self.cells, decimal_mark: self.layout.decimal_mark as u8 };
         let now = if let Some(cell) = self.columns.stamps {
             let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
             if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {

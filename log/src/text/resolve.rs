@@ -150,8 +150,8 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
         None => None,
         Some(gyro) => {
             let mut half_periods = Sensors::new();
-            for (positive, negative) in &gyro.half_periods {
-                half_periods.push((find(positive)?, find(negative)?));
+            for half in &gyro.half_periods {
+                half_periods.push((find(&half.positive)?, find(&half.negative)?));
             }
             Some(GyroCells {
                 ticks: ticks(&gyro.ticks, header)?,
@@ -176,7 +176,7 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
         Ok(TemperatureCell {
             channel: temperature.channel,
             cell: find(&temperature.column)?,
-            shift: temperature.shift,
+            shift: temperature.unit.shift(),
             every_rows: temperature.every_rows,
             may_be_empty: temperature.may_be_empty,
             since: 0,

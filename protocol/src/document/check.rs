@@ -1,19 +1,12 @@
-//! What holds between keys: names that must be known, curves that must be sound, lists that must be of one length.
-//!
-//! The core checks most of this again when it compiles the parts; it is checked here first because here the key
-//! and its line are known. A path that was reported is marked, so that the core does not report it once more.
+//! What the core cannot see, because it knows no names, units or keys: what is called what, and which keys go together.
 
 mod output;
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::curve::{Curve as CoreCurve, CurveError};
-use isotherm_correction::orientation::ROW_NORM_TOLERANCE;
-use isotherm_correction::thermal::Feature;
-
 use super::curve::Curve;
-use super::terms::{Coefficient, KeyedTerm, Regressor, StatedTerm};
-use super::types::{AccelSensor, Document, Filter, GyroSensor, Orientation, SelfTest};
+use super::terms::{Coefficient, KeyedTerm, Regressor};
+use super::types::{Document, Orientation, Sensor};
 use isotherm_document::{Reader, element, join};
 
 /// Checks everything between keys.
@@ -23,28 +16,28 @@ pub(super) fn check(r: &mut Reader<'_>, document: &Document) {
     names(r, "gyro.sensor", document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()));
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
         output::gyro(r, &element("gyro.sensor", i), document.gyro.output, sensor);
-        gyro(r, &element("gyro.sensor", i), sensor, channels);
-        terms(r, &element("gyro.sensor", i), &sensor.terms.keyed(), document, channels);
     }
-    orientation(r, "gyro", &document.gyro.orientation, document.gyro.sensor.len(), channels);
-    filter(r, document);
+    orientation(r, "gyro.orientation", &document.gyro.orientation, channels);
     if let Some(section) = &document.accel {
         names(r, "accel.sensor", section.sensor.iter().map(|sensor| sensor.name.as_str()));
         for (i, sensor) in section.sensor.iter().enumerate() {
             output::accel(r, &element("accel.sensor", i), section.output, sensor);
-            accel(r, &element("accel.sensor", i), sensor, channels);
-            terms(r, &element("accel.sensor", i), &sensor.terms.keyed(), document, channels);
+            let board = sensor.board_channel.as_deref();
+            channel(r, &element("accel.sensor", i), "board_channel", board, channels);
         }
-        orientation(r, "accel", &section.orientation, section.sensor.len(), channels);
+        orientation(r, "accel.orientation", &section.orientation, channels);
     }
+    let sensors = document.sensors();
+    for sensor in &sensors {
+        channel(r, &sensor.path, "channel", sensor.channel, channels);
+        terms(r, sensor, document, channels);
+    }
+    filter(r, document, &sensors);
     if document.mode_reversal.as_ref().is_some_and(|reversal| reversal.transition_s.is_some()) {
         let key = "mode_reversal.transition_ticks";
         if r.has(key) {
             r.refuse(key, "duplicates `transition_s`: give one of the two");
         }
-    }
-    if let Some(section) = &document.self_test {
-        self_test_names(r, section);
     }
 }
 
@@ -59,21 +52,6 @@ fn names<'n>(r: &mut Reader<'_>, sensors: &str, names: impl Iterator<Item = &'n 
     }
 }
 
-/// No two voltages or counters of the self-test have one name: both kinds come in on one topic.
-fn self_test_names(r: &mut Reader<'_>, self_test: &SelfTest) {
-    let voltages = self_test.voltage.iter().map(|voltage| voltage.name.as_str());
-    let counters = self_test.counter.iter().map(|counter| counter.name.as_str());
-    names(r, "self_test.voltage", voltages.clone());
-    names(r, "self_test.counter", counters.clone());
-    for (i, name) in counters.enumerate() {
-        if let Some(earlier) = voltages.clone().position(|voltage| voltage == name) {
-            let path = join(&element("self_test.counter", i), "name");
-            let voltage = element("self_test.voltage", earlier);
-            r.refuse(&path, format!("is {name:?}, also the name of {voltage}: names must differ"));
-        }
-    }
-}
-
 /// Names of the channels; `None` where one of them is not known.
 fn channels<'d>(r: &Reader<'_>, document: &'d Document) -> Option<Vec<&'d str>> {
     let name = |i| join(&element("temperature.channel", i), "name");
@@ -84,58 +62,29 @@ fn channels<'d>(r: &Reader<'_>, document: &'d Document) -> Option<Vec<&'d str>> 
         .filter(|_| !r.is_marked("temperature") && !r.is_marked("temperature.channel"))
 }
 
-/// A name that must be that of a channel.
-fn channel(r: &mut Reader<'_>, path: &str, name: Option<&str>, channels: Option<&[&str]>) {
+/// A key of a table that must name a channel.
+fn channel(r: &mut Reader<'_>, table: &str, key: &str, name: Option<&str>, channels: Option<&[&str]>) {
     if let (Some(name), Some(channels)) = (name, channels)
         && !channels.contains(&name)
     {
         let known = if channels.is_empty() { "none".into() } else { channels.join(", ") };
-        r.refuse(path, format!("is {name:?}, not a temperature channel; the channels are: {known}"));
+        let message = format!("is {name:?}, not a temperature channel; the channels are: {known}");
+        r.refuse(&format!("{table}.{key}"), message);
     }
 }
 
-fn gyro(r: &mut Reader<'_>, path: &str, sensor: &GyroSensor, channels: Option<&[&str]>) {
-    channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
-    curve(r, &join(path, "increment_weight_over_rate"), sensor.increment_weight_over_rate.as_ref());
-    let rest_frequency = sensor.servo.as_ref().map(|servo| &servo.rest_frequency);
-    curve(r, &join_dotted(path, "servo.rest_frequency"), rest_frequency);
-}
-
-/// Curves of every term; both curves of a branched coefficient over one argument; lags no shorter than the grid's step; forces that
-/// there are.
-fn terms(
-    r: &mut Reader<'_>,
-    path: &str,
-    terms: &[KeyedTerm<'_>],
-    document: &Document,
-    temperatures: Option<&[&str]>,
-) {
-    for KeyedTerm { term, key, stated } in terms {
-        let curves = KeyedTerm { term, key: format!("{path}.{key}"), stated }.curves();
-        for (path, form) in &curves {
-            curve(r, path, Some(form));
-        }
-        if let [run_up, braking] = &curves[..] {
+/// Both curves of a branched coefficient over one argument; forces and channels that there are.
+fn terms(r: &mut Reader<'_>, sensor: &Sensor<'_>, document: &Document, temperatures: Option<&[&str]>) {
+    for keyed in &sensor.terms {
+        if let [run_up, braking] = &keyed.curves().collect::<Vec<_>>()[..] {
             one_argument(r, run_up, braking);
         }
-        if term.feature.is_force() && document.accel.is_none() {
-            let table = key.split('.').next().unwrap_or_default();
-            let message = "needs the specific force, but there is no [accel]: add it, or remove this";
-            r.refuse(&join(path, table), message);
+        if keyed.term.feature.is_force() && document.accel.is_none() {
+            let table = keyed.path.rsplit_once('.').map_or("", |(table, _)| table);
+            r.refuse(table, "needs the specific force, but there is no [accel]: add it, or remove this");
         }
-        if let Some(regressor) = &stated.regressor {
-            check_regressor(r, &format!("{path}.{key}"), regressor, document, temperatures);
-        }
-        let (Feature::Lag, tau, Some(filter)) =
-            (term.feature, stated.parameter, &document.temperature.filter)
-        else {
-            continue;
-        };
-        let Filter { grid_step_s, .. } = filter;
-        if tau < *grid_step_s && !r.is_damaged("temperature.filter.grid_step_s") {
-            let message =
-                format!("is {tau} s, must be at least temperature.filter.grid_step_s, {grid_step_s} s");
-            r.refuse(&format!("{path}.{key}.time_constant_s"), message);
+        if let Some(regressor) = &keyed.stated.regressor {
+            check_regressor(r, &keyed.path, regressor, document, temperatures);
         }
     }
 }
@@ -173,29 +122,6 @@ fn check_regressor(
     }
 }
 
-fn accel(r: &mut Reader<'_>, path: &str, sensor: &AccelSensor, channels: Option<&[&str]>) {
-    channel(r, &join(path, "channel"), sensor.channel.as_deref(), channels);
-    channel(r, &join(path, "board_channel"), sensor.board_channel.as_deref(), channels);
-    curve(r, &join(path, "scale_factor"), Some(&sensor.scale_factor));
-    curve(r, &join(path, "board_ratio_error"), sensor.board_ratio_error.as_ref());
-}
-
-/// A curve that the core must be able to compile.
-fn curve(r: &mut Reader<'_>, path: &str, curve: Option<&Curve>) {
-    let Some(curve) = curve else { return };
-    if r.is_damaged(path) {
-        return;
-    }
-    let Err(error) = CoreCurve::new(&curve.to_parts(0.0)) else { return };
-    let keys = curve.keys();
-    let place = match error {
-        CurveError::KnotsNotIncreasing { index, .. } => element(&join(path, &keys.knots), index),
-        CurveError::EmptyRange { .. } => join(path, &keys.range),
-        _ => path.to_owned(),
-    };
-    r.refuse(&place, error.to_string());
-}
-
 /// Both curves of a branched coefficient have one argument.
 fn one_argument(
     r: &mut Reader<'_>,
@@ -215,7 +141,7 @@ fn one_argument(
 }
 
 /// The filter and its dead band are there where something needs them.
-fn filter(r: &mut Reader<'_>, document: &Document) {
+fn filter(r: &mut Reader<'_>, document: &Document, sensors: &[Sensor<'_>]) {
     const KEY: &str = "branch_dead_band_deg_c2_per_s3";
     let Some(filter) = &document.temperature.filter else {
         let needed_by = match (&document.temperature.channel[..], &document.auxiliary[..]) {
@@ -227,61 +153,18 @@ fn filter(r: &mut Reader<'_>, document: &Document) {
         r.refuse("temperature.filter", message);
         return;
     };
-    let mut sensors = document.gyro.sensor.iter();
-    let branched = |sensor: &GyroSensor| {
-        let branched = |stated: &StatedTerm| matches!(stated.coefficient, Coefficient::Branched { .. });
-        sensor.terms.iter().any(branched)
-    };
-    let Some(i) = sensors.position(branched) else { return };
+    let branched = |keyed: &KeyedTerm<'_>| matches!(keyed.stated.coefficient, Coefficient::Branched { .. });
+    let Some(sensor) = sensors.iter().find(|sensor| sensor.terms.iter().any(branched)) else { return };
     if filter.branch_dead_band_deg_c2_per_s3.is_none() {
-        let why = "run-up and braking curves of";
-        r.refuse(
-            &join("temperature.filter", KEY),
-            format!("is missing: the {why} gyro.sensor[{i}] need it, add `{KEY}`"),
-        );
+        let message =
+            format!("is missing: the run-up and braking curves of {} need it, add `{KEY}`", sensor.path);
+        r.refuse(&join("temperature.filter", KEY), message);
     }
 }
 
-/// Rows, weights and slopes for each sensor; rows of norm one; known channels.
-fn orientation<P>(
-    r: &mut Reader<'_>,
-    section: &str,
-    orientation: &Orientation<P>,
-    sensors: usize,
-    channels: Option<&[&str]>,
-) {
-    let path = join(section, "orientation");
-    let thermal = orientation.thermal.as_ref();
-    for (key, count) in [
-        ("rows", Some(orientation.rows.len())),
-        ("weights", orientation.weights.as_ref().map(Vec::len)),
-        ("thermal.slopes_arcsec_per_deg_c", thermal.map(|thermal| thermal.slopes_arcsec_per_deg_c.len())),
-    ] {
-        let path = join_dotted(&path, key);
-        if count.is_some_and(|count| count != sensors) && !r.is_marked(&join(section, "sensor")) {
-            let count = count.unwrap_or_default();
-            r.refuse(
-                &path,
-                format!("has {count} entries, must have {sensors}: one for each {section}.sensor"),
-            );
-        }
+/// Channels that an orientation follows.
+fn orientation<P>(r: &mut Reader<'_>, path: &str, orientation: &Orientation<P>, channels: Option<&[&str]>) {
+    for (i, name) in orientation.thermal.iter().flat_map(|thermal| &thermal.channels).enumerate() {
+        channel(r, path, &element("thermal.channels", i), Some(name), channels);
     }
-    for (i, row) in orientation.rows.iter().enumerate() {
-        let norm = row.iter().map(|c| c * c).sum::<f64>().sqrt();
-        if (norm - 1.0).abs() > ROW_NORM_TOLERANCE {
-            let path = element(&join(&path, "rows"), i);
-            r.refuse(
-                &path,
-                format!("has norm {norm:.6}, must be 1 within {ROW_NORM_TOLERANCE}: a unit vector"),
-            );
-        }
-    }
-    for (i, name) in thermal.iter().flat_map(|thermal| &thermal.channels).enumerate() {
-        channel(r, &element(&join_dotted(&path, "thermal.channels"), i), Some(name), channels);
-    }
-}
-
-/// Path of a key of a table within a table.
-fn join_dotted(path: &str, keys: &str) -> String {
-    keys.split('.').fold(path.to_owned(), |path, key| join(&path, key))
 }

@@ -3,7 +3,7 @@
 mod sigma;
 
 use isotherm_correction::calibration::{
-    AccelParts, CalibrationParts, GyroParts, Source, TermParts, TrendParts,
+    AccelParts, CalibrationParts, EVERYWHERE_DEG_C, GyroParts, NO_LIMIT, Source, TermParts, TrendParts,
 };
 use isotherm_correction::channel::{ChannelParts, ThermalFilterParts};
 use isotherm_correction::drift::DriftParts;
@@ -16,14 +16,10 @@ use isotherm_correction::servo::{ServoForm, ServoParts};
 use super::measure::{ARCSEC, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::terms::{SensorKind, Terms};
 use super::types::{
-    AccelOutput, AccelSensor, Auxiliary, AxesHysteresis, Channel, Document, Drift, FitWindow, GyroOutput,
-    GyroSensor, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    AccelOutput, AccelSensor, Auxiliary, AxesHysteresis, Channel, Document, Drift, Filter, FitWindow,
+    GyroOutput, GyroSensor, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
 };
 
-/// Temperature range of an orientation that does not depend on temperature (°C): nothing lies outside.
-const EVERYWHERE_DEG_C: [f64; 2] = [-1e9, 1e9];
-/// Input limit where none is stated: beyond every reading.
-const NO_LIMIT: f64 = 1e100;
 /// Half width of the blend where no term is branched (°C²/s³): any positive number.
 const NO_BRANCHES: f64 = 1.0;
 /// Filter of a unit without temperature channels: never run.
@@ -47,8 +43,8 @@ impl Document {
         let following =
             |channels: &Vec<String>| channels.iter().map(|name| self.channel_index(name)).collect();
         CalibrationParts {
-            filter: filter(temperature),
-            channels: temperature.channel.iter().map(channel).collect(),
+            filter: temperature.to_parts(),
+            channels: temperature.channel.iter().map(Channel::to_parts).collect(),
             auxiliaries: self.auxiliary.iter().map(auxiliary).collect(),
             gyro_output: match self.gyro.output {
                 GyroOutput::Counts => OutputKind::Counts,
@@ -148,18 +144,26 @@ impl Document {
     }
 }
 
-fn filter(temperature: &Temperature) -> ThermalFilterParts {
-    let assumed_deg_c = temperature.assumed_deg_c;
-    match &temperature.filter {
-        Some(filter) => ThermalFilterParts {
-            grid_step_s: filter.grid_step_s,
-            smoothing_s: filter.smoothing_s,
-            derivative_step_s: filter.derivative_step_s,
-            stale_after_s: filter.stale_after_s,
-            branch_dead_band: filter.branch_dead_band_deg_c2_per_s3.unwrap_or(NO_BRANCHES),
+impl Temperature {
+    fn to_parts(&self) -> ThermalFilterParts {
+        let assumed_deg_c = self.assumed_deg_c;
+        let none = || ThermalFilterParts { assumed_deg_c, ..NO_FILTER };
+        self.filter.as_ref().map_or_else(none, |filter| filter.to_parts(assumed_deg_c))
+    }
+}
+
+impl Filter {
+    /// The core's parts, with the temperature that is assumed before the first reading.
+    #[must_use]
+    pub fn to_parts(&self, assumed_deg_c: f64) -> ThermalFilterParts {
+        ThermalFilterParts {
+            grid_step_s: self.grid_step_s,
+            smoothing_s: self.smoothing_s,
+            derivative_step_s: self.derivative_step_s,
+            stale_after_s: self.stale_after_s,
+            branch_dead_band: self.branch_dead_band_deg_c2_per_s3.unwrap_or(NO_BRANCHES),
             assumed_deg_c,
-        },
-        None => ThermalFilterParts { assumed_deg_c, ..NO_FILTER },
+        }
     }
 }
 
@@ -174,12 +178,16 @@ fn name(stated: &str) -> ChannelName {
     name
 }
 
-fn channel(channel: &Channel) -> ChannelParts {
-    ChannelParts {
-        name: name(&channel.name),
-        conversion: channel.conversion_deg_c.clone(),
-        range_deg_c: channel.range_deg_c,
-        spike_limit_deg_c: channel.spike_limit_deg_c,
+impl Channel {
+    /// The core's parts.
+    #[must_use]
+    pub fn to_parts(&self) -> ChannelParts {
+        ChannelParts {
+            name: name(&self.name),
+            conversion: self.conversion_deg_c.clone(),
+            range_deg_c: self.range_deg_c,
+            spike_limit_deg_c: self.spike_limit_deg_c,
+        }
     }
 }
 

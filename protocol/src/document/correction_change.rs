@@ -1,12 +1,12 @@
 //! What differs between the corrections of two documents at one thermal state.
 
-use isotherm_correction::calibration::{Calibration, Steady};
+use isotherm_correction::calibration::Calibration;
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::{ChannelName, LasingMode};
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 
 use super::measure::ARCSEC;
-use super::types::{Document, GyroOutput};
+use super::types::{Accel, Document, GyroOutput};
 use crate::control::CorrectionChange;
 
 /// Names of the case axes.
@@ -38,9 +38,36 @@ pub fn correction_change(
     let old = before.calibration.steady(&thermal, mode);
     let new = after.calibration.steady(&thermal, mode);
     let mut changes = Changes(Vec::new());
-    changes.gyros(before.document, after.document, &old, &new);
-    changes.accels(before.document, after.document, &old, &new);
-    let deg_per_h = |rate: f64| AngularRate::from_rad_per_s(rate).as_deg_per_h();
+    let (first, second) = (before.document, after.document);
+    let same = first.gyro.output == second.gyro.output;
+    let (weight, size) = match second.gyro.output {
+        GyroOutput::Counts => ("″/count", ARCSEC),
+        GyroOutput::Mean => ("rad/rad", 1.0),
+    };
+    let names = |document: &Document| -> Vec<String> {
+        document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect()
+    };
+    for (name, i, j) in matched(&names(first), &names(second)) {
+        let sensor = format!("gyro {name}");
+        changes.pair(&sensor, "bias", ("°/h", deg_per_h), pair(&old.gyro_bias, &new.gyro_bias, i, j));
+        let weights = pair(&old.gyro_weight, &new.gyro_weight, i, j).filter(|_| same);
+        changes.pair(&sensor, "increment weight", (weight, |weight| weight / size), weights);
+        changes.turn(&sensor, pair(&old.gyro_axes, &new.gyro_axes, i, j));
+    }
+    if let (Some(first), Some(second)) = (&first.accel, &second.accel) {
+        let same = first.output == second.output;
+        let unit = second.output.scale_unit().symbol();
+        let names = |accel: &Accel| -> Vec<String> {
+            accel.sensor.iter().map(|sensor| sensor.name.clone()).collect()
+        };
+        for (name, i, j) in matched(&names(first), &names(second)) {
+            let sensor = format!("accelerometer {name}");
+            changes.pair(&sensor, "bias", ("mg", milli_g), pair(&old.accel_bias, &new.accel_bias, i, j));
+            let scales = pair(&old.accel_scale, &new.accel_scale, i, j).filter(|_| same);
+            changes.pair(&sensor, "scale factor", (&unit, |scale| scale), scales);
+            changes.turn(&sensor, pair(&old.accel_axes, &new.accel_axes, i, j));
+        }
+    }
     for ((axis, old), new) in AXES.iter().zip(old.gyro_rate_in_case).zip(new.gyro_rate_in_case) {
         changes.add(format!("angular rate about {axis}"), "°/h", deg_per_h(old), deg_per_h(new));
     }
@@ -60,46 +87,21 @@ impl Changes {
         }
     }
 
-    fn gyros(&mut self, before: &Document, after: &Document, old: &Steady, new: &Steady) {
-        let names = |document: &Document| -> Vec<String> {
-            document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect()
-        };
-        let same_output = before.gyro.output == after.gyro.output;
-        for (name, i, j) in matched(&names(before), &names(after)) {
-            let deg_per_h = |rate: f64| AngularRate::from_rad_per_s(rate).as_deg_per_h();
-            if let Some((old, new)) = pair(&old.gyro_bias, &new.gyro_bias, i, j) {
-                self.add(format!("gyro {name} bias"), "°/h", deg_per_h(old), deg_per_h(new));
-            }
-            if let Some((old, new)) = pair(&old.gyro_weight, &new.gyro_weight, i, j).filter(|_| same_output) {
-                let (unit, size) = match after.gyro.output {
-                    GyroOutput::Counts => ("″/count", ARCSEC),
-                    GyroOutput::Mean => ("rad/rad", 1.0),
-                };
-                self.add(format!("gyro {name} increment weight"), unit, old / size, new / size);
-            }
-            if let Some((old, new)) = pair(&old.gyro_axes, &new.gyro_axes, i, j) {
-                self.add(format!("gyro {name} input axis turns"), "″", 0.0, turned_arcsec(old, new));
-            }
+    fn pair(
+        &mut self,
+        sensor: &str,
+        quantity: &str,
+        (unit, stated): (&str, impl Fn(f64) -> f64),
+        values: Option<(f64, f64)>,
+    ) {
+        if let Some((old, new)) = values {
+            self.add(format!("{sensor} {quantity}"), unit, stated(old), stated(new));
         }
     }
 
-    fn accels(&mut self, before: &Document, after: &Document, old: &Steady, new: &Steady) {
-        let (Some(first), Some(second)) = (&before.accel, &after.accel) else { return };
-        let names = |sensors: &[super::AccelSensor]| -> Vec<String> {
-            sensors.iter().map(|sensor| sensor.name.clone()).collect()
-        };
-        let unit = second.output.scale_unit().symbol();
-        for (name, i, j) in matched(&names(&first.sensor), &names(&second.sensor)) {
-            if let Some((old, new)) = pair(&old.accel_bias, &new.accel_bias, i, j) {
-                self.add(format!("accelerometer {name} bias"), "mg", milli_g(old), milli_g(new));
-            }
-            let same_output = first.output == second.output;
-            if let Some((old, new)) = pair(&old.accel_scale, &new.accel_scale, i, j).filter(|_| same_output) {
-                self.add(format!("accelerometer {name} scale factor"), &unit, old, new);
-            }
-            if let Some((old, new)) = pair(&old.accel_axes, &new.accel_axes, i, j) {
-                self.add(format!("accelerometer {name} input axis turns"), "″", 0.0, turned_arcsec(old, new));
-            }
+    fn turn(&mut self, sensor: &str, axes: Option<([f64; 3], [f64; 3])>) {
+        if let Some((old, new)) = axes {
+            self.add(format!("{sensor} input axis turns"), "″", 0.0, turned_arcsec(old, new));
         }
     }
 }
@@ -113,6 +115,11 @@ fn matched(before: &[String], after: &[String]) -> Vec<(String, usize, usize)> {
 
 fn pair<T: Copy>(before: &[T], after: &[T], i: usize, j: usize) -> Option<(T, T)> {
     Some((*before.get(i)?, *after.get(j)?))
+}
+
+/// °/h from rad/s.
+fn deg_per_h(rate: f64) -> f64 {
+    AngularRate::from_rad_per_s(rate).as_deg_per_h()
 }
 
 /// Thousandths of standard gravity from m/s².

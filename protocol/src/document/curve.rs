@@ -100,6 +100,12 @@ impl Shape {
 /// Argument range of a constant in the core, which has no form for it: wider than any temperature or rate.
 const EVERYWHERE: [f64; 2] = [-1e9, 1e9];
 
+impl Default for Curve {
+    fn default() -> Self {
+        Self::new(Shape::Constant { value: 0.0 })
+    }
+}
+
 impl Curve {
     /// A curve over temperature in ppm, or in the unit of the term that it is put into.
     #[must_use]

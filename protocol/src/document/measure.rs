@@ -1,7 +1,7 @@
 //! Units of measure as the document's keys spell them, and their size in SI.
 
-use isotherm_correction::thermal::Per;
-use isotherm_correction::units::{Angle, AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Per};
+use isotherm_correction::units::{Angle, AngularRate};
 
 /// rad/s in one °/h.
 pub(super) const DEG_PER_H: f64 = AngularRate::from_deg_per_h(1.0).as_rad_per_s();
@@ -60,27 +60,8 @@ impl BaseUnit {
     }
 }
 
-/// What a unit is per: all of them.
-const PER: [Per; 8] =
-    [Per::One, Per::DegC, Per::DegCPerS, Per::DegCPerS2, Per::MPerS2, Per::G, Per::G2, Per::Unit];
-
-/// Spelling in keys and for readers, and how much of the core's unit it is (°C, °C/s, °C/s², m/s²); of the square of a force, whose
-/// coefficient is a force by itself, a standard gravity.
-const fn spelled(per: Per) -> (&'static str, &'static str, f64) {
-    match per {
-        Per::One => ("", "", 1.0),
-        Per::DegC => ("_per_deg_c", "°C", 1.0),
-        Per::DegCPerS => ("_per_deg_c_per_s", "°C/s", 1.0),
-        Per::DegCPerS2 => ("_per_deg_c_per_s2", "°C/s²", 1.0),
-        Per::MPerS2 => ("_per_m_per_s2", "m/s²", 1.0),
-        Per::G => ("_per_g", "g", STANDARD_GRAVITY_M_PER_S2),
-        Per::G2 => ("_per_g2", "g²", STANDARD_GRAVITY_M_PER_S2),
-        Per::Unit => ("_per_unit", "unit", 1.0),
-    }
-}
-
 /// Unit of a curve's values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     /// The unit by itself.
     pub base: BaseUnit,
@@ -90,22 +71,22 @@ pub struct Unit {
 
 impl Unit {
     /// ppm.
-    pub const PPM: Self = BaseUnit::Ppm.per(Per::One);
+    pub const PPM: Self = BaseUnit::Ppm.per(Per::ONE);
     /// Hz.
-    pub const HZ: Self = BaseUnit::Hz.per(Per::One);
+    pub const HZ: Self = BaseUnit::Hz.per(Per::ONE);
 
     /// The unit of a spelling in keys.
     #[must_use]
     pub fn of_suffix(suffix: &str) -> Option<Self> {
-        let mut all =
-            BaseUnit::ALL.into_iter().flat_map(|base| PER.into_iter().map(move |per| base.per(per)));
+        let terms = GYRO_TERMS.iter().chain(&ACCEL_TERMS).map(|term| term.per).chain([Per::M_PER_S2]);
+        let mut all = terms.flat_map(|per| BaseUnit::ALL.map(|base| base.per(per)));
         all.find(|unit| unit.suffix() == suffix)
     }
 
     /// Spelling in keys.
     #[must_use]
     pub fn suffix(self) -> String {
-        [self.base.spelled().0, spelled(self.per).0].concat()
+        [self.base.spelled().0, self.per.key].concat()
     }
 
     /// Spelling for readers.
@@ -113,14 +94,14 @@ impl Unit {
     pub fn symbol(self) -> String {
         let whole =
             |symbol: &str| if symbol.contains('/') { format!("({symbol})") } else { symbol.to_owned() };
-        let (base, per) = (self.base.spelled().1, spelled(self.per).1);
+        let (base, per) = (self.base.spelled().1, self.per.symbol);
         if per.is_empty() { base.to_owned() } else { format!("{}/{}", whole(base), whole(per)) }
     }
 
     /// How much of the core's unit it is.
     #[must_use]
     pub fn in_core_units(self) -> f64 {
-        self.base.spelled().2 / spelled(self.per).2
+        self.base.spelled().2 / self.per.size
     }
 }
 
@@ -138,7 +119,7 @@ pub enum Argument {
 }
 
 impl Argument {
-    const ALL: [Self; 4] = [Self::DegC, Self::DegCPerS, Self::DegCPerS2, Self::DegPerS];
+    pub(super) const ALL: [Self; 4] = [Self::DegC, Self::DegCPerS, Self::DegCPerS2, Self::DegPerS];
 
     /// Spelling in keys and for readers, and how much of the core's unit it is (°C, °C/s, °C/s² or rad/s).
     const fn spelled(self) -> (&'static str, &'static str, f64) {
@@ -173,49 +154,4 @@ impl Argument {
     pub const fn symbol(self) -> &'static str {
         self.spelled().1
     }
-}
-
-/// Spellings at the end of a key that state its unit, the longest first, with the symbol for readers.
-#[cfg(test)]
-const KEY_UNITS: [(&str, &str); 34] = [
-    ("_m_per_s2_per_sqrt_h", "(m/s²)/√h"),
-    ("_deg_per_h_per_sqrt_h", "(°/h)/√h"),
-    ("_m_per_s_per_sqrt_h", "(m/s)/√h"),
-    ("_deg_per_h_per_deg_c", "(°/h)/°C"),
-    ("_m_per_s2_per_deg_c", "(m/s²)/°C"),
-    ("_arcsec_per_deg_c", "″/°C"),
-    ("_arcsec_per_count", "″/count"),
-    ("_counts_per_tick", "counts/tick"),
-    ("_deg_c2_per_s3", "°C²/s³"),
-    ("_rad_per_rad", "rad/rad"),
-    ("_time_constants", "time constants"),
-    ("_deg_c_per_s", "°C/s"),
-    ("_deg_per_sqrt_h", "°/√h"),
-    ("_deg_per_h2", "°/h²"),
-    ("_deg_per_h", "°/h"),
-    ("_deg_per_s", "°/s"),
-    ("_m_per_s2", "m/s²"),
-    ("_m_per_s", "m/s"),
-    ("_arcsec", "″"),
-    ("_ppm", "10⁻⁶"),
-    ("_readings", "readings"),
-    ("_readings_before", "readings"),
-    ("_readings_after", "readings"),
-    ("_degree", "degree"),
-    ("_deg_c", "°C"),
-    ("_deg", "°"),
-    ("_ticks", "ticks"),
-    ("_ratio", "1"),
-    ("_h", "h"),
-    ("_ns", "ns"),
-    ("_s", "s"),
-    ("_m", "m"),
-    ("_v", "V"),
-    ("_hz", "Hz"),
-];
-
-/// Symbol of the unit that a key ends with; `None` for a key without one.
-#[cfg(test)]
-pub(super) fn unit_of_key(key: &str) -> Option<&'static str> {
-    KEY_UNITS.iter().find(|(suffix, _)| key.ends_with(suffix)).map(|(_, symbol)| *symbol)
 }

@@ -8,8 +8,8 @@ use std::marker::PhantomData;
 use isotherm_correction::calibration::{
     BranchArgument, BranchedParts, CoefficientParts, RegressorParts, Source, TermParts,
 };
-use isotherm_correction::thermal::{ACCEL_TERMS, Feature, GYRO_TERMS, Makes, Per, Term, TermForm};
-use isotherm_document::{element, join};
+use isotherm_correction::thermal::{ACCEL_TERMS, Feature, GYRO_TERMS, Makes, Term, TermForm};
+use isotherm_document::join;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +84,6 @@ pub struct Regressor {
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: String,
     /// Subtracted channel.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub minus: Option<String>,
     /// Subtracted constant.
@@ -127,17 +126,13 @@ impl StatedTerm {
         }
     }
 
-    /// Its curves, each with its key after that of the term, where it has one.
-    fn keyed(&self, form: TermForm) -> Vec<(Option<&'static str>, &Curve)> {
-        match &self.coefficient {
-            Coefficient::Branched { run_up, braking } => {
-                vec![(Some("run_up"), run_up), (Some("braking"), braking)]
-            }
-            Coefficient::Curve(gain) => {
-                let is_gain = matches!(form, TermForm::Each(_) | TermForm::Regressors(_));
-                vec![(is_gain.then_some("gain"), gain)]
-            }
-        }
+    /// Its curves, in the order of [`TermForm::curves`].
+    fn curves(&self) -> impl Iterator<Item = &Curve> {
+        let curves = match &self.coefficient {
+            Coefficient::Curve(curve) => [Some(curve), None],
+            Coefficient::Branched { run_up, braking } => [Some(run_up), Some(braking)],
+        };
+        curves.into_iter().flatten()
     }
 
     fn curves_mut(&mut self) -> impl Iterator<Item = &mut Curve> {
@@ -228,32 +223,36 @@ impl<K: SensorKind> Terms<K> {
         self.of(feature).next()?.curve()
     }
 
-    /// All of them, each with its key in the sensor's table.
-    pub(super) fn keyed(&self) -> Vec<KeyedTerm<'_>> {
+    /// All of them, each with its path; `sensor` is that of the sensor's table.
+    pub(super) fn keyed(&self, sensor: &str) -> Vec<KeyedTerm<'_>> {
         let of_term = |term: &'static Term| {
-            let stated = self.of(term.feature).enumerate();
-            stated.map(move |(i, stated)| {
-                let key = if term.form.most() > 1 { element(term.key, i) } else { term.key.to_owned() };
-                KeyedTerm { term, key, stated }
+            let path = move |i| format!("{sensor}.{}", term.path(i));
+            self.of(term.feature).enumerate().map(move |(i, stated)| KeyedTerm {
+                term,
+                path: path(i),
+                stated,
             })
         };
         K::TERMS.iter().flat_map(of_term).collect()
     }
 }
 
-/// A term with its declaration and its key in the sensor's table.
+/// A term with its declaration and its path.
 #[derive(Debug)]
 pub(super) struct KeyedTerm<'d> {
     pub(super) term: &'static Term,
-    pub(super) key: String,
+    pub(super) path: String,
     pub(super) stated: &'d StatedTerm,
 }
 
 impl<'d> KeyedTerm<'d> {
-    /// Its curves, each with its path in the sensor's table.
-    pub(super) fn curves(&self) -> Vec<(String, &'d Curve)> {
-        let path = |key: Option<&str>| key.map_or_else(|| self.key.clone(), |key| join(&self.key, key));
-        self.stated.keyed(self.term.form).into_iter().map(|(key, curve)| (path(key), curve)).collect()
+    /// Its curves, each with its path.
+    pub(super) fn curves(&self) -> impl Iterator<Item = (String, &'d Curve)> {
+        let mut keys = self.term.form.curves().iter();
+        self.stated.curves().map(move |curve| {
+            let path = &self.path;
+            (keys.next().map_or_else(|| path.clone(), |key| join(path, key)), curve)
+        })
     }
 }
 
@@ -269,10 +268,9 @@ pub(super) fn unit(term: &Term, bias: BaseUnit) -> Unit {
 
 /// Arguments of a term's curves: temperature, and the feature where the coefficient is branched.
 fn arguments(term: &Term) -> Vec<Argument> {
-    let feature = match (term.form, term.per) {
-        (TermForm::Branches, Per::DegCPerS) => Some(Argument::DegCPerS),
-        (TermForm::Branches, Per::DegCPerS2) => Some(Argument::DegCPerS2),
-        _ => None,
-    };
+    let feature = Argument::ALL.into_iter().filter(|argument| {
+        matches!(term.form, TermForm::Branches)
+            && term.per.key.strip_prefix("_per_") == Some(argument.suffix())
+    });
     std::iter::once(Argument::DegC).chain(feature).collect()
 }

@@ -5,6 +5,7 @@ mod keys;
 mod published;
 mod reference;
 mod robust;
+mod units;
 
 use isotherm_correction::calibration::{CoefficientParts, TermParts};
 use isotherm_correction::curve::{Curve, CurveParts};
@@ -128,7 +129,7 @@ fn doubts_are_warnings() {
     for (from, to, key, message) in [
         ("smoothing_s = 20.0", "smoothing_s = 20.4", "temperature.filter.smoothing_s", "20 s is used"),
         ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", followed by no sensor"),
-        ("channel = \"coil\"\n", "", "gyro.sensor[3].lag", "has no effect"),
+        ("channel = \"coil\"\n", "", "gyro.sensor[3].lag[0]", "has no effect"),
         (
             "range_deg_c = [-65.0, 110.0]",
             "range_deg_c = [-30.0, 60.0]",

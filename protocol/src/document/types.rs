@@ -20,8 +20,11 @@ pub use sigma::{AccelBiasSigma, AccelSigma, GyroBiasSigma, GyroSigma};
 
 use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::units::Span;
+use isotherm_document::element;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use super::terms::KeyedTerm;
 
 /// The calibration of one unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -37,13 +40,10 @@ pub struct Document {
     )]
     pub unit: String,
     /// Date, or date and time with offset, unquoted.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub created: Option<Created>,
     /// Free text for readers.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// Where the numbers come from; not used by the correction. Source: models §8.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
     /// Temperature channels and their filter.
     pub temperature: Temperature,
@@ -54,14 +54,35 @@ pub struct Document {
     /// Gyros.
     pub gyro: Gyro,
     /// Accelerometers, if the unit has any.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub accel: Option<Accel>,
     /// Substitution over mode switches. Source: models §5, 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub mode_reversal: Option<ModeReversal>,
     /// Self-test limits of voltages and counters on `imu/{unit}/raw/health`. Source: models §7.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub self_test: Option<SelfTest>,
+}
+
+/// What gyros and accelerometers have in common.
+#[derive(Debug)]
+pub(super) struct Sensor<'d> {
+    /// Path of its table.
+    pub(super) path: String,
+    pub(super) channel: Option<&'d str>,
+    pub(super) terms: Vec<KeyedTerm<'d>>,
+}
+
+impl Document {
+    /// All sensors, gyros first.
+    pub(super) fn sensors(&self) -> Vec<Sensor<'_>> {
+        let gyros = self.gyro.sensor.iter().enumerate().map(|(i, sensor)| {
+            let path = element("gyro.sensor", i);
+            Sensor { channel: sensor.channel.as_deref(), terms: sensor.terms.keyed(&path), path }
+        });
+        let accels = self.accel.iter().flat_map(|accel| &accel.sensor).enumerate().map(|(i, sensor)| {
+            let path = element("accel.sensor", i);
+            Sensor { channel: sensor.channel.as_deref(), terms: sensor.terms.keyed(&path), path }
+        });
+        gyros.chain(accels).collect()
+    }
 }
 
 /// Temperature channels and the filter that all of them use.
@@ -72,7 +93,6 @@ pub struct Temperature {
     #[schemars(range(min = -273.15, max = 1000.0))]
     pub assumed_deg_c: f64,
     /// Filter of all channels; required with channels. Part of the fit: coefficients need the same filter.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub filter: Option<Filter>,
     /// Channels, which sensors follow by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -98,7 +118,6 @@ pub struct Filter {
     pub stale_after_s: f64,
     /// Half width, in Ṫ·T̈, of the blend between run-up and braking; required with `thermal_rate` or
     /// `thermal_acceleration`. Source: models §2, 000.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub branch_dead_band_deg_c2_per_s3: Option<f64>,
 }
@@ -159,14 +178,11 @@ pub struct Orientation<P> {
     #[schemars(length(min = 3, max = 8))]
     pub rows: Vec<[f64; 3]>,
     /// Weights in the pseudo-inverse, > 0, proportional to 1/σ²; default: equal. Source: models §4.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 3, max = 8), extend("items" = { "type": "number", "exclusiveMinimum": 0 }))]
     pub weights: Option<Vec<f64>>,
     /// Change with temperature.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub thermal: Option<OrientationThermal>,
     /// Detection and exclusion of a failed sensor. Source: models §4.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub parity: Option<P>,
 }
 
@@ -210,11 +226,9 @@ pub struct AxesHysteresis {
 #[schemars(deny_unknown_fields, title = "Mode reversal")]
 pub struct ModeReversal {
     /// n: ticks lost by a switch, the commanded one included; or give `transition_s`. Source: 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 32))]
     pub transition_ticks: Option<u8>,
     /// Time lost by a switch from the command on, instead of `transition_ticks`: n = ⌈t/Δt − 1/16⌉, at most 32. Source: 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0001, max = 1.0))]
     pub transition_s: Option<f64>,
     /// Readings of the prediction's fit. Source: 003 step 1.

@@ -1,45 +1,51 @@
 //! What is doubtful about a document that is valid.
 
-use isotherm_correction::thermal::{Feature, GYRO_TERMS, Term, TermForm};
+use std::collections::BTreeSet;
+
+use isotherm_correction::thermal::{Feature, TermForm};
 
 use super::curve::Curve;
 use super::measure::Argument;
 use super::terms::KeyedTerm;
-use super::types::{Document, Filter, GyroSensor, Orientation, Temperature};
+use super::types::{Document, Filter, Orientation, Sensor};
 use isotherm_document::Problem;
 use isotherm_document::{Reader, element, join};
 
-/// Everything doubtful, in the order of its keys.
+/// Everything doubtful, in the order of the text.
 pub(super) fn warnings(r: &Reader<'_>, document: &Document) -> Vec<Problem> {
     let mut found = Vec::new();
     if let Some(filter) = &document.temperature.filter {
         grid(r, filter, &mut found);
     }
     unused_channels(r, document, &mut found);
-    let ranges = Ranges { r, temperature: &document.temperature };
+    for sensor in document.sensors() {
+        for (path, curve) in sensor.terms.iter().flat_map(KeyedTerm::curves) {
+            out_of_range(r, document, (&path, curve), sensor.channel, &mut found);
+        }
+        without_channel(r, &sensor, &mut found);
+    }
     for (i, sensor) in document.gyro.sensor.iter().enumerate() {
-        let path = element("gyro.sensor", i);
-        let channel = sensor.channel.as_deref();
-        ranges.compare_terms(&path, channel, &sensor.terms.keyed(), &mut found);
-        without_channel(r, &path, sensor, &mut found);
         if sensor.terms.has(Feature::LasingMode) && document.mode_reversal.is_none() {
             let why = "changes its sign with the lasing mode, but there is no [mode_reversal]: switches are not bridged";
-            found.push(r.warning(&join(&path, "magnetic_bias"), why));
+            found.push(r.warning(&format!("gyro.sensor[{i}].magnetic_bias"), why));
         }
     }
-    parity(r, "gyro", &document.gyro.orientation, &mut found);
+    parity(r, "gyro.orientation.parity", &document.gyro.orientation, &mut found);
     if let Some(accel) = &document.accel {
         for (i, sensor) in accel.sensor.iter().enumerate() {
-            let path = element("accel.sensor", i);
-            let channel = sensor.channel.as_deref();
-            ranges.compare(&path, "scale_factor", channel, Some(&sensor.scale_factor), &mut found);
-            ranges.compare_terms(&path, channel, &sensor.terms.keyed(), &mut found);
             let board = sensor.board_channel.as_deref();
-            let ratio = sensor.board_ratio_error.as_ref();
-            ranges.compare(&path, "board_ratio_error", board, ratio, &mut found);
+            let curves = [
+                ("scale_factor", sensor.channel.as_deref(), Some(&sensor.scale_factor)),
+                ("board_ratio_error", board, sensor.board_ratio_error.as_ref()),
+            ];
+            for (key, channel, curve) in curves {
+                let Some(curve) = curve else { continue };
+                out_of_range(r, document, (&format!("accel.sensor[{i}].{key}"), curve), channel, &mut found);
+            }
         }
-        parity(r, "accel", &accel.orientation, &mut found);
+        parity(r, "accel.orientation.parity", &accel.orientation, &mut found);
     }
+    found.sort_by_key(|problem| (problem.line, problem.column));
     found
 }
 
@@ -59,90 +65,62 @@ fn grid(r: &Reader<'_>, filter: &Filter, found: &mut Vec<Problem>) {
 
 /// A channel that nothing follows.
 fn unused_channels(r: &Reader<'_>, document: &Document, found: &mut Vec<Problem>) {
+    let sensors = document.sensors();
     let accel = document.accel.as_ref();
     let gyro_thermal = document.gyro.orientation.thermal.as_ref();
     let accel_thermal = accel.and_then(|accel| accel.orientation.thermal.as_ref());
-    let accel_sensors = accel.into_iter().flat_map(|accel| &accel.sensor);
-    let used: Vec<&String> = (document.gyro.sensor.iter().filter_map(|sensor| sensor.channel.as_ref()))
-        .chain(accel_sensors.flat_map(|sensor| sensor.channel.iter().chain(&sensor.board_channel)))
-        .chain(regressors(document))
-        .chain(gyro_thermal.into_iter().chain(accel_thermal).flat_map(|thermal| &thermal.channels))
-        .collect();
+    let axes = gyro_thermal.into_iter().chain(accel_thermal).flat_map(|thermal| &thermal.channels);
+    let boards =
+        accel.into_iter().flat_map(|accel| &accel.sensor).filter_map(|sensor| sensor.board_channel.as_ref());
+    let regressors =
+        sensors.iter().flat_map(|sensor| &sensor.terms).filter_map(|term| term.stated.regressor.as_ref());
+    let regressors = regressors.flat_map(|regressor| regressor.minus.iter().chain([&regressor.channel]));
+    let own = sensors.iter().filter_map(|sensor| sensor.channel);
+    let used: BTreeSet<&str> = axes.chain(boards).chain(regressors).map(String::as_str).chain(own).collect();
     let temperatures = document.temperature.channel.iter().map(|channel| &channel.name).enumerate();
     let temperatures = temperatures.map(|(i, name)| (element("temperature.channel", i), name));
     let auxiliaries = document.auxiliary.iter().map(|channel| &channel.name).enumerate();
     let auxiliaries = auxiliaries.map(|(i, name)| (element("auxiliary", i), name));
-    for (path, name) in temperatures.chain(auxiliaries).filter(|(_, name)| !used.contains(name)) {
+    for (path, name) in temperatures.chain(auxiliaries).filter(|(_, name)| !used.contains(name.as_str())) {
         let message = format!("is {name:?}, followed by no sensor and no orientation");
         found.push(r.warning(&join(&path, "name"), message));
     }
 }
 
-/// Channels of regressors.
-fn regressors(document: &Document) -> impl Iterator<Item = &String> {
-    let gyros = document.gyro.sensor.iter().flat_map(|sensor| sensor.terms.iter());
-    let accels = document.accel.iter().flat_map(|accel| &accel.sensor).flat_map(|sensor| sensor.terms.iter());
-    let stated = gyros.chain(accels).filter_map(|stated| stated.regressor.as_ref());
-    stated.flat_map(|regressor| regressor.minus.iter().chain([&regressor.channel]))
-}
-
 /// Terms that need a temperature that moves.
-fn without_channel(r: &Reader<'_>, path: &str, sensor: &GyroSensor, found: &mut Vec<Problem>) {
-    for Term { feature, key, form, .. } in &GYRO_TERMS {
-        let moves = matches!(form, TermForm::Branches | TermForm::Each(_));
-        if moves && sensor.channel.is_none() && sensor.terms.has(*feature) {
-            found.push(r.warning(&join(path, key), "has no effect: the gyro follows no temperature channel"));
+fn without_channel(r: &Reader<'_>, sensor: &Sensor<'_>, found: &mut Vec<Problem>) {
+    for KeyedTerm { term, path, .. } in sensor.terms.iter().filter(|_| sensor.channel.is_none()) {
+        if matches!(term.form, TermForm::Branches | TermForm::Each(_)) {
+            let why = "has no effect: the sensor follows no temperature channel";
+            found.push(r.warning(path, why));
         }
     }
 }
 
 /// A parity check that cannot check anything.
-fn parity<P>(r: &Reader<'_>, section: &str, orientation: &Orientation<P>, found: &mut Vec<Problem>) {
+fn parity<P>(r: &Reader<'_>, path: &str, orientation: &Orientation<P>, found: &mut Vec<Problem>) {
     if orientation.parity.is_some() && orientation.rows.len() <= 3 {
-        let path = join(&join(section, "orientation"), "parity");
-        found.push(r.warning(&path, "has no effect: three sensors leave no parity residual"));
+        found.push(r.warning(path, "has no effect: three sensors leave no parity residual"));
     }
 }
 
-/// Compares fitted ranges with the physical range of the channel.
-struct Ranges<'a, 't> {
-    r: &'a Reader<'t>,
-    temperature: &'a Temperature,
-}
-
-impl Ranges<'_, '_> {
-    fn compare_terms(
-        &self,
-        sensor: &str,
-        channel: Option<&str>,
-        terms: &[KeyedTerm<'_>],
-        found: &mut Vec<Problem>,
-    ) {
-        for (key, curve) in terms.iter().flat_map(KeyedTerm::curves) {
-            self.compare(sensor, &key, channel, Some(curve), found);
-        }
-    }
-
-    fn compare(
-        &self,
-        sensor: &str,
-        key: &str,
-        channel: Option<&str>,
-        curve: Option<&Curve>,
-        found: &mut Vec<Problem>,
-    ) {
-        let Some(curve) = curve.filter(|curve| curve.argument() == Some(Argument::DegC)) else { return };
-        let Some([low, high]) = curve.range() else { return };
-        let Some(channel) = self.temperature.channel.iter().find(|c| Some(c.name.as_str()) == channel) else {
-            return;
-        };
-        let [coldest, hottest] = channel.range_deg_c;
-        if low < coldest || high > hottest {
-            let message = format!(
-                "is fitted from {low} to {high} °C, but channel {:?} rejects readings outside {coldest} to {hottest} °C",
-                channel.name
-            );
-            found.push(self.r.warning(&format!("{sensor}.{key}"), message));
-        }
+/// A curve that is fitted beyond the physical range of the channel that it follows.
+fn out_of_range(
+    r: &Reader<'_>,
+    document: &Document,
+    (path, curve): (&str, &Curve),
+    channel: Option<&str>,
+    found: &mut Vec<Problem>,
+) {
+    let range = curve.range().filter(|_| curve.argument() == Some(Argument::DegC));
+    let followed = document.temperature.channel.iter().find(|of| Some(of.name.as_str()) == channel);
+    let (Some([low, high]), Some(channel)) = (range, followed) else { return };
+    let [coldest, hottest] = channel.range_deg_c;
+    if low < coldest || high > hottest {
+        let message = format!(
+            "is fitted from {low} to {high} °C, but channel {:?} rejects readings outside {coldest} to {hottest} °C",
+            channel.name
+        );
+        found.push(r.warning(path, message));
     }
 }

@@ -25,16 +25,13 @@ pub struct Overlay {
     )]
     pub unit: String,
     /// Date, or date and time with offset, unquoted.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub created: Option<Created>,
     /// Free text for readers.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
     /// Gyros that change.
     #[schemars(length(min = 1, max = 8))]
     pub gyro: Vec<GyroOverlay>,
     /// The pre-launch calibration that made it; for readers. Source: models §7.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub pre_launch: Option<PreLaunchRecord>,
 }
 
@@ -52,11 +49,9 @@ pub struct GyroOverlay {
     #[schemars(range(min = 0.0, max = 100_000.0))]
     pub static_bias_sigma_deg_per_h: f64,
     /// Added to the magnetic bias (B0). Source: models §7, 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -100_000.0, max = 100_000.0))]
     pub magnetic_bias_change_deg_per_h: Option<f64>,
     /// Its standard error; required with it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 100_000.0))]
     pub magnetic_bias_sigma_deg_per_h: Option<f64>,
 }
@@ -72,7 +67,6 @@ pub struct PreLaunchRecord {
     #[schemars(range(min = -360.0, max = 360.0))]
     pub heading_deg: f64,
     /// Pitch and roll; default: levelled by the accelerometers.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -180.0, max = 180.0)))]
     pub pitch_roll_deg: Option<[f64; 2]>,
     /// Accumulated time.

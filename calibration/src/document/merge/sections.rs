@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Makes, Term};
 use toml::{Table, Value};
 
 /// Sections by their key; sensors and channels by their name: `gyro.sensor.x.static_bias`.
@@ -9,18 +10,10 @@ pub(super) type Sections = BTreeMap<String, Value>;
 
 /// Keys that say nothing about the correction.
 const ABOUT: [&str; 4] = ["schema", "created", "note", "origin"];
-/// Terms of a gyro's Ω, which one fit makes together.
-const BIAS: [&str; 9] = [
-    "static_bias",
-    "magnetic_bias",
-    "slow_meander",
-    "thermal_rate",
-    "thermal_acceleration",
-    "lag",
-    "hysteresis",
-    "regressor",
-    "trend",
-];
+/// Whether a key is that of a term of a sensor's bias, all of which one fit makes together.
+fn is_bias(terms: &[Term], key: &str) -> bool {
+    terms.iter().any(|term| term.key == key && term.makes == Makes::Bias)
+}
 
 /// Whether a key is about the document itself.
 pub(super) fn is_about(key: &str) -> bool {
@@ -33,16 +26,15 @@ pub(super) fn is_about(key: &str) -> bool {
 pub(super) fn group(key: &str) -> String {
     let parts: Vec<&str> = key.split('.').collect();
     match parts.as_slice() {
-        ["gyro", "sensor", name, term] if BIAS.contains(term) => format!("gyro.sensor.{name} bias"),
+        ["gyro", "sensor", name, term] if *term == "trend" || is_bias(&GYRO_TERMS, term) => {
+            format!("gyro.sensor.{name} bias")
+        }
         ["gyro", "sensor", name, term] if term.starts_with("increment_weight") => {
             format!("gyro.sensor.{name} weight")
         }
-        [
-            "accel",
-            "sensor",
-            name,
-            "scale_factor" | "bias" | "board_ratio_error" | "lag" | "hysteresis" | "regressor",
-        ] => {
+        ["accel", "sensor", name, key]
+            if matches!(*key, "scale_factor" | "board_ratio_error") || is_bias(&ACCEL_TERMS, key) =>
+        {
             format!("accel.sensor.{name} output")
         }
         [kind, "orientation", "rows" | "weights" | "thermal"] => format!("{kind}.orientation axes"),

@@ -6,7 +6,12 @@
 
 use std::collections::BTreeMap;
 use std::iter;
+use std::sync::Arc;
 
+use isotherm_correction::calibration::{
+    BranchArgument, BranchedParts, Calibration, CalibrationParts, Defect, TermParts,
+};
+use isotherm_correction::curve::CurveParts;
 use isotherm_correction::observation::Observation;
 use isotherm_correction::sample::{
     GyroTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TemperatureReading,
@@ -14,15 +19,11 @@ use isotherm_correction::sample::{
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::{MAX_TICK_DURATION, UnitSettings};
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
-use isotherm_log::offline::Offline;
+use isotherm_log::offline::{Loaded, Offline, unit_id};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{
-    Channel, Curve, Document, Filter, Gyro, GyroOutput, GyroSensor, Orientation, Shape, StatedTerm,
-    Temperature,
-};
+use isotherm_protocol::document::{Channel, Curve, Filter, Shape};
 
 use super::samples::Samples;
-use crate::document::written::Written;
 use crate::error::Error;
 use crate::numbers::{real, seconds};
 
@@ -85,11 +86,11 @@ pub struct Columns<'a> {
 }
 
 impl Basis {
-    /// A polynomial with one coefficient of one.
-    pub(super) fn power(&self, power: usize, value: f64) -> Curve {
+    /// A polynomial (°/h and so on) with one coefficient that is not zero.
+    fn power(&self, power: usize, value: f64) -> CurveParts {
         let mut coefficients = vec![0.0; power + 1];
-        coefficients[power] = value;
-        self.curve(coefficients)
+        coefficients[power] = AngularRate::from_deg_per_h(value).as_rad_per_s();
+        CurveParts::Polynomial { reference: self.reference_deg_c, coefficients, range: self.range_deg_c }
     }
 
     /// A polynomial over its range.
@@ -98,67 +99,41 @@ impl Basis {
         Curve::new(Shape::Polynomial { reference, coefficients, range })
     }
 
-    /// A document of gyros on this channel, each with the term that it is given and nothing else.
-    fn document(&self, terms: &[Term]) -> Document {
-        let sensor = |(index, term): (usize, &Term)| {
-            let mut gyro = GyroSensor {
-                channel: Some(self.channel.name.clone()),
-                increment_weight_rad_per_rad: Some(1.0),
-                ..GyroSensor::bare(&index.to_string())
-            };
-            match *term {
-                Term::Scale(_) => {}
-                Term::Static(power) => gyro.set(Feature::One, self.power(power, 1.0)),
-                Term::Rate(branch, power) => {
-                    gyro.put(StatedTerm::branched(Feature::ThermalRate, self.branches(branch, power)));
-                }
-                Term::Acceleration(branch, power) => {
-                    gyro.put(StatedTerm::branched(
-                        Feature::ThermalAcceleration,
-                        self.branches(branch, power),
-                    ));
-                }
-                Term::Lag(tau, power) => {
-                    let gain = self.power(power, 1.0);
-                    gyro.put(StatedTerm::with_parameter(Feature::Lag, tau_s(tau), gain));
-                }
-            }
-            gyro
+    /// A term with the coefficient one (°/h and so on).
+    fn parts(&self, term: Term) -> Vec<TermParts> {
+        let branched = |feature, branch, power| {
+            let [run_up, braking] = [Branch::Braking, Branch::RunUp]
+                .map(|other| self.power(power, f64::from(u8::from(branch != other))));
+            let argument = BranchArgument::Temperature;
+            TermParts::branched(feature, BranchedParts { argument, run_up, braking })
         };
-        let sensors: Vec<GyroSensor> = terms.iter().enumerate().map(sensor).collect();
-        let dead_band = self.filter.branch_dead_band_deg_c2_per_s3.or(Some(1e-9));
-        // Any axes that span space: what is looked at is not resolved along them.
-        let row = |index: usize| {
-            let mut row = [0.0; 3];
-            row[index % 3] = 1.0;
-            row
-        };
-        let rows = (0..sensors.len()).map(row).collect();
-        Document {
-            schema: isotherm_protocol::document::CURRENT_SCHEMA,
-            unit: "COLUMNS".to_owned(),
-            created: None,
-            note: None,
-            origin: None,
-            auxiliary: Vec::new(),
-            temperature: Temperature {
-                assumed_deg_c: self.reference_deg_c,
-                filter: Some(Filter { branch_dead_band_deg_c2_per_s3: dead_band, ..self.filter.clone() }),
-                channel: vec![self.channel.clone()],
-            },
-            gyro: Gyro {
-                output: GyroOutput::Mean,
-                sensor: sensors,
-                orientation: Orientation { rows, weights: None, thermal: None, parity: None },
-            },
-            accel: None,
-            mode_reversal: None,
-            self_test: None,
-        }
+        vec![match term {
+            Term::Scale(_) => return Vec::new(),
+            Term::Static(power) => TermParts::new(Feature::One, self.power(power, 1.0)),
+            Term::Rate(branch, power) => branched(Feature::ThermalRate, branch, power),
+            Term::Acceleration(branch, power) => branched(Feature::ThermalAcceleration, branch, power),
+            Term::Lag(tau, power) => TermParts::lag(seconds(tau), self.power(power, 1.0)),
+        }]
     }
 
-    fn branches(&self, branch: Branch, power: usize) -> [Curve; 2] {
-        [Branch::Braking, Branch::RunUp].map(|other| self.power(power, f64::from(u8::from(branch != other))))
+    /// Gyros on this channel, each with a term and nothing else.
+    fn unit(&self, terms: &[Term]) -> Result<Loaded, Error> {
+        let filter = Filter {
+            branch_dead_band_deg_c2_per_s3: self.filter.branch_dead_band_deg_c2_per_s3.or(Some(1e-9)),
+            ..self.filter.clone()
+        };
+        let parts = CalibrationParts::columns(
+            filter.to_parts(self.reference_deg_c),
+            self.channel.to_parts(),
+            terms.iter().map(|term| self.parts(*term)),
+        );
+        let defects = |found: Vec<Defect>| {
+            Error::Document(
+                found.iter().map(|defect| format!("{}: {}", defect.path(), defect.kind)).collect(),
+            )
+        };
+        let calibration = Arc::new(Calibration::new(&parts).map_err(defects)?);
+        Ok(Loaded { calibration, digest: [0; 8], unit: unit_id("COLUMNS")?, warnings: Vec::new() })
     }
 
     /// What up to eight terms subtract over the windows of a run (°/h).
@@ -166,7 +141,7 @@ impl Basis {
         // A unit has three gyros at least.
         let padding = iter::repeat_n(Term::Static(0), MIN_SENSORS.saturating_sub(terms.len()));
         let padded: Vec<Term> = terms.iter().copied().chain(padding).collect();
-        let loaded = Written::compiled(&self.document(&padded))?;
+        let loaded = self.unit(&padded)?;
         let mut unit = Offline::new(&loaded, UnitSettings::default());
         let readings: &[TemperatureReading] =
             run.temperatures.get(&self.channel.name).map_or(&[], Vec::as_slice);

@@ -1,9 +1,13 @@
 //! Collects everything that is wrong.
 
+use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::super::defect::{Defect, DefectKind, Section};
 use super::super::parts::Source;
+use crate::curve::CurveError;
 use crate::sample::ChannelName;
 
 /// Collects defects.
@@ -27,28 +31,33 @@ impl Checker {
         self
     }
 
-    pub(super) fn push(&mut self, field: &'static str, kind: impl Into<DefectKind>) {
-        self.defects.push(Defect { section: self.section, field, kind: kind.into() });
+    pub(super) fn push(&mut self, field: &str, kind: impl Into<DefectKind>) {
+        self.defects.push(Defect { section: self.section, field: field.to_owned(), kind: kind.into() });
     }
 
-    pub(super) fn within(&mut self, field: &'static str, value: f64, low: f64, high: f64) {
+    /// What is wrong with a curve, in its place.
+    pub(super) fn curve(&mut self, field: &str, error: CurveError) {
+        self.push(&format!("{field}{}", error.place()), error);
+    }
+
+    pub(super) fn within(&mut self, field: &str, value: f64, low: f64, high: f64) {
         if !(low..=high).contains(&value) {
             self.push(field, DefectKind::OutOfRange { value, low, high });
         }
     }
 
-    pub(super) fn positive(&mut self, field: &'static str, value: f64) {
+    pub(super) fn positive(&mut self, field: &str, value: f64) {
         self.within(field, value, f64::MIN_POSITIVE, HUGE);
     }
 
-    pub(super) fn count(&mut self, field: &'static str, count: usize, low: usize, high: usize) {
+    pub(super) fn count(&mut self, field: &str, count: usize, low: usize, high: usize) {
         if !(low..=high).contains(&count) {
             self.push(field, DefectKind::Count { count, low, high });
         }
     }
 
     /// Coefficients of a polynomial, at least one of them.
-    pub(super) fn coefficients(&mut self, field: &'static str, coefficients: &[f64], most: usize) {
+    pub(super) fn coefficients(&mut self, field: &str, coefficients: &[f64], most: usize) {
         self.count(field, coefficients.len(), 1, most);
         for &coefficient in coefficients {
             self.within(field, coefficient, -HUGE, HUGE);
@@ -56,7 +65,7 @@ impl Checker {
     }
 
     /// A range that runs upwards and lies within limits.
-    pub(super) fn range(&mut self, field: &'static str, [from, to]: [f64; 2], low: f64, high: f64) {
+    pub(super) fn range(&mut self, field: &str, [from, to]: [f64; 2], low: f64, high: f64) {
         if from >= to {
             self.push(field, DefectKind::InvertedRange { low: from, high: to });
         }
@@ -65,7 +74,7 @@ impl Checker {
         }
     }
 
-    pub(super) fn channel(&mut self, field: &'static str, index: Option<usize>) {
+    pub(super) fn channel(&mut self, field: &str, index: Option<usize>) {
         let channels = self.channels;
         if let Some(index) = index.filter(|index| *index >= channels) {
             self.push(field, DefectKind::NoSuchChannel { index, channels });
@@ -73,7 +82,7 @@ impl Checker {
     }
 
     /// A channel of either kind.
-    pub(super) fn source(&mut self, field: &'static str, source: Source) {
+    pub(super) fn source(&mut self, field: &str, source: Source) {
         let (index, channels) = match source {
             Source::Temperature(index) => (index, self.channels),
             Source::Auxiliary(index) => (index, self.auxiliaries),
@@ -98,11 +107,11 @@ impl Checker {
     pub(super) fn compiled<T, E: Into<DefectKind>>(
         &mut self,
         compiled: Result<T, Vec<E>>,
-        field: fn(&E) -> &'static str,
+        field: impl Fn(&E) -> String,
     ) -> Option<T> {
         let errors = compiled.map_err(|errors| {
             for error in errors {
-                self.push(field(&error), error);
+                self.push(&field(&error), error);
             }
         });
         errors.ok()

@@ -10,10 +10,12 @@ pub const MAX_SELF_TEST_READINGS: usize = 32;
 
 /// Every limit is one, and no name stands for two readings: both kinds come in on one topic.
 pub(super) fn check_self_test(checker: &mut Checker, SelfTestParts { voltages, counters }: &SelfTestParts) {
-    checker.at(Section::SelfTest).count("voltages", voltages.len(), 0, MAX_SELF_TEST_READINGS);
-    checker.count("counters", counters.len(), 0, MAX_SELF_TEST_READINGS);
-    let voltage_names = || voltages.iter().enumerate().map(|(i, voltage)| ("voltage", i, voltage.name));
-    let counter_names = || counters.iter().enumerate().map(|(i, counter)| ("counter", i, counter.name));
+    checker.at(Section::SelfTest).count("voltage", voltages.len(), 0, MAX_SELF_TEST_READINGS);
+    checker.count("counter", counters.len(), 0, MAX_SELF_TEST_READINGS);
+    let voltage_names =
+        || voltages.iter().enumerate().map(|(i, voltage)| ("self_test.voltage", i, voltage.name));
+    let counter_names =
+        || counters.iter().enumerate().map(|(i, counter)| ("self_test.counter", i, counter.name));
     for (i, voltage) in voltages.iter().enumerate() {
         name(checker.at(Section::SelfTestVoltage(i)), voltage.name, voltage_names().take(i));
         checker.range("range_v", voltage.range_v, -HUGE, HUGE);

@@ -1,5 +1,7 @@
 //! Checks and compiles gyros, accelerometers and their orientations.
 
+use alloc::format;
+
 use super::super::defect::{DefectKind, Section};
 use super::super::parts::{AccelParts, CalibrationParts, GyroParts, TermParts, TrendParts};
 use super::checker::{Checker, HUGE};
@@ -7,9 +9,10 @@ use crate::channel::ThermalFilter;
 use crate::curve::Curve;
 use crate::orientation::{Orientation, OrientationError, OrientationParts};
 use crate::sample::OutputKind;
+use crate::servo::Servo;
 use crate::sigma::{MAX_BIAS_TERMS, SigmaParts};
 use crate::thermal::{
-    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_PLAYS, Parameter, Term, TermError, TermForm,
+    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_PLAYS, Parameter, Term, TermForm,
 };
 
 /// Farthest that an accelerometer may sit from the reference point along an axis (m).
@@ -23,27 +26,30 @@ pub(super) fn gyro_model(
     parts: &CalibrationParts,
 ) -> Option<GyroModel> {
     checker.at(Section::Gyro(index)).channel("channel", gyro.channel);
-    checker.positive("increment_weight", gyro.increment_weight.abs());
+    let counts = parts.gyro_output == OutputKind::Counts;
+    let weight = if counts { "increment_weight_arcsec" } else { "increment_weight_rad" };
+    checker.positive(weight, gyro.increment_weight.abs());
     checker.positive("input_limit", gyro.input_limit);
     checker.within("delay_ticks", gyro.delay_ticks, 0.0, 1.0);
     terms(checker, (gyro.channel, &gyro.terms), &GYRO_TERMS, parts);
     if let Some(TrendParts { coefficients, interval_s }) = &gyro.trend {
         checker.coefficients("trend.coefficients", coefficients, 3);
-        checker.range("trend.interval_s", *interval_s, 0.0, 1e9);
+        checker.range("trend.interval", *interval_s, 0.0, 1e9);
     }
     if gyro.servo.is_some() && parts.reversal.is_none() {
         let needed_by = "the gyros' servo term";
-        checker.at(Section::Reversal).push("transition_ticks", DefectKind::Missing { needed_by });
+        checker.at(Section::Reversal).push("", DefectKind::Missing { needed_by });
     }
     checker.at(Section::Gyro(index));
-    if gyro.servo.is_some() && parts.gyro_output != OutputKind::Counts {
+    if gyro.servo.is_some() && !counts {
         checker.push("servo", DefectKind::NeedsCounts);
     }
     sigma(checker, gyro.sigma.as_ref());
-    GyroModel::new(gyro, filter, &mut |field, error| match error {
-        TermError::Curve(error) => checker.push(field, error),
-        TermError::Servo(error) => checker.push(field, error),
-    })
+    let servo = gyro
+        .servo
+        .as_ref()
+        .and_then(|servo| checker.compiled(Servo::new(servo), |error| format!("servo.{}", error.field())));
+    GyroModel::new(gyro, servo, filter, &mut |field, error| checker.curve(field, error))
 }
 
 pub(super) fn accel_model(
@@ -56,7 +62,7 @@ pub(super) fn accel_model(
     checker.at(Section::Accel(index)).channel("channel", accel.channel);
     checker.channel("board_channel", accel.board_channel);
     if accel.board_channel.is_none() && accel.board_ratio.is_some() {
-        checker.push("board_channel", DefectKind::Missing { needed_by: "board_ratio" });
+        checker.push("board_channel", DefectKind::Missing { needed_by: "board_ratio_error" });
     }
     for metres in accel.position_m {
         checker.within("position_m", metres, -MOST_POSITION_M, MOST_POSITION_M);
@@ -65,7 +71,7 @@ pub(super) fn accel_model(
     checker.within("delay_ticks", accel.delay_ticks, 0.0, 1.0);
     terms(checker, (accel.channel, &accel.terms), &ACCEL_TERMS, parts);
     sigma(checker, accel.sigma.as_ref());
-    let model = AccelModel::new(accel, filter, &mut |field, error| checker.push(field, error))?;
+    let model = AccelModel::new(accel, filter, &mut |field, error| checker.curve(field, error))?;
     if let Some(at) = sign_change(&model.scale_factor) {
         checker.push("scale_factor", DefectKind::Zero { at });
     }
@@ -105,24 +111,29 @@ fn terms(
     declared: &[Term],
     parts: &CalibrationParts,
 ) {
-    for Term { feature, key, form, .. } in declared {
-        let stated = terms.iter().filter(|term| term.feature == *feature);
-        checker.count(key, stated.clone().count(), 0, form.most());
-        for TermParts { parameter, regressor, .. } in stated {
-            match form {
-                TermForm::Each(Parameter { range: [least, most], .. }) => {
-                    let step_s = if *feature == Feature::Lag { parts.filter.grid_step_s } else { *least };
-                    checker.within(key, *parameter, step_s, *most);
+    let grid_step_s = parts.filter.grid_step_s;
+    for term in declared {
+        let stated = terms.iter().filter(|stated| stated.feature == term.feature);
+        checker.count(term.key, stated.clone().count(), 0, term.form.most());
+        for (index, TermParts { parameter, regressor, .. }) in stated.enumerate() {
+            let path = term.path(index);
+            match term.form {
+                TermForm::Each(Parameter { key, range: [least, most], .. }) => {
+                    let path = format!("{path}.{key}");
+                    checker.within(&path, *parameter, least, most);
+                    if term.feature == Feature::Lag && *parameter < grid_step_s {
+                        checker.push(&path, DefectKind::BelowGridStep { time_s: *parameter, grid_step_s });
+                    }
                 }
                 TermForm::Regressors(_) => match regressor {
                     Some(regressor) => {
-                        regressor.channels().for_each(|source| checker.source(key, source));
-                        checker.within(key, regressor.reference, -HUGE, HUGE);
+                        regressor.channels().for_each(|source| checker.source(&path, source));
+                        checker.within(&format!("{path}.reference"), regressor.reference, -HUGE, HUGE);
                         if channel.is_none() {
                             checker.push("channel", DefectKind::Missing { needed_by: "regressor" });
                         }
                     }
-                    None => checker.push(key, DefectKind::Missing { needed_by: "its coefficient" }),
+                    None => checker.push(&path, DefectKind::Missing { needed_by: "its coefficient" }),
                 },
                 TermForm::Curve | TermForm::Branches | TermForm::PartOf(_) => {}
             }
@@ -146,10 +157,19 @@ pub(super) fn orientation(
     following: &[usize],
     sensors: usize,
 ) -> Option<Orientation> {
-    checker.count("rows", parts.rows.len(), sensors, sensors);
-    checker.count("plays", parts.plays.len(), 0, MAX_PLAYS);
+    checker.count("thermal.hysteresis", parts.plays.len(), 0, MAX_PLAYS);
     for &index in following {
-        checker.channel("channels", Some(index));
+        checker.channel("thermal.channels", Some(index));
     }
-    checker.compiled(Orientation::new(parts), OrientationError::field)
+    // As many of everything as there are sensors, not as there are rows.
+    let (name, got) = ("rows", parts.rows.len());
+    let rows = (got != sensors).then_some(OrientationError::ListCount { name, got, sensors });
+    for error in rows.into_iter().chain(parts.check_lists(sensors)) {
+        checker.push(&error.field(), error);
+    }
+    let compiled = Orientation::new(parts).map_err(|mut errors| {
+        errors.retain(|error| !matches!(error, OrientationError::ListCount { .. }));
+        errors
+    });
+    checker.compiled(compiled, OrientationError::field)
 }

@@ -64,9 +64,9 @@ pub(super) fn accel(r: &mut Reader<'_>, path: &str, output: AccelOutput, sensor:
         }
     }
     in_unit(r, &join(path, "scale_factor"), &sensor.scale_factor, output.scale_unit());
-    for term in sensor.terms.keyed() {
-        for (key, curve) in term.curves() {
-            in_unit(r, &format!("{path}.{key}"), curve, unit(term.term, output.base_unit()));
+    for term in sensor.terms.keyed(path) {
+        for (path, curve) in term.curves() {
+            in_unit(r, &path, curve, unit(term.term, output.base_unit()));
         }
     }
 }

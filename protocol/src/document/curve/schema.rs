@@ -26,7 +26,7 @@ pub(in super::super) fn frequency(generator: &mut SchemaGenerator) -> Schema {
 
 /// Scale factor of an accelerometer.
 pub(in super::super) fn scale_factor(generator: &mut SchemaGenerator) -> Schema {
-    let units: Vec<_> = Accels::BIAS.iter().map(|bias: &BaseUnit| bias.per(Per::MPerS2)).collect();
+    let units: Vec<_> = Accels::BIAS.iter().map(|bias: &BaseUnit| bias.per(Per::M_PER_S2)).collect();
     reference(generator, &units, Argument::DegC)
 }
 

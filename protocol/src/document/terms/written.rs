@@ -40,8 +40,9 @@ impl<'d> From<&KeyedTerm<'d>> for Node<'d> {
             entries.extend(minus.as_deref().map(|minus| ("minus", Self::Text(minus))));
             entries.push(("reference", Self::Number(*reference)));
         }
-        for (key, curve) in stated.keyed(term.form) {
-            let Some(key) = key else { return Self::Curve(curve) };
+        let mut keys = term.form.curves().iter();
+        for curve in stated.curves() {
+            let Some(key) = keys.next() else { return Self::Curve(curve) };
             entries.push((key, Self::Curve(curve)));
         }
         Self::Table(entries)
@@ -51,7 +52,7 @@ impl<'d> From<&KeyedTerm<'d>> for Node<'d> {
 impl<K: SensorKind> Serialize for Terms<K> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut entries: Vec<(&str, Node<'_>)> = Vec::new();
-        for stated in &self.keyed() {
+        for stated in &self.keyed("") {
             let (key, part) = parts(stated.term);
             let node = Node::from(stated);
             match (entries.last_mut(), part) {

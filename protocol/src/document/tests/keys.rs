@@ -3,8 +3,8 @@
 use serde_json::Value as Json;
 use toml::Value;
 
-use super::super::measure::unit_of_key;
 use super::super::{Document, schema};
+use super::units::unit_of_key;
 use super::{FULL, OTHER, accept, refuse};
 
 /// A key of the schema.

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value as Json};
 
-use super::super::measure::unit_of_key;
 use super::super::schema;
+use super::units::unit_of_key;
 use crate::overlay::overlay_schema;
 
 /// Start of the names of curve definitions.

@@ -51,7 +51,7 @@ impl AccelOutput {
     /// Unit of its scale factors.
     #[must_use]
     pub const fn scale_unit(self) -> Unit {
-        self.base_unit().per(Per::MPerS2)
+        self.base_unit().per(Per::M_PER_S2)
     }
 }
 
@@ -59,30 +59,25 @@ impl AccelOutput {
 pub type AccelOrientation = Orientation<AccelParity>;
 
 /// One accelerometer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields, title = "Accelerometer")]
 pub struct AccelSensor {
     /// Unique name, 1 to 24 bytes.
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Temperature channel; default: `assumed_deg_c`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: Option<String>,
     /// Temperature channel of the electronics board, for `board_ratio_error`. Source: 001.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub board_channel: Option<String>,
     /// Overrange from this magnitude, for counts; default: none.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_counts_per_tick: Option<f64>,
     /// Overrange from this magnitude, for V; default: none.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_v: Option<f64>,
     /// Overrange from this magnitude, for m/s²; default: none.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_m_per_s2: Option<f64>,
     /// K(T): output per specific force, never 0. Source: models §3, 001 (k1…k3).
@@ -92,20 +87,17 @@ pub struct AccelSensor {
     #[serde(flatten)]
     pub terms: Terms<Accels>,
     /// Position in case axes, from the point of the published specific force (default). Source: models §3.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub position_m: Option<[f64; 3]>,
     /// As for gyros. Source: models §3.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub delay_ticks: Option<f64>,
     /// `r(T_board) − 1`, r the board's scale factor at the calibration temperature over that at `T_board`.
     /// Source: models §3, 001 (y1…y3).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     #[schemars(schema_with = "relative")]
     pub board_ratio_error: Option<Curve>,
     /// As for gyros. Source: models §3, IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<AccelSigma>,
 }
 

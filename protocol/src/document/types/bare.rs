@@ -4,7 +4,7 @@ use isotherm_correction::thermal::Feature;
 
 use super::{AccelSensor, GyroSensor, Orientation};
 use crate::document::measure::BaseUnit;
-use crate::document::{Curve, StatedTerm, Terms};
+use crate::document::{Curve, StatedTerm};
 
 impl GyroSensor {
     /// A gyro without any term, channel or increment weight.
@@ -35,20 +35,7 @@ impl AccelSensor {
     /// An accelerometer with a scale factor and nothing else.
     #[must_use]
     pub fn bare(name: &str, scale_factor: Curve) -> Self {
-        Self {
-            name: name.to_owned(),
-            channel: None,
-            board_channel: None,
-            input_limit_counts_per_tick: None,
-            input_limit_v: None,
-            input_limit_m_per_s2: None,
-            scale_factor,
-            terms: Terms::default(),
-            position_m: None,
-            delay_ticks: None,
-            board_ratio_error: None,
-            sigma: None,
-        }
+        Self { name: name.to_owned(), scale_factor, ..Self::default() }
     }
 
     /// Adds a term, in its unit beside that of the scale factor; it replaces one that may stand once only.

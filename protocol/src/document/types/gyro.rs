@@ -43,47 +43,37 @@ pub struct GyroSensor {
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub name: String,
     /// Temperature channel; default: `assumed_deg_c`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 24), extend("x-must-be" = "a name of 1 to 24 bytes"))]
     pub channel: Option<String>,
     /// K0 for counts: angle per count, negative for a reversed axis. Source: models §2, 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("not" = { "const": 0 }))]
     pub increment_weight_arcsec_per_count: Option<f64>,
     /// K0 for means: true rate per stated rate. Source: models §2.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("not" = { "const": 0 }))]
     pub increment_weight_rad_per_rad: Option<f64>,
     /// Overrange from this magnitude, for counts; default: none.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_counts_per_tick: Option<f64>,
     /// Overrange from this magnitude, for means; default: none.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub input_limit_deg_per_s: Option<f64>,
     /// Terms of its bias Ω and of its scale.
     #[serde(flatten)]
     pub terms: Terms<Gyros>,
     /// K(ω)/K(T) − 1, ω the rate that the gyro reads. Source: models §2, IEEE 528.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     #[schemars(schema_with = "relative_over_rate")]
     pub increment_weight_over_rate: Option<Curve>,
     /// Polynomial of the time since turn-on. Source: 002.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub trend: Option<Trend>,
     /// Lag of its reading, in ticks; all sensors are delayed to the slowest. Source: models §3.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub delay_ticks: Option<f64>,
     /// Transient of the path-length servo after a mode switch; needs `[mode_reversal]`. Source: models §6, 003.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub servo: Option<Servo>,
     /// Statistics of the remaining drift (constant, Markov process, trend), for the in-run estimator. Source: models §7, 002.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub drift: Option<Drift>,
     /// Standard errors: σ is published with every output. Source: models §2, IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<GyroSigma>,
 }
 

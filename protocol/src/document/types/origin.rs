@@ -14,20 +14,15 @@ use toml::value::Datetime;
 #[schemars(deny_unknown_fields, title = "Origin")]
 pub struct Origin {
     /// Program and version.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
     /// Command line.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<String>,
     /// Method of the fit, such as "joint".
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
     /// Temperatures in the logs.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-rising" = true))]
     pub range_deg_c: Option<[f64; 2]>,
     /// Temperature rates in the logs.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-rising" = true))]
     pub rate_range_deg_c_per_s: Option<[f64; 2]>,
     /// Logs of the fit.
@@ -39,7 +34,6 @@ pub struct Origin {
     #[schemars(length(max = 256))]
     pub residual: Vec<Residual>,
     /// Anything else, such as the covariance.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
     pub details: Option<toml::Table>,
 }
@@ -72,11 +66,9 @@ pub struct Residual {
     #[schemars(range(min = 0.0))]
     pub rms_after: f64,
     /// Peak to peak before the correction.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub peak_to_peak_before: Option<f64>,
     /// Peak to peak after it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub peak_to_peak_after: Option<f64>,
 }

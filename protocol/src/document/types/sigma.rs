@@ -8,34 +8,26 @@ use serde::{Deserialize, Serialize};
 #[schemars(deny_unknown_fields, title = "Standard errors of a gyro")]
 pub struct GyroSigma {
     /// N; default: that of `drift`. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 3000.0))]
     pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
     /// Q; default for counts: a count/√12. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub quantisation_arcsec: Option<f64>,
     /// B; default: 0. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 20_000.0))]
     pub bias_instability_deg_per_h: Option<f64>,
     /// K, from turn-on; default: 0. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 20_000.0))]
     pub rate_random_walk_deg_per_h_per_sqrt_h: Option<f64>,
     /// Of the bias; default: `initial_sigma` and `sigma` of `drift`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<GyroBiasSigma>,
     /// Of K.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub increment_weight_ppm: Option<f64>,
     /// Of the input axis, about either transverse axis.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub misalignment_arcsec: Option<f64>,
     /// Of the bias beyond the fitted temperatures.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 20_000.0))]
     pub clamping_deg_per_h_per_deg_c: Option<f64>,
 }
@@ -62,34 +54,26 @@ pub struct GyroBiasSigma {
 #[schemars(deny_unknown_fields, title = "Standard errors of an accelerometer")]
 pub struct AccelSigma {
     /// N. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e4))]
     pub velocity_random_walk_m_per_s_per_sqrt_h: Option<f64>,
     /// Q; default for counts: a count/√12. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e3))]
     pub quantisation_m_per_s: Option<f64>,
     /// B; default: 0. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e3))]
     pub bias_instability_m_per_s2: Option<f64>,
     /// K, from turn-on; default: 0. Source: IEEE 952.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e3))]
     pub acceleration_random_walk_m_per_s2_per_sqrt_h: Option<f64>,
     /// Of the bias.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<AccelBiasSigma>,
     /// Of K.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub scale_factor_ppm: Option<f64>,
     /// Of the input axis, about either transverse axis.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub misalignment_arcsec: Option<f64>,
     /// Of the bias beyond the fitted temperatures.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e3))]
     pub clamping_m_per_s2_per_deg_c: Option<f64>,
 }

@@ -20,7 +20,7 @@ pub(super) const EDITS: [Edit; 28] = [
         "name = \"board\"",
         "name = \"board\"\nconversion_deg_c = [-150.0, 100.0]\nrange_deg_c = [-70.0, 130.0]\nspike_limit_deg_c = 1.0\n\n[gyro]",
         "temperature.channel[7].name",
-        "is also the name of channel 6",
+        "is also the name of temperature.channel[6]",
     ),
     (
         "name too long",

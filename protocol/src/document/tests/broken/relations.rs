@@ -9,7 +9,7 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"block\"",
         "# digital sensor",
         "temperature.channel[1].name",
-        "is also the name of channel 0",
+        "is also the name of temperature.channel[0]",
     ),
     (
         "name too long",
@@ -209,7 +209,7 @@ pub(super) const CASES: [Case; 32] = [
         "weights = [1.0, 1.0, 1.0]",
         "weights = [1.0, 1.0, 1.0]\n",
         "gyro.orientation.weights",
-        "has 3 entries, must have 4: one for each gyro.sensor",
+        "has 3 entries, must have 4: one for each sensor",
     ),
     (
         "accelerometer in the wrong unit",
