@@ -74,7 +74,7 @@ fn a_report_says_the_same_in_every_form() {
     assert_eq!(json["accepted"], false);
     assert_eq!(json["verdict"], report.headline());
     assert_eq!(json["verdicts"][0]["out_of_sample"]["after"]["peak_to_peak"], 0.17);
-    assert_eq!(json["coefficients"][1]["sigma"], serde_json::Value::Null);
+    assert_eq!(json["coefficients"][1]["sigma"], Value::Null);
     let html = report.to_html();
     for part in [
         "1.2346",

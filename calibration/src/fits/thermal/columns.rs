@@ -112,7 +112,7 @@ impl Basis {
             Term::Static(power) => TermParts::new(Feature::One, self.power(power, 1.0)),
             Term::Rate(branch, power) => branched(Feature::ThermalRate, branch, power),
             Term::Acceleration(branch, power) => branched(Feature::ThermalAcceleration, branch, power),
-            Term::Lag(tau, power) => TermParts::lag(seconds(tau), self.power(power, 1.0)),
+            Term::Lag(tau, power) => TermParts::lag(tau_s(tau), self.power(power, 1.0)),
         }]
     }
 
