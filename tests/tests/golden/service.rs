@@ -63,11 +63,8 @@ pub(crate) fn record(scenario: &Scenario) -> Recording {
     let now = Instant::now();
     for (index, step) in scenario.steps.iter().enumerate() {
         match step {
-            Step::Frame(Input::Raw(stream), frame) => {
-                intake.receive(&key::raw(&unit, *stream), Some(frame), now);
-            }
-            Step::Frame(Input::Reference, frame) => {
-                intake.reference(&key::reference(&unit), Some(frame), now);
+            Step::Frame(input, frame) => {
+                intake.receive(&key::input(&unit, *input), Some(frame), now);
             }
             Step::Event(event) => {
                 let said = intake.each_unit(|actor| act(actor, event, now)).concat();
