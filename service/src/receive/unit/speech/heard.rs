@@ -96,7 +96,14 @@ impl UnitActor {
         let Some(following) = &mut self.speech.following else { return };
         let ns = following.ns(now);
         let change = matches!(entry.event, JournalEvent::Changed { .. }).then(|| entry.clone());
+        let documents = match &entry.event {
+            JournalEvent::Memory { document, pending, .. } => Some([document, pending].map(Clone::clone)),
+            _ => None,
+        };
         if following.follower.entry(entry, ns) {
+            if let Some(documents) = documents {
+                following.documents = documents.into_iter().flatten().collect();
+            }
             following.changes.extend(change);
             let beyond = following.changes.len().saturating_sub(MOST_CHANGES);
             following.changes.drain(..beyond);
