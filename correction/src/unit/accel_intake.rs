@@ -30,8 +30,14 @@ impl PendingAccel {
     /// Whether it ends with a gyro tick, nearer than half the gyro tick's duration.
     #[inline]
     pub(super) fn ends_with(&self, gyro: &GyroTick) -> bool {
-        let apart_ns = self.end_time.as_ns().abs_diff(gyro.end_time.as_ns());
-        apart_ns < (gyro.duration.as_ns() / 2).unsigned_abs()
+        let half = Span::from_ns(gyro.duration.as_ns() / 2);
+        self.end_time < gyro.end_time + half && !self.ends_before(gyro)
+    }
+
+    /// Whether it ends earlier than that.
+    #[inline]
+    fn ends_before(&self, gyro: &GyroTick) -> bool {
+        self.end_time + Span::from_ns(gyro.duration.as_ns() / 2) <= gyro.end_time
     }
 
     /// One reading per accelerometer: counts, or mean output.
@@ -117,10 +123,7 @@ impl AccelIntake {
     /// The tick that [ends with](PendingAccel::ends_with) `gyro`: the oldest that waits, once those are dropped whose gyro tick never
     /// came. One that is not there may still come.
     pub(super) fn partner(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
-        while let Some(front) = self.pending.front()
-            && front.end_time <= gyro.end_time
-            && !front.ends_with(gyro)
-        {
+        while self.pending.front().is_some_and(|front| front.ends_before(gyro)) {
             self.pending.pop_front();
             counters.accel_unpaired += 1;
         }

@@ -201,9 +201,7 @@ impl Corrector {
             self.renew(calibration, tick, (waiting, delay), counters);
         }
         if !self.drift.is_idle() {
-            self.drift.advance(time, tick.before.restart, &|rate| {
-                calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
-            });
+            self.advance_drift(calibration, time, tick.before.restart);
         }
         // Four lanes fill two registers of every x86-64, and suffice for most units.
         if self.calm.wide {
@@ -214,6 +212,14 @@ impl Corrector {
         if !self.drift.is_idle() {
             self.drift.observe(&self.seen);
         }
+    }
+
+    /// Has the drift estimator go on to a tick.
+    #[inline(never)]
+    fn advance_drift(&mut self, calibration: &Calibration, time: Timestamp, restart: bool) {
+        self.drift.advance(time, restart, &|rate| {
+            calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
+        });
     }
 
     /// Does before a tick what few need: a new series begins, temperature readings take effect, a swap is on its way.

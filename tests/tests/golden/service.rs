@@ -12,7 +12,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
-use isotherm_protocol::key::{self, Input, UnitId};
+use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::stream::Label;
 use isotherm_service::Settings;
 use isotherm_service::control::calibrations::{Calibrations, Change, Installable};
