@@ -7,6 +7,7 @@ mod notices;
 mod present;
 mod seen;
 mod speech;
+mod unknown_channels;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -34,6 +35,7 @@ pub use journal_writer::{Journal, JournalOutlet};
 pub use present::Present;
 pub(crate) use seen::TickSeen;
 pub(crate) use speech::{Alarm, Footing, Standing, Wants};
+use unknown_channels::UnknownChannels;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
 pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
@@ -55,6 +57,7 @@ pub struct UnitActor {
     faults: FaultLog,
     latency: Histogram,
     arrivals: Arrivals,
+    unknown_channels: UnknownChannels,
     notices: NoticeCollector,
     journal_writer: JournalWriter,
     speech: Speech,
@@ -93,6 +96,7 @@ impl UnitActor {
             faults: FaultLog::default(),
             latency: Histogram::default(),
             arrivals: Arrivals::new(stream_timeout, Instant::now()),
+            unknown_channels: UnknownChannels::default(),
             notices: NoticeCollector::default(),
             journal_writer: JournalWriter::default(),
             speech: Speech::default(),
@@ -135,7 +139,7 @@ impl UnitActor {
             let (at, slew) = ((*at).into(), *slew);
             self.stream.schedule(unit::Change { calibration, revision: revision.counter, at, slew }, label)
         };
-        self.journal(|_| journal_writer::changed(change));
+        self.journal_order(|_| journal_writer::changed(change));
         replaced
     }
 
@@ -145,7 +149,7 @@ impl UnitActor {
     /// [`Refusal`]: the state is as before.
     pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
         let done = self.stream.command(command);
-        self.journal(|_| journal_writer::commanded(command, &done));
+        self.journal_order(|_| journal_writer::commanded(command, &done));
         // A self-test without a calibration changes no state, and yet has a report.
         self.status_due |= done.is_ok();
         self.look();
@@ -164,6 +168,9 @@ impl UnitActor {
         let received = self.stream.receive(input, frame);
         let series = (is_gyro && received.is_ok()).then(|| self.stream.incoming_series());
         self.arrivals.note(input, series, arrival);
+        if input == Input::Raw(RawStream::Temperature) {
+            self.unknown_channels.heard(self.stream.unit(), frame, arrival);
+        }
         if let Err(error) = received {
             self.fault(FaultKind::from(&error), 1, || format!("{}: {error}", input.topic()));
             return self.status_due;

@@ -210,6 +210,7 @@ impl UnitActor {
         let Some(following) = following else { return (self.outlet)(frame) };
         let now = Instant::now();
         let lacks = following.kept.computed(frame, now);
+        following.intact &= following.follower.has_joined() || !lacks;
         if !following.also_out {
             return Ok(());
         }
@@ -292,8 +293,10 @@ impl UnitActor {
         // Nor does a unit that sends nothing wait for ever.
         let still_silent = now.saturating_duration_since(following.listens) > standing.takeover * 2;
         let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, silence);
+        // Who has just yielded knows what the other does, before the other's memory has come.
+        let knows = joined || (following.intact && !following.doubt);
         let is_due =
-            lonely || (joined && (alone.is_some() || late)) || (following.doubt && (late || still_silent));
+            lonely || (knows && (alone.is_some() || late)) || (following.doubt && (late || still_silent));
         if is_due && !following.isolated {
             wants.spoke = !following.doubt;
             self.speak(now, standing.takeover);
