@@ -27,16 +27,27 @@ pub(crate) fn put<const N: usize>(lanes: &mut Lanes, values: [f64; N]) {
 }
 
 /// Readings as lanes; 0 where there is none.
+#[inline]
 pub(crate) fn of_readings<const N: usize>(readings: &[f64]) -> [f64; N] {
-    // The last reading that fills all lanes is looked for once, not each.
-    match readings.first_chunk() {
-        Some(readings) => *readings,
-        None => array::from_fn(|i| readings.get(i).copied().unwrap_or(0.0)),
+    // Mostly there are three.
+    if let &[x, y, z] = readings {
+        return array::from_fn(|lane| match lane {
+            0 => x,
+            1 => y,
+            2 => z,
+            _ => 0.0,
+        });
     }
+    let mut lanes = [0.0; N];
+    lanes.iter_mut().zip(readings).for_each(|(lane, reading)| *lane = *reading);
+    lanes
 }
 
 /// One term of each sensor on a straight line over a share that goes from 0 to 1.
+///
+/// Aligned so that two lanes can be taken from memory by the instruction that reckons with them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[repr(align(16))]
 pub(crate) struct Line {
     from: Lanes,
     step: Lanes,

@@ -299,8 +299,9 @@ fn masked(mut rows: Rows, mask: SensorMask) -> Rows {
     rows
 }
 
-/// A compiled C(T)⁺.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// A compiled C(T)⁺, aligned as [lanes](crate::lanes) are; by default of no sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[repr(align(16))]
 pub struct Inverse {
     /// What one unit of each sensor's reading gives along the case axes; the fourth axis is none, and a sensor that takes no
     /// part gives nothing.

@@ -126,14 +126,20 @@ impl Substitution {
     /// A mode that differs from the last one without a command begins a transition at this tick; where ticks
     /// are missing before it the switch may have come later than the gap's start, so all n are counted
     /// from here. Ticks missing inside a transition count as ticks of it.
+    #[inline]
     pub fn tick(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
-        if self.is_settled() && !input.restart && !self.may_switch(&input) {
-            self.change_due = false;
-            if let Some(reading) = Reading::new(input.end_time, input.duration, increments) {
-                self.history.push(reading);
-            }
-            return TickFlags::empty();
+        if !self.is_settled() || input.restart || self.may_switch(&input) {
+            return self.bridge(reversal, input, increments);
         }
+        self.change_due = false;
+        if let Some(reading) = Reading::new(input.end_time, input.duration, increments) {
+            self.history.push(reading);
+        }
+        TickFlags::empty()
+    }
+
+    /// Takes a tick in or about a switch.
+    fn bridge(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
         let mut flags = TickFlags::empty();
         if input.restart {
             if !(self.lost.is_empty() && self.pending.is_none()) {

@@ -8,17 +8,15 @@ mod bank;
 mod declared;
 mod gyro;
 mod motion;
-mod ramp;
 mod terms;
 mod trail;
 
 pub use accel::AccelModel;
-pub(crate) use bank::{Bank, MotionBanks, Paces, Shares};
+pub(crate) use bank::{Bank, MotionBanks, Pace, Paces, Ramp, Shares};
 pub use declared::{ACCEL_TERMS, Feature, GYRO_TERMS, Makes, Parameter, Per, Term, TermForm};
 pub(crate) use gyro::Trends;
 pub use gyro::{GyroModel, GyroTerms, TrendModel};
 pub(crate) use motion::{Motion, MotionTerms};
-pub(crate) use ramp::{Pace, Ramp};
 pub use terms::MAX_REGRESSORS;
 pub(crate) use terms::Others;
 pub use trail::{MAX_LAGS, MAX_PLAYS};

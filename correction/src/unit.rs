@@ -17,9 +17,8 @@ mod axes;
 mod change;
 mod correct;
 mod counters;
-mod footing;
+mod flags;
 mod gyro_intake;
-mod health;
 mod operating;
 mod pipeline;
 mod settings;
@@ -28,19 +27,20 @@ mod thermal_memory;
 mod view;
 
 use alloc::sync::Arc;
+use core::slice;
 
 use serde::{Deserialize, Serialize};
 
-use accel_intake::AccelIntake;
+use accel_intake::{AccelIntake, PendingAccel};
 pub use at_rest::AtRest;
 pub use change::{At, Change};
 pub use correct::Applied;
 pub use counters::Counters;
+pub use flags::SensorHealth;
 pub use gyro_intake::MAX_TICK_DURATION;
-use gyro_intake::{GyroIntake, Left};
-pub use health::SensorHealth;
+use gyro_intake::{Break, GyroIntake, Left};
 pub use operating::PreLaunchView;
-use pipeline::{Pipeline, Released};
+use pipeline::{Pipeline, Run};
 pub use settings::{Uncalibrated, UnitSettings};
 pub use thermal_memory::ChannelReport;
 
@@ -129,9 +129,11 @@ impl Unit {
         match event {
             Event::Gyro { output, ticks } => self.take_gyros(output, ticks, emit),
             Event::Accel { output, ticks } => {
+                pipeline.counters.accel_ticks_in += ticks.len() as u64;
+                let settled = pipeline.settled().filter(|calibration| calibration.accel_output == output);
+                let fitting = settled.map(Calibration::accel_count);
                 for tick in ticks {
-                    pipeline.counters.accel_ticks_in += 1;
-                    if pipeline.takes_accel(tick, output) {
+                    if fitting == Some(tick.readings.len()) || pipeline.takes_accel(tick, output) {
                         self.accels.admit(tick, output, &mut pipeline.counters);
                     }
                 }
@@ -163,16 +165,27 @@ impl Unit {
         ticks: &[GyroTick],
         emit: &mut E,
     ) {
+        self.pipeline.counters.gyro_ticks_in += ticks.len() as u64;
         let mut starts_anew = false;
-        for tick in ticks {
-            self.pipeline.counters.gyro_ticks_in += 1;
-            if !self.pipeline.takes_gyro(tick, output) {
+        let mut rest = ticks;
+        while let Some((tick, others)) = rest.split_first() {
+            let run = self.run(output, rest);
+            if let Some((run, behind)) = rest.split_at_checked(run)
+                && let Some(last) = run.last()
+            {
+                let accels = self.accels.waiting();
+                let accels = accels.get(..run.len()).unwrap_or_default();
+                let (end_time, met) = (last.end_time, accels.len());
+                self.gyros.passed(run);
+                self.pipeline.pass(&Run { ticks: run, accels, before: Break::default() }, true, emit);
+                self.accels.gyros_released(end_time, met);
+                rest = behind;
                 continue;
             }
-            if self.gyros.is_next(tick) && self.pass_next(tick, emit) {
-                continue;
+            if self.pipeline.takes_gyro(tick, output) {
+                starts_anew |= self.gyros.admit(tick, output, &mut self.pipeline.counters);
             }
-            starts_anew |= self.gyros.admit(tick, output, &mut self.pipeline.counters);
+            rest = others;
         }
         self.gyros.end_batch();
         if starts_anew {
@@ -183,19 +196,23 @@ impl Unit {
         self.release(false, emit);
     }
 
-    /// Gives out a tick that is the next, where its accelerometers are at hand; whether they were.
+    /// How many of these ticks need not wait: they go on where the last one left off, fit the calibration, and have their accelerometer
+    /// ticks, or there are no accelerometers.
     #[inline]
-    fn pass_next<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, tick: &GyroTick, emit: &mut E) -> bool {
-        let accel = self.accels.partner(tick, &mut self.pipeline.counters);
-        let met = accel.is_some();
-        if !met && self.pipeline.expects_accels() {
-            return false;
+    fn run(&self, output: OutputKind, ticks: &[GyroTick]) -> usize {
+        let Some(calibration) = self.pipeline.settled() else { return 0 };
+        let (accels, accel_count) = (self.accels.waiting(), calibration.accel_count());
+        if calibration.gyro_output != output || (accel_count == 0 && !accels.is_empty()) {
+            return 0;
         }
-        self.gyros.passed(tick);
-        self.pipeline.begin(tick, false);
-        self.pipeline.pass(Released { tick, missed: 0, restart: false }, true, accel, emit);
-        self.accels.gyro_released(tick.end_time, met);
-        true
+        self.gyros.run(ticks, |index, tick| {
+            let is_met = |accel: &PendingAccel| {
+                let fits = accel.count == accel_count && accel.output == calibration.accel_output;
+                fits && accel.ends_with(tick)
+            };
+            tick.readings.len() == calibration.gyro_count()
+                && (accel_count == 0 || accels.get(index).is_some_and(is_met))
+        })
     }
 
     /// Gives out every tick that waits and need not wait any longer.
@@ -217,11 +234,14 @@ impl Unit {
             if !met && self.pipeline.expects_accels() && !front.expired {
                 return;
             }
-            let Some(Left { tick, output, missed, restart }) = self.gyros.release() else { return };
-            self.pipeline.begin(&tick, restart);
+            let Some(Left { tick, output, before }) = self.gyros.release() else { return };
+            self.pipeline.begin(&tick, before.restart);
             let fits = self.pipeline.takes_gyro(&tick, output);
-            self.pipeline.pass(Released { tick: &tick, missed, restart }, fits, accel, emit);
-            self.accels.gyro_released(tick.end_time, met);
+            // A swap since it came may have changed what fits.
+            let accel = accel.filter(|accel| self.pipeline.fits_accel(accel));
+            let (ticks, accels) = (slice::from_ref(&tick), accel.map_or(&[][..], slice::from_ref));
+            self.pipeline.pass(&Run { ticks, accels, before }, fits, emit);
+            self.accels.gyros_released(tick.end_time, usize::from(met));
         }
     }
 }

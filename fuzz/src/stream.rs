@@ -251,7 +251,7 @@ fn reference(stream: &mut UnitStream, end_ns: i64, from: &mut Cursor<'_>) {
         sigma_rad_per_s: f64::from(from.some()) * 1e-8,
     };
     let Ok(frame) = encode(&reference) else { return };
-    stream.receive_reference(&frame).expect("a frame of its kind");
+    stream.receive(Input::Reference, &frame).expect("a frame of its kind");
 }
 
 /// A frame of which nothing is known but its kind.
@@ -266,7 +266,7 @@ fn anything(stream: &mut UnitStream, from: &mut Cursor<'_>) {
         Input::Raw(RawStream::Health) => sealed::<HealthBatch>(bytes),
         Input::Reference => sealed::<Reference>(bytes),
     };
-    if let Err(error) = stream.take(input, frame.as_deref().unwrap_or(bytes)) {
+    if let Err(error) = stream.receive(input, frame.as_deref().unwrap_or(bytes)) {
         in_few_words(&error);
     }
 }

@@ -197,7 +197,7 @@ impl Replica {
         let done = match self.sequencer.next_deed() {
             Some(Deed::Frame { input, received_ns, frame }) => {
                 self.report.frames += 1;
-                let taken = self.stream.as_mut().map_or(Ok(()), |stream| stream.take(input, &frame));
+                let taken = self.stream.as_mut().map_or(Ok(()), |stream| stream.receive(input, &frame));
                 Done::Frame { input, received_ns, frame, taken }
             }
             Some(Deed::Entry { entry, received_ns, anchor }) => {

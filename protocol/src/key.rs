@@ -147,17 +147,6 @@ pub enum RawStream {
 impl RawStream {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Gyro, Self::Accel, Self::Temperature, Self::Health];
-
-    /// Last chunk of the key.
-    #[must_use]
-    pub const fn chunk(self) -> &'static str {
-        match self {
-            Self::Gyro => "gyro",
-            Self::Accel => "accel",
-            Self::Temperature => "temp",
-            Self::Health => "health",
-        }
-    }
 }
 
 /// What comes in for a unit: its raw streams, and its rate references.
@@ -190,28 +179,43 @@ impl Input {
             Self::Reference => 4,
         }
     }
+
+    /// The chunks of its key behind the unit.
+    #[must_use]
+    pub const fn topic(self) -> &'static str {
+        match self {
+            Self::Raw(RawStream::Gyro) => "raw/gyro",
+            Self::Raw(RawStream::Accel) => "raw/accel",
+            Self::Raw(RawStream::Temperature) => "raw/temp",
+            Self::Raw(RawStream::Health) => "raw/health",
+            Self::Reference => "reference",
+        }
+    }
+}
+
+impl From<RawStream> for Input {
+    fn from(stream: RawStream) -> Self {
+        Self::Raw(stream)
+    }
 }
 
 /// Key of an input: of a raw stream, or of the rate references.
 #[must_use]
 pub fn input(unit: &UnitId, input: Input) -> String {
-    match input {
-        Input::Raw(stream) => raw(unit, stream),
-        Input::Reference => reference(unit),
-    }
+    format!("{ROOT}/{unit}/{}", input.topic())
 }
 
 /// Reads the key of an input back; `None` where it is none.
 #[must_use]
 pub fn parse_input(key: &str) -> Option<(&str, Input)> {
-    let raw = || parse_raw(key).map(|(unit, stream)| (unit, Input::Raw(stream)));
-    raw().or_else(|| parse_reference(key).map(|unit| (unit, Input::Reference)))
+    let (unit, topic) = parse(ROOT, key)?;
+    Input::ALL.into_iter().find(|input| input.topic() == topic).map(|input| (unit, input))
 }
 
 /// Key of a raw stream: `imu/{unit}/raw/{gyro|accel|temp|health}`.
 #[must_use]
 pub fn raw(unit: &UnitId, stream: RawStream) -> String {
-    format!("{ROOT}/{unit}/raw/{}", stream.chunk())
+    input(unit, stream.into())
 }
 
 /// Declares the keys `imu/{unit}/{topic}` once, so that building and parsing cannot drift apart.
@@ -336,9 +340,10 @@ pub fn unit_of(key: &str) -> Option<&str> {
 /// Reads a raw key back; `None` where it is none.
 #[must_use]
 pub fn parse_raw(key: &str) -> Option<(&str, RawStream)> {
-    let (unit, rest) = parse(ROOT, key)?;
-    let stream = rest.strip_prefix("raw/")?;
-    RawStream::ALL.into_iter().find(|s| s.chunk() == stream).map(|stream| (unit, stream))
+    match parse_input(key)? {
+        (unit, Input::Raw(stream)) => Some((unit, stream)),
+        (_, Input::Reference) => None,
+    }
 }
 
 /// Splits `{root}/{name}/{rest}`.

@@ -5,7 +5,6 @@
 
 mod carry_out;
 mod edge;
-mod heard;
 mod label;
 mod memory;
 mod outgoing;
@@ -26,7 +25,6 @@ use serde::{Deserialize, Serialize};
 
 pub use carry_out::JournalError;
 pub use edge::Edge;
-pub use heard::Heard;
 pub use label::Label;
 pub use memory::{MEMORY_VERSION, MemoryError};
 use outgoing::Last;
@@ -56,6 +54,24 @@ struct Scratch {
 
 thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+/// The frames that a stream was given of one input, bad ones included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub struct Heard {
+    /// How many.
+    pub frames: u64,
+    /// The last four bytes of the last one, little-endian: the checksum of a good frame. 0 before the first frame, and
+    /// for one of fewer than four bytes.
+    pub crc: u32,
+}
+
+impl Heard {
+    /// One frame more.
+    pub fn note(&mut self, frame: &[u8]) {
+        self.frames += 1;
+        self.crc = frame.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    }
 }
 
 /// One unit's stream.
@@ -169,70 +185,50 @@ impl UnitStream {
         self.watching_pre_launch(Unit::end_pre_launch);
     }
 
-    /// Takes one frame of any input.
+    /// Takes one frame.
     ///
     /// # Errors
     /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
-    pub fn take(&mut self, input: Input, frame: &[u8]) -> Result<(), CodecError> {
-        match input {
-            Input::Raw(stream) => self.receive(stream, frame),
-            Input::Reference => self.receive_reference(frame),
+    pub fn receive(&mut self, input: impl Into<Input>, frame: &[u8]) -> Result<(), CodecError> {
+        let input = input.into();
+        if let Some(heard) = self.heard.get_mut(input.index()) {
+            heard.note(frame);
         }
-    }
-
-    /// Takes one raw frame.
-    ///
-    /// # Errors
-    /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
-    pub fn receive(&mut self, stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
-        self.note_heard(Input::Raw(stream), frame);
         let received = SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
-            Ok(mut scratch) => self.receive_frame(stream, frame, &mut scratch),
-            Err(_) => self.receive_frame(stream, frame, &mut Scratch::default()),
+            Ok(mut scratch) => self.read(input, frame, &mut scratch),
+            Err(_) => self.read(input, frame, &mut Scratch::default()),
         });
         self.bad_frames += u64::from(received.is_err());
         received
     }
 
-    fn receive_frame(
-        &mut self,
-        stream: RawStream,
-        frame: &[u8],
-        scratch: &mut Scratch,
-    ) -> Result<(), CodecError> {
+    /// Reads a frame, and has the unit take what it says.
+    fn read(&mut self, input: Input, frame: &[u8], scratch: &mut Scratch) -> Result<(), CodecError> {
         let Scratch { gyro_ticks, accel_ticks, readings, health } = scratch;
-        match stream {
-            RawStream::Gyro => {
+        match input {
+            Input::Raw(RawStream::Gyro) => {
                 let output = raw::read_ticks(frame, gyro_ticks)?;
                 self.handle(Event::Gyro { output, ticks: gyro_ticks });
             }
-            RawStream::Accel => {
+            Input::Raw(RawStream::Accel) => {
                 let output = raw::read_ticks(frame, accel_ticks)?;
                 self.handle(Event::Accel { output, ticks: accel_ticks });
             }
-            RawStream::Temperature => {
+            Input::Raw(RawStream::Temperature) => {
                 raw::read_temperatures(frame, readings)?;
                 self.handle(Event::Temperature(readings));
             }
-            RawStream::Health => {
+            Input::Raw(RawStream::Health) => {
                 let batch: HealthBatch = codec::decode(frame)?;
                 health.clear();
                 health.extend(batch.to_core());
                 self.handle(Event::Health(health));
             }
+            Input::Reference => {
+                let reference: Reference = codec::decode(frame)?;
+                self.handle(Event::Reference(&reference.to_core()));
+            }
         }
-        Ok(())
-    }
-
-    /// Takes one frame with a rate reference.
-    ///
-    /// # Errors
-    /// [`CodecError`] for a frame that cannot be read: it is counted, and nothing else changes.
-    pub fn receive_reference(&mut self, frame: &[u8]) -> Result<(), CodecError> {
-        self.note_heard(Input::Reference, frame);
-        let decoded = codec::decode::<Reference>(frame);
-        self.bad_frames += u64::from(decoded.is_err());
-        self.handle(Event::Reference(&decoded?.to_core()));
         Ok(())
     }
 
@@ -260,7 +256,10 @@ impl UnitStream {
         });
         let after = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
         if before.1 != after.1 {
-            before.0.into_iter().chain(after.0).for_each(|counter| self.revisions.made_ticks(counter));
+            if before.0 != after.0 {
+                before.0.into_iter().for_each(|counter| self.revisions.made_ticks(counter));
+            }
+            after.0.into_iter().for_each(|counter| self.revisions.made_ticks(counter));
         }
         self.note_pre_launch(state);
     }
@@ -332,6 +331,12 @@ impl UnitStream {
         let series = self.series.unwrap_or_default();
         self.last = Some(LastTick { end_time_ns, sequence, series });
         self.revisions.taken(revision);
+    }
+
+    /// What it was given, by [`Input::index`]. A unit that has started anew goes on counting.
+    #[must_use]
+    pub fn heard(&self) -> [Heard; Input::ALL.len()] {
+        self.heard
     }
 
     /// Series of the last raw gyro tick.

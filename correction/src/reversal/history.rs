@@ -30,6 +30,7 @@ impl Reading {
         Self { end_time: Timestamp::from_ns(0), duration: Span::ZERO, rates: [f64::NAN; MAX_SENSORS] };
 
     /// The rates of a tick; `None` where it has no duration, so that no rate can be formed.
+    #[inline]
     pub(super) fn new(end_time: Timestamp, duration: Span, increments: &[f64]) -> Option<Self> {
         if duration == Span::ZERO {
             return None;
@@ -71,6 +72,7 @@ pub(super) struct History {
 
 impl History {
     /// Adds the newest reading; the oldest gives way.
+    #[inline]
     pub(super) fn push(&mut self, reading: Reading) {
         if self.ring.is_empty() {
             self.ring = alloc::vec![Reading::NONE; KEPT];

@@ -1,4 +1,4 @@
-//! The thermal terms of all sensors of a kind, each on a straight line from one evaluation to the next.
+//! The thermal terms of all sensors of a kind, each on a straight line from one evaluation to the next; and other values that move so.
 
 use core::array;
 
@@ -7,7 +7,6 @@ use alloc::vec::Vec;
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use super::ramp::Pace;
 use super::terms::{Others, SensorState};
 use super::trail::{MAX_TRAILS, Trail, Trailed, advance, resume};
 use crate::calibration::RegressorParts;
@@ -15,7 +14,7 @@ use crate::channel::{ThermalFilter, ThermalState};
 use crate::lanes::Line;
 use crate::orientation::SensorMask;
 use crate::sample::MAX_SENSORS;
-use crate::units::Timestamp;
+use crate::units::{Span, Timestamp};
 
 /// A sensor model with `T` terms that follow one temperature channel.
 pub(crate) trait Follows<const T: usize> {
@@ -34,11 +33,80 @@ const MOST_FOLLOWED: usize = 3 * MAX_SENSORS;
 
 /// How far along its way everything is that follows a channel, at one time. What follows none stands still anyway.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Shares {
+pub(crate) enum Shares<'a> {
     /// Everything is equally far, as it is where a unit's channels are read together.
     Together(f64),
     /// By the channel's place among those that are followed.
-    Apart([f64; MOST_FOLLOWED]),
+    Apart(&'a [f64; MOST_FOLLOWED]),
+}
+
+/// When a way begins, and what part of it is made in a second; a way that is over at once has no pace.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Pace {
+    start: Timestamp,
+    per_second: f64,
+}
+
+impl Pace {
+    /// A way that takes this long from `start` on.
+    pub(crate) fn new(start: Timestamp, over: Span) -> Self {
+        if over == Span::ZERO { Self::default() } else { Self { start, per_second: 1.0 / over.as_s() } }
+    }
+
+    /// Whether the way begins at `time`.
+    pub(crate) fn starts(&self, time: Timestamp) -> bool {
+        self.per_second > 0.0 && self.start == time
+    }
+
+    /// How far along the way `time` is, 0…1: exactly 0 before the start, exactly 1 at and after the end; 0 without a pace.
+    #[inline]
+    pub(crate) fn share(&self, time: Timestamp) -> f64 {
+        let way = time.seconds_from(self.start) * self.per_second;
+        // Not `clamp`: without a pace −0 is to become 0, and these are two instructions without a branch.
+        let way = if way > 0.0 { way } else { 0.0 };
+        if way < 1.0 { way } else { 1.0 }
+    }
+}
+
+/// A value on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Ramp {
+    pace: Pace,
+    from: f64,
+    step: f64,
+}
+
+impl Ramp {
+    /// A value that stands still.
+    pub(crate) fn hold(value: f64) -> Self {
+        Self { pace: Pace::default(), from: value, step: 0.0 }
+    }
+
+    /// The value at `time`: exactly the starting one before the start.
+    pub(crate) fn at(&self, time: Timestamp) -> f64 {
+        self.from + self.step * self.share(time)
+    }
+
+    /// Turns towards `target`, to be reached `over` later; from where the value is at `start`.
+    pub(crate) fn turn(&mut self, start: Timestamp, over: Span, target: f64) {
+        let from = self.at(start);
+        *self = if over == Span::ZERO {
+            Self::hold(target)
+        } else {
+            Self { pace: Pace::new(start, over), from, step: target - from }
+        };
+    }
+
+    /// Arrives at once.
+    pub(crate) fn settle(&mut self) {
+        *self = Self::hold(self.from + self.step);
+    }
+
+    /// How far along its way the value is, 0…1; 0 for one that stands still.
+    #[inline]
+    pub(crate) fn share(&self, time: Timestamp) -> f64 {
+        self.pace.share(time)
+    }
 }
 
 /// The channels that sensors follow. Whatever follows one is turned at once with all the rest: hence one pace for each.
@@ -62,19 +130,20 @@ impl Paces {
         u8::try_from(place).unwrap_or_default()
     }
 
-    /// How far along everything is at `time`.
+    /// How far along everything is at `time`; `each` is room for what is not equally far.
     #[inline]
-    pub(crate) fn shares(&self, time: Timestamp) -> Shares {
-        match self.followed.first() {
-            Some(_) if self.apart => {
-                let mut shares = [0.0; MOST_FOLLOWED];
-                let followed = shares.iter_mut().zip(&self.followed);
-                followed.for_each(|(share, (_, pace))| *share = pace.share(time));
-                Shares::Apart(shares)
-            }
-            Some((_, pace)) => Shares::Together(pace.share(time)),
-            None => Shares::Together(0.0),
+    pub(crate) fn shares<'a>(
+        &self,
+        time: Timestamp,
+        each: &'a mut Option<[f64; MOST_FOLLOWED]>,
+    ) -> Shares<'a> {
+        if self.apart {
+            let each = each.insert([0.0; MOST_FOLLOWED]);
+            let followed = each.iter_mut().zip(&self.followed);
+            followed.for_each(|(share, (_, pace))| *share = pace.share(time));
+            return Shares::Apart(each);
         }
+        Shares::Together(self.followed.first().map_or(0.0, |(_, pace)| pace.share(time)))
     }
 
     /// How far along whatever follows a channel is at `time`.
@@ -273,9 +342,9 @@ impl<const T: usize> Bank<T> {
     /// The terms so far along, term by term.
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     #[inline(always)]
-    pub(crate) fn at<const N: usize>(&self, shares: &Shares) -> [[f64; N]; T] {
+    pub(crate) fn at<const N: usize>(&self, shares: Shares<'_>) -> [[f64; N]; T] {
         let share = match shares {
-            Shares::Together(share) => [*share; N],
+            Shares::Together(share) => [share; N],
             Shares::Apart(shares) => {
                 array::from_fn(|lane| shares[usize::from(self.share_of[lane]) % MOST_FOLLOWED])
             }
@@ -283,8 +352,33 @@ impl<const T: usize> Bank<T> {
         array::from_fn(|term| self.lines[term].at(&share))
     }
 
+    /// Whether any of these terms is not zero, or on its way from zero.
+    pub(crate) fn has_any(&self, terms: [usize; 2]) -> bool {
+        terms.into_iter().filter_map(|term| self.lines.get(term)).any(|line| *line != Line::ZERO)
+    }
+
     /// Whether an argument of a sensor was outside its fitted range at the last evaluation.
     pub(crate) fn clamped(&self, lane: usize) -> bool {
         self.clamped.contains(lane)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[expect(clippy::float_cmp, reason = "continuity is to the bit")]
+    fn a_turn_in_mid_way_is_continuous() {
+        let at = |ms: i64| Timestamp::from_ns(ms * 1_000_000);
+        for (from, to) in [(1.0, 2.0), (-1.0, -3.0)] {
+            let mut ramp = Ramp::hold(from);
+            ramp.turn(at(0), Span::from_ms(100), to);
+            let before = ramp.at(at(40));
+            ramp.turn(at(40), Span::from_ms(100), 0.0);
+            assert_eq!(ramp.at(at(40)), before);
+            assert_eq!(ramp.at(at(39)), before);
+            assert!(ramp.at(at(140)).abs() < 1e-15);
+        }
     }
 }

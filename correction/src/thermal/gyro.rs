@@ -151,6 +151,7 @@ impl Follows<4> for GyroModel {
     /// In the order of [`GyroTerms`].
     fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 4], bool) {
         let ([error, bias, magnetic, meander], clamped) = self.terms.lines(state, filter);
-        ([self.increment_weight * (1.0 + error), bias, magnetic, meander], clamped)
+        // A bias of −0 becomes 0, so that a tick need not add the zeros of terms that there are not.
+        ([self.increment_weight * (1.0 + error), bias + 0.0, magnetic, meander], clamped)
     }
 }

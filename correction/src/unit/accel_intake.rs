@@ -27,6 +27,19 @@ pub(super) struct PendingAccel {
 }
 
 impl PendingAccel {
+    /// Whether it ends with a gyro tick, nearer than half the gyro tick's duration.
+    #[inline]
+    pub(super) fn ends_with(&self, gyro: &GyroTick) -> bool {
+        let half = Span::from_ns(gyro.duration.as_ns() / 2);
+        self.end_time < gyro.end_time + half && !self.ends_before(gyro)
+    }
+
+    /// Whether it ends earlier than that.
+    #[inline]
+    fn ends_before(&self, gyro: &GyroTick) -> bool {
+        self.end_time + Span::from_ns(gyro.duration.as_ns() / 2) <= gyro.end_time
+    }
+
     /// One reading per accelerometer: counts, or mean output.
     pub(super) fn readings(&self) -> &[f64] {
         self.readings.get(..self.count).unwrap_or_default()
@@ -48,6 +61,7 @@ pub(super) struct AccelIntake {
 
 impl AccelIntake {
     /// Takes one tick.
+    #[inline]
     pub(super) fn admit(&mut self, tick: &AccelTick, output: OutputKind, counters: &mut Counters) {
         if !is_possible(tick.duration) {
             counters.bad_duration += 1;
@@ -56,21 +70,27 @@ impl AccelIntake {
         let &AccelTick { end_time, duration, ref readings, .. } = tick;
         let (count, readings) = (readings.len(), of_readings(readings));
         let pending = PendingAccel { end_time, duration, output, count, readings, after: self.gyro_messages };
-        if self.released.is_some_and(|released| tick.end_time <= released) {
-            counters.accel_late += 1;
-            if self.behind.len() < MAX_PENDING {
-                self.behind.push_back(pending);
-            }
-            return;
+        if self.released.is_some_and(|released| end_time <= released) {
+            self.note_late(pending, counters);
+        } else {
+            self.insert(pending, counters);
         }
-        self.insert(pending, counters);
+    }
+
+    /// Sets a tick apart whose gyro tick has gone.
+    #[cold]
+    fn note_late(&mut self, late: PendingAccel, counters: &mut Counters) {
+        counters.accel_late += 1;
+        if self.behind.len() < MAX_PENDING {
+            self.behind.push_back(late);
+        }
     }
 
     /// Puts a tick in its place in time.
     #[inline]
     fn insert(&mut self, pending: PendingAccel, counters: &mut Counters) {
-        let time = pending.end_time;
-        if self.pending.len() < MAX_PENDING && self.pending.back().is_none_or(|last| last.end_time < time) {
+        let is_newest = self.pending.back().is_none_or(|last| last.end_time < pending.end_time);
+        if is_newest && self.pending.len() < MAX_PENDING {
             self.pending.push_back(pending);
         } else {
             self.insert_between(pending, counters);
@@ -94,38 +114,31 @@ impl AccelIntake {
         }
     }
 
-    /// The tick that ends with `gyro`, nearer than half the gyro tick's duration: the oldest that waits. One that is not there may
-    /// still come.
+    /// The ticks that wait, the oldest first, as far as they lie in one piece.
     #[inline]
-    pub(super) fn partner(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
-        let late = gyro.end_time + Span::from_ns(gyro.duration.as_ns() / 2);
-        // Mostly both end at once.
-        if self.pending.front().is_some_and(|front| front.end_time != gyro.end_time || gyro.end_time == late)
-        {
-            self.drop_unpaired(gyro, counters);
-        }
-        self.pending.front().filter(|front| front.end_time < late)
+    pub(super) fn waiting(&self) -> &[PendingAccel] {
+        self.pending.as_slices().0
     }
 
-    /// Drops ticks whose gyro tick never came.
-    #[cold]
-    fn drop_unpaired(&mut self, gyro: &GyroTick, counters: &mut Counters) {
-        let half = Span::from_ns(gyro.duration.as_ns() / 2);
-        while self.pending.front().is_some_and(|front| front.end_time + half <= gyro.end_time) {
+    /// The tick that [ends with](PendingAccel::ends_with) `gyro`: the oldest that waits, once those are dropped whose gyro tick never
+    /// came. One that is not there may still come.
+    pub(super) fn partner(&mut self, gyro: &GyroTick, counters: &mut Counters) -> Option<&PendingAccel> {
+        while self.pending.front().is_some_and(|front| front.ends_before(gyro)) {
             self.pending.pop_front();
             counters.accel_unpaired += 1;
         }
+        self.pending.front().filter(|front| front.ends_with(gyro))
     }
 
-    /// Remembers that the gyro tick which ends at `end_time` has gone, with the tick here that it has `met`.
-    pub(super) fn gyro_released(&mut self, end_time: Timestamp, met: bool) {
+    /// Remembers that gyro ticks have gone, the last of which ends at `end_time`, and that so many ticks went with them.
+    #[inline]
+    pub(super) fn gyros_released(&mut self, end_time: Timestamp, met: usize) {
         self.released = Some(end_time);
-        if met {
-            self.pending.pop_front();
-        }
+        (0..met).for_each(|_| drop(self.pending.pop_front()));
     }
 
     /// Notes that gyro ticks came which start no new series.
+    #[inline]
     pub(super) fn goes_on(&mut self) {
         self.behind.clear();
         self.gyro_messages += 1;

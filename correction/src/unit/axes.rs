@@ -21,9 +21,13 @@ pub(super) struct Axes {
     clamped: bool,
     /// Whether a temperature was read: the first one is not approached from the assumed one, but met.
     started: bool,
+    /// Sensors that there are, and those that are resolved.
+    all: SensorMask,
     mask: SensorMask,
-    from: Option<Inverse>,
-    to: Option<Inverse>,
+    /// Inverses at both ends of the way; nothing where the sensors do not span the space.
+    ends: [Inverse; 2],
+    /// Whether they do.
+    spans: bool,
     /// There is no way from the one to the other.
     stands: bool,
     /// Sensors that the parity check has not excluded.
@@ -42,9 +46,10 @@ impl Axes {
             played: orientation.plays().iter().map(|_| target).collect(),
             clamped: outside(orientation, target),
             started: false,
+            all: mask,
             mask,
-            from: inverse,
-            to: inverse,
+            ends: [inverse.unwrap_or_default(); 2],
+            spans: inverse.is_some(),
             stands: true,
             included: mask,
             parity: ParityCheck::new(),
@@ -64,10 +69,8 @@ impl Axes {
         let temperature = self.stick(orientation, temperature);
         self.started = true;
         let now = self.at(start);
-        self.to = orientation.inverse(temperature, self.mask);
-        self.from = now.or(self.to);
-        self.give_up_across_a_plane(orientation, start, temperature);
-        self.stands = self.from == self.to;
+        let to = orientation.inverse(temperature, self.mask);
+        self.set_out(orientation, (now.or(to), to), [self.temperature.at(start), temperature]);
         self.target = temperature;
         self.clamped = clamped;
         self.temperature.turn(start, over, temperature);
@@ -91,7 +94,7 @@ impl Axes {
     /// Arrives at once where it is heading, after a step of the producer's clock.
     pub(super) fn settle(&mut self) {
         self.temperature.settle();
-        self.from = self.to;
+        self.ends[0] = self.ends[1];
         self.stands = true;
     }
 
@@ -119,17 +122,39 @@ impl Axes {
         if usable != self.mask {
             self.choose(orientation, usable, time);
         }
-        let trusted = self.from.is_some() && self.to.is_some();
+        if self.spans && self.mask == self.all {
+            let [from, to] = &self.ends;
+            return (from.lerp_apply(to, self.share(time), readings), true);
+        }
+        // A copy, so that the readings themselves need no place in memory.
+        let readings = *readings;
+        self.resolve_some(orientation, &readings, time)
+    }
+
+    /// Likewise from some of the sensors.
+    #[cold]
+    fn resolve_some<const N: usize>(
+        &mut self,
+        orientation: &Orientation,
+        readings: &[f64; N],
+        time: Timestamp,
+    ) -> ([f64; 3], bool) {
+        let trusted = self.spans;
         if !trusted {
             self.choose(orientation, self.included, time);
         }
-        let (Some(from), Some(to)) = (&self.from, &self.to) else { return ([0.0; 3], false) };
-        let share = if self.stands { 1.0 } else { self.temperature.share(time) };
-        if self.mask == SensorMask::all(orientation.sensors()) {
-            return (from.lerp_apply(to, share, readings), trusted);
+        if !self.spans {
+            return ([0.0; 3], false);
         }
+        let [from, to] = &self.ends;
         let readings = array::from_fn(|lane| if self.mask.contains(lane) { readings[lane] } else { 0.0 });
-        (from.lerp_apply::<N>(to, share, &readings), trusted)
+        (from.lerp_apply::<N>(to, self.share(time), &readings), trusted)
+    }
+
+    /// How far along the way between the inverses `time` is.
+    #[inline]
+    fn share(&self, time: Timestamp) -> f64 {
+        if self.stands { 1.0 } else { self.temperature.share(time) }
     }
 
     /// Goes on with other sensors: both ends anew, from where the temperature is now, so that the change of sensors is all that
@@ -137,18 +162,26 @@ impl Axes {
     #[cold]
     fn choose(&mut self, orientation: &Orientation, mask: SensorMask, time: Timestamp) {
         self.mask = mask;
-        self.from = orientation.inverse(self.temperature.at(time), mask);
-        self.to = orientation.inverse(self.target, mask);
-        self.give_up_across_a_plane(orientation, time, self.target);
-        self.stands = self.from == self.to;
+        let now = self.temperature.at(time);
+        let [from, to] = [now, self.target].map(|temperature| orientation.inverse(temperature, mask));
+        self.set_out(orientation, (from, to), [now, self.target]);
     }
 
-    /// Gives the inverses up where, on the way to a target (°C), the axes of the sensors in use come into one plane: both
-    /// ends may be sound, and what is between them nonsense. With all sensors that cannot be: the calibration was refused.
-    fn give_up_across_a_plane(&mut self, orientation: &Orientation, from: Timestamp, target: f64) {
-        if !orientation.is_conditioned_between(self.mask, self.temperature.at(from), target) {
-            (self.from, self.to) = (None, None);
-        }
+    /// Sets out from one inverse to the other, which hold at two temperatures (°C). Gives both up where the axes of the sensors in use come
+    /// into one plane between them: both ends may be sound, and what is between them nonsense. With all sensors that cannot be: the
+    /// calibration was refused.
+    fn set_out(
+        &mut self,
+        orientation: &Orientation,
+        (from, to): (Option<Inverse>, Option<Inverse>),
+        [now, target]: [f64; 2],
+    ) {
+        let is_clear = |_: &_| orientation.is_conditioned_between(self.mask, now, target);
+        let ends = from.zip(to).filter(is_clear);
+        self.spans = ends.is_some();
+        self.ends = ends.map_or_else(Default::default, |(from, to)| [from, to]);
+        let [from, to] = &self.ends;
+        self.stands = from == to;
     }
 
     /// Temperature that the orientation follows (°C).
@@ -182,8 +215,8 @@ impl Axes {
     }
 
     fn at(&self, time: Timestamp) -> Option<Inverse> {
-        let (from, to) = (self.from.as_ref()?, self.to.as_ref()?);
-        Some(from.lerp(to, self.temperature.share(time)))
+        let [from, to] = &self.ends;
+        self.spans.then(|| from.lerp(to, self.temperature.share(time)))
     }
 }
 

@@ -3,13 +3,12 @@
 //! scale and bias per gyro (with the mode's sign) → perimeter-servo transient → four-step substitution → delays → case axes;
 //! accelerometers: bias, scale and board ratio → delays → case axes.
 //!
-//! Every tick goes this way. A sensor that cannot be taken as it stands is put right [on its lane](patch).
+//! Every tick goes this way. A sensor that cannot be taken as it stands is put right on its lane.
 
 mod accels;
 mod gyros;
 mod held;
 mod motion;
-mod patch;
 mod sigma;
 
 use alloc::boxed::Box;
@@ -19,8 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use super::accel_intake::PendingAccel;
 use super::counters::Counters;
-use super::health::Health;
-use super::pipeline::Released;
+use super::flags::Health;
+use super::gyro_intake::Break;
 use super::slew::{Slew, Slewing};
 use super::thermal_memory::{ThermalMemory, Waiting};
 use crate::calibration::Calibration;
@@ -33,6 +32,7 @@ use crate::sample::{CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, 
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
+use accels::Felt;
 pub(super) use motion::MotionInUse;
 use motion::{Follows, MotionMemory};
 
@@ -63,13 +63,23 @@ pub(super) struct Corrector {
     /// The swap that is being made over a time, and the share of what was before it at the present tick.
     slew: Option<Box<Slew>>,
     slew_share: f64,
-    /// Whether anything follows motion at the present tick.
-    moves: bool,
-    /// Up to this time a tick finds everything as the last one did: no memory, only a shorter way.
+    /// What holds for the next ticks: no memory, only a shorter way.
     #[serde(skip)]
-    calm_until: Option<Timestamp>,
-    /// What follows motion up to then.
-    #[serde(skip)]
+    calm: Calm,
+}
+
+/// What a tick finds as the last one did, until a temperature reading falls due, a swap moves on or a new series begins.
+#[derive(Debug, Clone, Copy, Default)]
+struct Calm {
+    /// Ticks that end later look for what has changed; all do without.
+    until: Option<Timestamp>,
+    /// Whether any sensor needs more than four lanes.
+    wide: bool,
+    /// Whether the gyros have terms that change their sign.
+    modal: bool,
+    /// Whether the terms of the gyros are not what the bank gives, or a switch of the mode is given up.
+    special: bool,
+    /// What follows motion.
     follows: Follows,
 }
 
@@ -86,12 +96,15 @@ pub(super) struct Takeover {
     pub(super) drift: DriftSettings,
 }
 
-/// A tick on its way through the models.
+/// A gyro tick with its accelerometers'.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OnItsWay<'a> {
-    pub(super) released: &'a Released<'a>,
+pub(super) struct Paired<'a> {
+    pub(super) gyro: &'a GyroTick,
     pub(super) accel: Option<&'a PendingAccel>,
-    pub(super) since_turn_on_s: f64,
+    /// What lies between it and the last tick that was corrected.
+    pub(super) before: Break,
+    /// When the unit was turned on.
+    pub(super) turn_on: Timestamp,
 }
 
 impl Corrector {
@@ -119,9 +132,7 @@ impl Corrector {
             last_forces: [0.0; MAX_SENSORS],
             slew: None,
             slew_share: 0.0,
-            moves: false,
-            calm_until: None,
-            follows: Follows::default(),
+            calm: Calm::default(),
         };
         let Some((old_calibration, old)) =
             before.filter(|(old, _)| old.gyro_count() == gyros && old.accel_count() == accels)
@@ -136,7 +147,7 @@ impl Corrector {
         let same_bias = |i| same_basis && old_calibration.gyros.get(i) == calibration.gyros.get(i);
         let Self { mut drift, thermal, .. } = new;
         drift.carry(old.drift, same_bias);
-        Self { drift, thermal, slew, slew_share: 0.0, calm_until: None, ..old }
+        Self { drift, thermal, slew, slew_share: 0.0, calm: Calm::default(), ..old }
     }
 
     /// Everything as it is in use at the end of the last tick, for a slew away from it.
@@ -151,15 +162,18 @@ impl Corrector {
                 _ => now,
             };
         let old = self.slew.as_deref();
-        let shares = self.thermal.paces.shares(now);
-        let (accels, boards) = self.accel_terms(&shares);
+        let mut each = None;
+        let shares = self.thermal.paces.shares(now, &mut each);
+        let mut gyros = self.thermal.gyros.at(shares);
+        self.special_terms(calibration, &mut gyros, since_turn_on_s);
+        let (accels, boards) = self.accel_terms(shares);
         Slew {
             start: now,
             over,
-            gyros: self.gyro_terms(calibration, &shares, since_turn_on_s),
+            gyros,
             accels,
             boards,
-            motion: self.motion_in_use(calibration, &shares),
+            motion: self.motion_in_use(calibration, shares),
             gyro_axes: on_its_way(self.thermal.gyro_axes.in_use(now), old.and_then(|slew| slew.gyro_axes)),
             accel_axes: on_its_way(
                 self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(now)),
@@ -177,25 +191,35 @@ impl Corrector {
     pub(super) fn correct(
         &mut self,
         calibration: &Calibration,
-        tick: &OnItsWay<'_>,
+        tick: &Paired<'_>,
         (waiting, delay): (&mut Waiting, Span),
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let (time, restart) = (tick.released.tick.end_time, tick.released.restart);
-        if restart || self.calm_until.is_none_or(|until| time > until) {
+        let time = tick.gyro.end_time;
+        if tick.before.restart || self.calm.until.is_none_or(|until| time > until) {
             self.renew(calibration, tick, (waiting, delay), counters);
         }
+        if !self.drift.is_idle() {
+            self.advance_drift(calibration, time, tick.before.restart);
+        }
+        // Four lanes fill two registers of every x86-64, and suffice for most units.
+        if self.calm.wide {
+            self.correct_lanes::<MAX_SENSORS>(calibration, tick, counters, out);
+        } else {
+            self.correct_lanes::<4>(calibration, tick, counters, out);
+        }
+        if !self.drift.is_idle() {
+            self.drift.observe(&self.seen);
+        }
+    }
+
+    /// Has the drift estimator go on to a tick.
+    #[inline(never)]
+    fn advance_drift(&mut self, calibration: &Calibration, time: Timestamp, restart: bool) {
         self.drift.advance(time, restart, &|rate| {
             calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
         });
-        // Four lanes fill two registers of every x86-64, and suffice for most units.
-        if calibration.gyros.len().max(calibration.accels.len()) <= 4 {
-            self.correct_lanes::<4>(calibration, tick, counters, out);
-        } else {
-            self.correct_lanes::<MAX_SENSORS>(calibration, tick, counters, out);
-        }
-        self.drift.observe(&self.seen);
     }
 
     /// Does before a tick what few need: a new series begins, temperature readings take effect, a swap is on its way.
@@ -203,12 +227,12 @@ impl Corrector {
     fn renew(
         &mut self,
         calibration: &Calibration,
-        tick: &OnItsWay<'_>,
+        tick: &Paired<'_>,
         (waiting, delay): (&mut Waiting, Span),
         counters: &mut Counters,
     ) {
-        let time = tick.released.tick.end_time;
-        if tick.released.restart {
+        let time = tick.gyro.end_time;
+        if tick.before.restart {
             self.thermal.restart(calibration);
             self.servo.reset();
             self.motion.restart();
@@ -222,23 +246,35 @@ impl Corrector {
         if self.slew_share <= 0.0 {
             self.slew = None;
         }
-        self.follow_motion(calibration);
-        self.calm_until = Some(waiting.due_after(delay)).filter(|_| self.slew.is_none());
+        if !self.drift.subtracts() {
+            self.seen.gyros.drift = [0.0; MAX_SENSORS];
+        }
+        let slews = self.slew.is_some();
+        let given_up = calibration.reversal.is_none() && !self.substitution.is_settled();
+        self.calm = Calm {
+            until: Some(waiting.due_after(delay)).filter(|_| !slews),
+            wide: calibration.gyros.len().max(calibration.accels.len()) > 4,
+            modal: slews || self.thermal.gyros.has_any([2, 3]),
+            special: slews || given_up || calibration.trends.is_some() || self.drift.subtracts(),
+            follows: self.follow_motion(calibration),
+        };
     }
 
     /// Has the next tick look for what has changed.
     pub(super) fn disturb(&mut self) {
-        self.calm_until = None;
+        self.calm.until = None;
     }
 
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once for each width")]
     fn correct_lanes<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        tick: &OnItsWay<'_>,
+        tick: &Paired<'_>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let &Released { tick: raw, missed, restart, .. } = tick.released;
+        let &Paired { gyro: raw, before: Break { missed, restart }, .. } = tick;
         out.sequence = raw.sequence;
         out.end_time = raw.end_time;
         out.duration = raw.duration;
@@ -251,13 +287,14 @@ impl Corrector {
         if let Some(held) = self.motion.held.as_mut().filter(|_| missed > 0) {
             held.interrupt();
         }
-        let shares = self.thermal.paces.shares(raw.end_time);
-        let felt = self.accels_feel::<N>(calibration, tick, &shares, counters, out);
-        if let Some(felt) = felt.as_ref().filter(|felt| self.moves & felt.within) {
-            self.note_force(calibration, &felt.forces, raw.end_time);
+        let mut each = None;
+        let shares = self.thermal.paces.shares(raw.end_time, &mut each);
+        let felt = self.accels_feel::<N>(calibration, tick, shares, counters, out);
+        if let Some(Felt { forces, .. }) = felt.filter(|felt| self.calm.follows.any & felt.within) {
+            self.note_force(calibration, &forces, raw.end_time);
         }
-        self.gyros::<N>(calibration, tick, &shares, counters, out);
-        if let Some(felt) = &felt {
+        self.gyros::<N>(calibration, tick, shares, counters, out);
+        if let Some(felt) = felt {
             self.resolve_force(calibration, felt, missed, counters, out);
         }
 
@@ -288,7 +325,7 @@ impl Corrector {
         let accels = self.thermal.accel_axes.as_ref().and_then(|axes| axes.in_use(time));
         let rates: Sensors<f64> = self.seen.gyros.iter().map(|gyro| gyro.bias + gyro.drift).collect();
         let ([bias, per_scale_factor], [ratio]) =
-            self.accel_terms::<MAX_SENSORS>(&self.thermal.paces.shares(time));
+            self.accel_terms::<MAX_SENSORS>(self.thermal.paces.shares(time, &mut None));
         let lanes = 0..calibration.accels.len();
         let forces: Sensors<f64> =
             lanes.map(|lane| bias[lane] * ratio[lane] * per_scale_factor[lane]).collect();

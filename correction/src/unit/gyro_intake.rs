@@ -53,8 +53,28 @@ pub(super) struct Front<'a> {
 pub(super) struct Left {
     pub(super) tick: GyroTick,
     pub(super) output: OutputKind,
+    pub(super) before: Break,
+}
+
+/// What lies between two ticks: nothing, mostly.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(super) struct Break {
+    /// Ticks that are missing.
     pub(super) missed: u64,
+    /// The producer restarted, or its clock stepped: a new series begins.
     pub(super) restart: bool,
+}
+
+impl Break {
+    /// With what lay before an earlier tick that was left out since.
+    pub(super) fn after(self, earlier: Self) -> Self {
+        Self { missed: self.missed.saturating_add(earlier.missed), restart: self.restart | earlier.restart }
+    }
+
+    /// With a tick more that is left out.
+    pub(super) fn and_a_tick(self) -> Self {
+        Self { missed: self.missed.saturating_add(1), ..self }
+    }
 }
 
 /// A jump of sequence or time that is not believed yet.
@@ -105,21 +125,31 @@ impl Admission {
 }
 
 impl GyroIntake {
-    /// Whether a tick goes on where the last one left off, with nothing waiting: then it need not wait either.
+    /// How many of these ticks go on where the last one left off, with nothing waiting: they need not wait either. `fits` says of a
+    /// tick, and its place among them, whether all that belongs to it is at hand.
     #[inline]
-    pub(super) fn is_next(&self, tick: &GyroTick) -> bool {
-        let (Some(newest), Some(last), Some(series)) = (self.newest, self.last, self.series) else {
-            return false;
+    pub(super) fn run(&self, ticks: &[GyroTick], fits: impl Fn(usize, &GyroTick) -> bool) -> usize {
+        let (Some(newest), Some(mut last), Some(series)) = (self.newest, self.last, self.series) else {
+            return 0;
         };
-        let next = last.wrapping_add(1);
-        let in_order = tick.sequence == next && newest.sequence == last && tick.series == series && next > 0;
-        let step_ns = tick.end_time.as_ns().saturating_sub(newest.end_time.as_ns());
-        let duration_ns = tick.duration.as_ns();
-        in_order
-            && is_possible(tick.duration)
-            && (1..=MAX_STEP.as_ns()).contains(&step_ns)
-            && step_ns >= duration_ns / 2
-            && self.pending.is_empty()
+        if newest.sequence != last || !self.pending.is_empty() {
+            return 0;
+        }
+        let mut last_end_ns = newest.end_time.as_ns();
+        let goes_on = |(index, tick): &(usize, &GyroTick)| {
+            let (end_ns, duration_ns) = (tick.end_time.as_ns(), tick.duration.as_ns());
+            let (step_ns, is_later) = (end_ns.abs_diff(last_end_ns), end_ns > last_end_ns);
+            (last, last_end_ns) = (last.wrapping_add(1), end_ns);
+            tick.sequence == last
+                && last > 0
+                && tick.series == series
+                && is_possible(tick.duration)
+                && is_later
+                && step_ns <= MAX_STEP.as_ns().unsigned_abs()
+                && step_ns >= (duration_ns / 2).unsigned_abs()
+                && fits(*index, tick)
+        };
+        ticks.iter().enumerate().take_while(goes_on).count()
     }
 
     /// Sequence number and end of the newest tick that was admitted.
@@ -127,12 +157,16 @@ impl GyroIntake {
         self.newest.map(|newest| (newest.sequence, newest.end_time))
     }
 
-    /// Remembers a tick that [is the next](Self::is_next) and did not wait.
+    /// Remembers a [run](Self::run), which did not wait.
     #[inline]
-    pub(super) fn passed(&mut self, tick: &GyroTick) {
+    pub(super) fn passed(&mut self, run: &[GyroTick]) {
+        let Some(last) = run.last() else { return };
         self.jump = None;
-        self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
-        self.leave(tick.sequence, 0, false);
+        self.newest = Some(Newest { sequence: last.sequence, end_time: last.end_time });
+        let count = u32::try_from(run.len()).unwrap_or(u32::MAX);
+        let moved = |bits: u128| bits.checked_shl(count).unwrap_or(0);
+        self.released = moved(self.released) | moved(1).wrapping_sub(1);
+        self.last = Some(last.sequence);
     }
 
     /// Remembers that a tick has left, with so many missing before it.
@@ -167,13 +201,16 @@ impl GyroIntake {
 
     /// Ends a batch: call it behind the last tick of each. Only what was admitted counts; a refused tick's broken
     /// time would keep the others waiting for ever.
+    #[inline]
     pub(super) fn end_batch(&mut self) {
-        if self.pending.is_empty() {
-            if self.pending.capacity() > LONGEST_KEPT {
-                self.pending = VecDeque::new();
-            }
-            return;
+        if !self.pending.is_empty() {
+            self.end_waiting_batch();
+        } else if self.pending.capacity() > LONGEST_KEPT {
+            self.pending = VecDeque::new();
         }
+    }
+
+    fn end_waiting_batch(&mut self) {
         let mut end = None;
         for pending in self.pending.iter_mut().rev() {
             if self.batch == 0 {
@@ -332,7 +369,7 @@ impl GyroIntake {
             _ => refused_before,
         };
         self.leave(tick.sequence, missed, restart);
-        Some(Left { tick, output, missed, restart })
+        Some(Left { tick, output, before: Break { missed, restart } })
     }
 
     /// How many ticks wait.
@@ -347,6 +384,7 @@ impl GyroIntake {
 }
 
 /// Whether a tick can have lasted so long.
+#[inline]
 pub(super) fn is_possible(duration: Span) -> bool {
     (1..=MAX_TICK_DURATION.as_ns()).contains(&duration.as_ns())
 }

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::accel_intake::PendingAccel;
 use super::change::{At, Change};
-use super::correct::{Corrector, OnItsWay, Takeover, pass_through};
+use super::correct::{Corrector, Paired, Takeover, pass_through};
 use super::counters::Counters;
+use super::gyro_intake::Break;
 use super::operating::Operating;
 use super::settings::{Uncalibrated, UnitSettings};
 use super::thermal_memory::Waiting;
@@ -31,13 +32,14 @@ pub(super) struct Active {
     sigma: Option<Box<SigmaMemory>>,
 }
 
-/// A gyro tick that has left its intake: the next of its series, or the first of a new one.
+/// Gyro ticks that leave the intake together, in their order: nothing lies between them.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Released<'a> {
-    pub(super) tick: &'a GyroTick,
-    /// Ticks that are missing before it.
-    pub(super) missed: u64,
-    pub(super) restart: bool,
+pub(super) struct Run<'a> {
+    pub(super) ticks: &'a [GyroTick],
+    /// The accelerometer tick of each; none, where there is none for the first.
+    pub(super) accels: &'a [PendingAccel],
+    /// What lies before the first.
+    pub(super) before: Break,
 }
 
 /// Everything that a tick passes between the intake and the owner of the unit.
@@ -50,12 +52,10 @@ pub(super) struct Pipeline {
     pub(super) waiting: Waiting,
     pub(super) steps: StepSum,
     pub(super) counters: Counters,
-    /// Ticks that left the intake and were neither given out nor announced.
-    unannounced: u64,
-    /// Ticks that left the intake without being corrected, and whether the producer restarted at one of them.
-    unseen: (u64, bool),
-    /// The next output must announce a restart that fell on a tick which was held back.
-    restart_due: bool,
+    /// What the next output must announce of ticks that left the intake and were not given out.
+    unannounced: Break,
+    /// What the corrector has not seen: ticks that left the intake without being corrected.
+    unseen: Break,
     /// End of the first tick since the unit appeared or its producer restarted.
     turn_on: Option<Timestamp>,
     pub(super) last_end: Timestamp,
@@ -74,9 +74,8 @@ impl Pipeline {
             waiting: Waiting::default(),
             steps: StepSum::new(),
             counters: Counters::default(),
-            unannounced: 0,
-            unseen: (0, false),
-            restart_due: false,
+            unannounced: Break::default(),
+            unseen: Break::default(),
             turn_on: None,
             last_end: Timestamp::default(),
             corrected: CorrectedTick::default(),
@@ -166,6 +165,17 @@ impl Pipeline {
         true
     }
 
+    /// The calibration in force, where no change waits.
+    #[inline]
+    pub(super) fn settled(&self) -> Option<&Calibration> {
+        self.active.as_ref().filter(|_| self.pending.is_none()).map(|active| &*active.calibration)
+    }
+
+    /// Whether an accelerometer tick fits the calibration in force.
+    pub(super) fn fits_accel(&mut self, accel: &PendingAccel) -> bool {
+        self.fits(false, accel.output, accel.count, |c| (c.accel_output(), c.accel_count()))
+    }
+
     /// Whether a gyro tick cannot go without its accelerometers. Whether a unit without calibration has any is not known: it
     /// waits as if it had.
     pub(super) fn expects_accels(&self) -> bool {
@@ -183,98 +193,82 @@ impl Pipeline {
         }
     }
 
-    /// Corrects one tick and gives it out. `fits`: its readings are those that the calibration in force takes.
-    #[inline]
+    /// Corrects ticks and gives them out. `fits`: their readings are those that the calibration in force takes.
     pub(super) fn pass<E: FnMut(&CorrectedTick) + ?Sized>(
         &mut self,
-        mut released: Released<'_>,
+        run: &Run<'_>,
         fits: bool,
-        accel: Option<&PendingAccel>,
         emit: &mut E,
     ) {
-        let Released { tick, .. } = released;
-        // A swap since it came may have changed what fits.
-        let accel = accel.filter(|accel| {
-            self.fits(false, accel.output, accel.count, |c| (c.accel_output(), c.accel_count()))
-        });
-        self.last_end = tick.end_time;
-        if released.restart {
-            self.waiting.restart(self.last_end);
+        let Some(first) = run.ticks.first() else { return };
+        if run.before.restart {
+            self.waiting.restart(first.end_time);
             self.turn_on = None;
         }
+        let turn_on = *self.turn_on.get_or_insert(first.end_time);
+        let uncalibrated = self.active.is_none();
+        let held = uncalibrated && self.settings.uncalibrated == Uncalibrated::Hold;
+        let mut watches = self.operating.watches();
         // What the consumer has not been told, and what the corrector has not seen: a tick that is held back in standby
         // is unknown to the one and not to the other.
-        let restart = released.restart | core::mem::take(&mut self.restart_due);
-        let missed = released.missed.saturating_add(core::mem::take(&mut self.unannounced));
-        let (unseen, restart_unseen) = core::mem::take(&mut self.unseen);
-        released.missed = released.missed.saturating_add(unseen);
-        released.restart |= restart_unseen;
-        let turn_on = *self.turn_on.get_or_insert(tick.end_time);
-        let mut held = false;
-        match &mut self.active {
-            Some(active) if fits => {
-                let tick = OnItsWay {
-                    released: &released,
-                    accel,
-                    since_turn_on_s: tick.end_time.seconds_from(turn_on),
-                };
-                let waiting = (&mut self.waiting, self.settings.temperature_delay);
-                let (counters, out) = (&mut self.counters, &mut self.corrected);
-                active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
-                self.corrected.revision = active.revision;
-                if let Some(memory) = &mut active.sigma {
-                    sigma(
-                        memory,
-                        &active.corrector,
-                        &active.calibration,
-                        &mut self.corrected,
-                        tick.since_turn_on_s,
-                    );
+        let mut untold = run.before.after(core::mem::take(&mut self.unannounced));
+        let mut unseen = run.before.after(core::mem::take(&mut self.unseen));
+        let mut accels = run.accels.iter();
+        for tick in run.ticks {
+            self.last_end = tick.end_time;
+            let accel = accels.next();
+            match &mut self.active {
+                Some(active) if fits => {
+                    let tick = Paired { gyro: tick, accel, before: unseen, turn_on };
+                    let waiting = (&mut self.waiting, self.settings.temperature_delay);
+                    let (counters, out) = (&mut self.counters, &mut self.corrected);
+                    active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
+                    unseen = Break::default();
+                    out.revision = active.revision;
+                    if active.sigma.is_some() {
+                        sigma(active, out, turn_on);
+                    }
+                    if watches {
+                        watch(&mut self.operating, active, self.last_end);
+                        watches = self.operating.watches();
+                    }
                 }
-                if self.operating.watches() {
-                    watch(&mut self.operating, active, self.last_end);
+                Some(_) => {}
+                None => self.corrected = pass_through(tick, accel),
+            }
+            let is_running = self.operating.state().is_running() && !held;
+            if !is_running || !(fits || uncalibrated) {
+                untold = untold.and_a_tick();
+                if uncalibrated || !fits {
+                    unseen = unseen.and_a_tick();
                 }
+                self.counters.ticks_held += u64::from(!is_running);
+                continue;
             }
-            Some(_) => {}
-            None => {
-                held = self.settings.uncalibrated == Uncalibrated::Hold;
-                self.corrected = pass_through(tick, accel);
+            self.corrected.missed = untold.missed;
+            if untold.missed > 0 {
+                self.corrected.flags |= TickFlags::GAP;
+                self.counters.gaps += 1;
+                self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(untold.missed);
             }
-        }
-        held |= !self.operating.state().is_running();
-        if held || (self.active.is_some() && !fits) {
-            self.unannounced = missed.saturating_add(1);
-            self.restart_due = restart;
-            if self.active.is_none() || !fits {
-                self.unseen = (released.missed.saturating_add(1), released.restart);
+            if untold.restart {
+                self.corrected.flags |= TickFlags::RESTART;
             }
-            self.counters.ticks_held += u64::from(held);
-            return;
+            (untold, unseen) = (Break::default(), Break::default());
+            self.counters.ticks_out += 1;
+            self.steps.push(&self.settings.navigation, &self.corrected, emit);
         }
-        self.corrected.missed = missed;
-        if missed > 0 {
-            self.corrected.flags |= TickFlags::GAP;
-            self.counters.gaps += 1;
-            self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(missed);
-        }
-        if restart {
-            self.corrected.flags |= TickFlags::RESTART;
-        }
-        self.counters.ticks_out += 1;
-        self.steps.push(&self.settings.navigation, &self.corrected, emit);
+        (self.unannounced, self.unseen) = (untold, unseen);
     }
 }
 
-/// Says how far off a corrected tick may be.
+/// Says how far off the tick that was just corrected to `out` may be.
 #[cold]
-fn sigma(
-    memory: &mut SigmaMemory,
-    corrector: &Corrector,
-    calibration: &Calibration,
-    out: &mut CorrectedTick,
-    since_turn_on_s: f64,
-) {
+fn sigma(active: &mut Active, out: &mut CorrectedTick, turn_on: Timestamp) {
+    let Active { calibration, corrector, sigma: Some(memory), .. } = active else { return };
+    let calibration: &Calibration = calibration;
     let Some(model) = calibration.sigma.as_deref() else { return };
+    let since_turn_on_s = out.end_time.seconds_from(turn_on);
     let sigma = corrector.sigma(memory, (calibration, model), out, since_turn_on_s);
     **out.sigma.get_or_insert_default() = sigma;
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axes::Axes;
 use super::counters::Counters;
-use super::footing::Footing;
+use super::flags::Footing;
 use crate::calibration::{Calibration, RegressorParts, Source};
 use crate::channel::{ChannelMemory, ThermalState, Verdict};
 use crate::sample::{ChannelName, TemperatureReading};

@@ -245,7 +245,7 @@ fn correct(mut stream: UnitStream, log: &Log, after: u64) -> (UnitStream, Vec<Co
         frames.retain(|(input, frame)| {
             let due = stream.heard()[input.index()].frames < entry.heard[input.index()].frames;
             if due {
-                drop(stream.take(*input, frame));
+                drop(stream.receive(*input, frame));
                 give(&mut stream);
             }
             !due

@@ -359,7 +359,7 @@ impl Made {
             Deed::Frame { input, frame, .. } => {
                 if let Some(stream) = &mut self.stream {
                     // A frame that cannot be read is counted by the stream, there as here.
-                    let _ = stream.take(input, &frame);
+                    let _ = stream.receive(input, &frame);
                 }
             }
             Deed::Entry { entry, anchor, .. } => {

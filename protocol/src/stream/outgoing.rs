@@ -148,9 +148,8 @@ impl Outgoing {
             ticks.drain(..).for_each(|tick| self.write(&tick));
             self.ticks = ticks;
         }
-        let mut frame = self.full.pop_front().unwrap_or_else(|| std::mem::take(&mut self.open));
+        let frame = self.full.front_mut().unwrap_or(&mut self.open);
         if frame.count == 0 {
-            self.open = frame;
             return None;
         }
         let version = version(&frame.sigmas);
@@ -169,10 +168,14 @@ impl Outgoing {
         seal(&mut frame.bytes);
         self.length = frame.bytes.len();
         std::mem::swap(into, &mut frame.bytes);
-        if self.open.count == 0 {
+        frame.count = 0;
+        let last = frame.last;
+        if let Some(frame) = self.full.pop_front()
+            && self.open.count == 0
+        {
             self.open.bytes = frame.bytes;
         }
-        Some(frame.last)
+        Some(last)
     }
 
     /// Forgets the head of the last frame: a revision's counter may mean another one.

@@ -339,9 +339,9 @@ fn references_are_counted_whatever_becomes_of_them() {
         sigma_rad_per_s: 1.0,
     };
     let good = encode(&reference(1_000_000_000, 3_000_000_000)).unwrap();
-    stream.receive_reference(&good).unwrap();
-    stream.receive_reference(&encode(&reference(0, 5)).unwrap()).unwrap();
-    assert!(stream.receive_reference(good.split_last().unwrap().1).is_err());
+    stream.receive(Input::Reference, &good).unwrap();
+    stream.receive(Input::Reference, &encode(&reference(0, 5)).unwrap()).unwrap();
+    assert!(stream.receive(Input::Reference, good.split_last().unwrap().1).is_err());
     assert!(encode(&reference(5, 5)).is_err(), "it ends when it starts");
     ticks(&mut stream, 1000..1100);
     let status = status(&stream);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::control::Schedule;
-use isotherm_protocol::key::{self, RawStream, UnitId};
+use isotherm_protocol::key::{self, Input, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
 use isotherm_protocol::status::{Fault, Output, Status};
 
@@ -99,13 +99,13 @@ impl Intake {
         made.count()
     }
 
-    /// Takes one message; whether subscribers of the status should hear of it at once.
+    /// Takes one message; whether subscribers of the status should hear of it at once. A rate reference makes no unit.
     ///
     /// Whatever goes wrong is counted; nothing gets out of here but the answer.
     pub fn receive(&self, key: &str, payload: Option<&[u8]>, arrival: Instant) -> bool {
-        let Some((serial, stream)) = key::parse_raw(key) else {
+        let Some((serial, input)) = key::parse_input(key) else {
             self.fault(FaultKind::UnknownStream, || {
-                format!("{key} is not a raw stream: gyro, accel or temp")
+                format!("{key} is not an input: raw/gyro, raw/accel, raw/temp, raw/health or reference")
             });
             return false;
         };
@@ -114,35 +114,23 @@ impl Intake {
             return false;
         };
         let known = self.unit(serial);
-        let Some(unit) = known.or_else(|| self.appear(serial, stream, frame, arrival)) else { return false };
+        let Some(unit) = known.or_else(|| self.appear(serial, input, frame, arrival)) else { return false };
         let mut actor = lock(&unit);
         if let Some(short) = self.pair.as_ref().and_then(|pair| pair.has_stood_still(arrival)) {
             actor.follow(arrival, Pair::footing(short));
         }
-        guarded(&mut actor, |actor| actor.receive(stream, frame, arrival));
-        actor.is_status_due()
-    }
-
-    /// Takes one rate reference; whether subscribers of the status should hear of it at once. It makes no unit.
-    pub fn reference(&self, key: &str, payload: Option<&[u8]>, arrival: Instant) -> bool {
-        let known = key::parse_reference(key).and_then(|serial| self.unit(serial));
-        let Some(unit) = known else {
-            self.fault(FaultKind::UnknownStream, || {
-                format!("{key}: a reference for a unit that has not appeared")
-            });
-            return false;
-        };
-        let Some(frame) = payload else {
-            self.fault(FaultKind::Deletion, || format!("{key}: a deletion has no effect"));
-            return false;
-        };
-        let mut actor = lock(&unit);
-        guarded(&mut actor, |actor| actor.reference(frame, arrival));
-        actor.is_status_due()
+        // After a panic it is due.
+        guarded(&mut actor, |actor| actor.receive(input, frame, arrival)).unwrap_or(true)
     }
 
     /// Makes the unit of a message that is its first, unless the message is bad or there are too many.
-    fn appear(&self, serial: &str, stream: RawStream, frame: &[u8], now: Instant) -> Option<Unit> {
+    fn appear(&self, serial: &str, input: Input, frame: &[u8], now: Instant) -> Option<Unit> {
+        let Input::Raw(stream) = input else {
+            self.fault(FaultKind::UnknownStream, || {
+                format!("unit {serial}: a reference for a unit that has not appeared")
+            });
+            return None;
+        };
         let id = UnitId::new(serial)
             .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
             .ok()?;
@@ -150,7 +138,7 @@ impl Intake {
         // Rubbish on a strange serial makes no unit; on a serial with a calibration it is that unit's rubbish.
         if !calibrated && let Err(error) = readable(stream, frame) {
             self.fault(FaultKind::from(&error), || {
-                format!("first message of unit {id}, raw/{}: {error}", stream.chunk())
+                format!("first message of unit {id}, {}: {error}", input.topic())
             });
             return None;
         }
@@ -159,7 +147,7 @@ impl Intake {
             self.make_room(now);
         }
         let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
-        if let Some(unit) = units.get(serial) {
+        if let Some(unit) = units.by_serial.get(serial) {
             return Some(Arc::clone(unit));
         }
         if !self.has_place(&units, calibrated) {
@@ -220,7 +208,7 @@ impl Intake {
     /// Whether one more unit may appear; places for units that have a calibration are kept free for them.
     fn has_place(&self, units: &Units, calibrated: bool) -> bool {
         let waiting = |calibrations: &Calibrations| {
-            calibrations.units().filter(|unit| units.get(unit.as_str()).is_none()).count()
+            calibrations.units().filter(|unit| !units.by_serial.contains_key(*unit)).count()
         };
         let limit = self.settings.max_units;
         // Most of the time there is room for all of them, whoever has appeared.
@@ -264,7 +252,7 @@ impl Intake {
 
     /// Whether a unit has appeared.
     pub(crate) fn has(&self, unit: &UnitId) -> bool {
-        read(&self.units).get(unit.as_str()).is_some()
+        read(&self.units).by_serial.contains_key(unit)
     }
 
     fn refuse<T>(&self, id: &UnitId) -> Option<T> {
@@ -277,7 +265,7 @@ impl Intake {
 
     /// The unit of a serial, if it has appeared.
     fn unit(&self, serial: &str) -> Option<Unit> {
-        read(&self.units).get(serial).map(Arc::clone)
+        read(&self.units).by_serial.get(serial).map(Arc::clone)
     }
 
     /// Counts a fault that belongs to no unit, and logs the first of its kind.

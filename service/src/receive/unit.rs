@@ -1,14 +1,12 @@
 //! One unit's part of the service: its stream, its calibration, its faults and its outlet.
 
 mod account;
+mod arrivals;
 mod journal_writer;
 mod notices;
 mod present;
-mod producers;
-mod rates;
 mod seen;
 mod speech;
-mod stream_timeout;
 mod unknown_channels;
 
 use std::sync::Arc;
@@ -16,7 +14,6 @@ use std::time::{Duration, Instant};
 
 use isotherm_correction::operation::{Command, Refusal, State};
 use isotherm_correction::unit::{self, Uncalibrated, UnitSettings};
-use isotherm_protocol::codec::CodecError;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
@@ -27,19 +24,17 @@ use crate::control::calibrations::{Change, Plan};
 use crate::control::swap_manager::{Inbox, Notice};
 use crate::receive::fault::{FaultKind, FaultLog};
 use crate::receive::latency::Histogram;
+use arrivals::Arrivals;
 use journal_writer::JournalWriter;
 use notices::NoticeCollector;
-use producers::Producers;
-use rates::Rates;
 use speech::Speech;
-use stream_timeout::StreamTimeout;
 
 pub(crate) use account::SwapAccount;
+pub use arrivals::StreamTimeoutSettings;
 pub use journal_writer::{Journal, JournalOutlet};
 pub use present::Present;
 pub(crate) use seen::TickSeen;
 pub(crate) use speech::{Alarm, Footing, Standing, Wants};
-pub use stream_timeout::StreamTimeoutSettings;
 use unknown_channels::UnknownChannels;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
@@ -61,9 +56,7 @@ pub struct UnitActor {
     outlet: Outlet,
     faults: FaultLog,
     latency: Histogram,
-    stream_timeout: StreamTimeout,
-    rates: Rates,
-    producers: Producers,
+    arrivals: Arrivals,
     unknown_channels: UnknownChannels,
     notices: NoticeCollector,
     journal_writer: JournalWriter,
@@ -102,9 +95,7 @@ impl UnitActor {
             outlet,
             faults: FaultLog::default(),
             latency: Histogram::default(),
-            stream_timeout: StreamTimeout::new(stream_timeout),
-            rates: Rates::new(Instant::now()),
-            producers: Producers::default(),
+            arrivals: Arrivals::new(stream_timeout, Instant::now()),
             unknown_channels: UnknownChannels::default(),
             notices: NoticeCollector::default(),
             journal_writer: JournalWriter::default(),
@@ -165,46 +156,32 @@ impl UnitActor {
         done
     }
 
-    /// Takes one raw frame that arrived at `arrival`, and publishes what it released.
-    pub fn receive(&mut self, stream: RawStream, frame: &[u8], arrival: Instant) {
-        if stream == RawStream::Gyro {
-            if self.speech.uncertain {
-                self.hear_again(frame, arrival);
-            }
-            self.stream_timeout.heard(arrival);
+    /// Takes one frame that arrived at `arrival`, and publishes what it releases; whether subscribers of the status should hear of it at
+    /// once.
+    pub fn receive(&mut self, input: impl Into<Input>, frame: &[u8], arrival: Instant) -> bool {
+        let input = input.into();
+        let is_gyro = input == Input::Raw(RawStream::Gyro);
+        if is_gyro && self.speech.uncertain {
+            self.hear_again(frame, arrival);
         }
-        self.note_frame(Input::Raw(stream), frame, arrival);
-        let taken = self.stream.receive(stream, frame);
-        if stream == RawStream::Gyro && taken.is_ok() {
-            self.producers.heard(self.stream.incoming_series(), arrival);
-        }
-        if stream == RawStream::Temperature {
+        self.note_frame(input, frame, arrival);
+        let received = self.stream.receive(input, frame);
+        let series = (is_gyro && received.is_ok()).then(|| self.stream.incoming_series());
+        self.arrivals.note(input, series, arrival);
+        if input == Input::Raw(RawStream::Temperature) {
             self.unknown_channels.heard(self.stream.unit(), frame, arrival);
         }
-        self.taken(taken, &format_args!("raw/{}", stream.chunk()), arrival);
-    }
-
-    /// Takes one frame with a rate reference that arrived at `arrival`.
-    pub fn reference(&mut self, frame: &[u8], arrival: Instant) {
-        self.note_frame(Input::Reference, frame, arrival);
-        let taken = self.stream.receive_reference(frame);
-        self.taken(taken, &"reference", arrival);
-    }
-
-    /// Publishes what a frame has released, or counts what is wrong with it.
-    fn taken(&mut self, taken: Result<(), CodecError>, topic: &dyn std::fmt::Display, arrival: Instant) {
-        self.rates.message();
-        if let Err(error) = taken {
-            self.fault(FaultKind::from(&error), 1, || format!("{topic}: {error}"));
-            return;
+        if let Err(error) = received {
+            self.fault(FaultKind::from(&error), 1, || format!("{}: {error}", input.topic()));
+            return self.status_due;
         }
         self.heard = arrival;
-        let first_output = self.latency.total() == 0;
         if self.publish() {
-            self.latency.record(u64::try_from(arrival.elapsed().as_nanos()).unwrap_or(u64::MAX));
-            self.status_due |= first_output;
+            self.status_due |=
+                self.latency.record(u64::try_from(arrival.elapsed().as_nanos()).unwrap_or(u64::MAX));
         }
         self.look();
+        self.status_due
     }
 
     /// Looks for what has changed with the last event.
@@ -225,7 +202,7 @@ impl UnitActor {
             self.notices.tell(&self.stream);
             return;
         }
-        if self.stream.is_waiting() && self.stream_timeout.is_over(now) {
+        if self.stream.is_waiting() && self.arrivals.is_over(now) {
             self.flush();
         }
         if self.self_test_since.is_some_and(|since| now.saturating_duration_since(since) > LONGEST_SELF_TEST)
@@ -235,7 +212,7 @@ impl UnitActor {
             self.look();
         }
         if self.stream.unit().state() == State::PreLaunchCalibration
-            && self.stream_timeout.is_silent_for(now, LONGEST_SILENCE)
+            && self.arrivals.is_silent_for(now, LONGEST_SILENCE)
         {
             self.stream.end_pre_launch();
             self.journal(|_| JournalEvent::PreLaunchEnded);
@@ -346,12 +323,6 @@ impl UnitActor {
     /// Whether something happened that subscribers of the status should hear of at once; asking settles it.
     pub fn take_status_due(&mut self) -> bool {
         std::mem::take(&mut self.status_due)
-    }
-
-    /// Whether [`UnitActor::take_status_due`] would say yes.
-    #[must_use]
-    pub fn is_status_due(&self) -> bool {
-        self.status_due
     }
 
     /// What the unit is doing, and what becomes of its ticks.

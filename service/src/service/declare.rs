@@ -122,19 +122,14 @@ pub(super) fn journal(session: Session, congestion: CongestionControl) -> Journa
 }
 
 /// What the receive thread does with a message: all of it.
-fn take(
-    intake: &Arc<Intake>,
-    bell: &Bell,
-    pulse: &Arc<Pulse>,
-    receive: fn(&Intake, &str, Option<&[u8]>, Instant) -> bool,
-) -> impl Fn(Sample) + Send + Sync + 'static {
+fn take(intake: &Arc<Intake>, bell: &Bell, pulse: &Arc<Pulse>) -> impl Fn(Sample) + Send + Sync + 'static {
     let (intake, bell, pulse) = (Arc::clone(intake), bell.clone(), Arc::clone(pulse));
     move |sample| {
         let arrival = Instant::now();
         let _in_hand = pulse.take(arrival);
         let bytes = sample.payload().to_bytes();
         let frame = (sample.kind() == SampleKind::Put).then_some(&*bytes);
-        if receive(&intake, sample.key_expr().as_str(), frame, arrival) {
+        if intake.receive(sample.key_expr().as_str(), frame, arrival) {
             bell.status_due();
         }
     }
@@ -148,37 +143,25 @@ async fn inputs(
     taken: &[String],
     pair: &Arc<Pair>,
 ) -> Result<Vec<Subscriber<()>>, ServiceError> {
-    let raw = take(intake, bell, pulse, Intake::receive);
-    let reference = take(intake, bell, pulse, Intake::reference);
     let chunks: Vec<_> = taken.iter().filter_map(|pattern| chunk(pattern)).collect();
     if chunks.iter().any(|chunk| chunk.as_str() == "*") {
-        let raw = subscribe(session, key::ALL_RAW, raw).await?;
-        return Ok(vec![raw, subscribe(session, key::ALL_REFERENCE, reference).await?]);
+        let raw = subscribe(session, key::ALL_RAW, take(intake, bell, pulse)).await?;
+        return Ok(vec![raw, subscribe(session, key::ALL_REFERENCE, take(intake, bell, pulse)).await?]);
     }
-    let (raw, reference) = (Arc::new(raw), Arc::new(reference));
     let mut subscribers = Vec::new();
     for (index, chunk) in chunks.iter().enumerate() {
         // Two patterns may take one unit: the first of them does.
-        let before = chunks.get(..index).unwrap_or_default().to_vec();
-        let (raw, reference) = (Arc::clone(&raw), Arc::clone(&reference));
-        let key = format!("imu/{chunk}/*/*");
-        let declare = session.declare_subscriber(key).allowed_origin(Locality::Remote);
-        let others = before.clone();
-        let inputs = declare.callback(move |sample| {
-            if !is_of(&others, &sample) && key::parse_raw(sample.key_expr().as_str()).is_some() {
-                raw(sample);
-            }
-        });
-        subscribers.push(inputs.await.map_err(|source| ServiceError::Declare { key: key::ALL_RAW, source })?);
-        let declare = session.declare_subscriber(format!("imu/{chunk}/reference"));
-        let references = declare.allowed_origin(Locality::Remote).callback(move |sample| {
-            if !is_of(&before, &sample) {
-                reference(sample);
-            }
-        });
-        let declared = references.await;
-        subscribers
-            .push(declared.map_err(|source| ServiceError::Declare { key: key::ALL_REFERENCE, source })?);
+        let before = chunks.get(..index).unwrap_or_default();
+        for (suffix, all) in [("*/*", key::ALL_RAW), ("reference", key::ALL_REFERENCE)] {
+            let (take, before) = (take(intake, bell, pulse), before.to_vec());
+            let declare = session.declare_subscriber(format!("imu/{chunk}/{suffix}"));
+            let inputs = declare.allowed_origin(Locality::Remote).callback(move |sample| {
+                if !is_of(&before, &sample) && key::parse_input(sample.key_expr().as_str()).is_some() {
+                    take(sample);
+                }
+            });
+            subscribers.push(inputs.await.map_err(|source| ServiceError::Declare { key: all, source })?);
+        }
     }
     let pair = Arc::clone(pair);
     subscribers.push(

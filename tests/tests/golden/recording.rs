@@ -94,7 +94,7 @@ pub(crate) fn record(scenario: &Scenario) -> Recording {
 pub(crate) fn give(stream: &mut UnitStream, step: &Step) -> Option<String> {
     match step {
         // A bad frame is part of what happens.
-        Step::Frame(input, frame) => stream.take(*input, frame).err().map(|_| "bad frame".to_owned()),
+        Step::Frame(input, frame) => stream.receive(*input, frame).err().map(|_| "bad frame".to_owned()),
         Step::Event(event) => {
             let words =
                 stream.carry_out(event).map_or_else(|error| error.to_string(), |()| "done".to_owned());

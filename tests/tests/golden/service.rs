@@ -12,7 +12,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
-use isotherm_protocol::key::{self, Input, UnitId};
+use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::stream::Label;
 use isotherm_service::Settings;
 use isotherm_service::control::calibrations::{Calibrations, Change, Installable};
@@ -63,11 +63,8 @@ pub(crate) fn record(scenario: &Scenario) -> Recording {
     let now = Instant::now();
     for (index, step) in scenario.steps.iter().enumerate() {
         match step {
-            Step::Frame(Input::Raw(stream), frame) => {
-                intake.receive(&key::raw(&unit, *stream), Some(frame), now);
-            }
-            Step::Frame(Input::Reference, frame) => {
-                intake.reference(&key::reference(&unit), Some(frame), now);
+            Step::Frame(input, frame) => {
+                intake.receive(&key::input(&unit, *input), Some(frame), now);
             }
             Step::Event(event) => {
                 let said = intake.each_unit(|actor| act(actor, event, now)).concat();

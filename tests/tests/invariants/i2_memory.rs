@@ -28,7 +28,7 @@ fn run(scenario: &Scenario, mut cut: impl FnMut(usize, &UnitStream) -> bool) -> 
         }
         match step {
             // A bad frame is part of what happens.
-            Step::Frame(input, frame) => drop(stream.take(*input, frame)),
+            Step::Frame(input, frame) => drop(stream.receive(*input, frame)),
             Step::Event(event) => stream.carry_out(event).unwrap(),
             Step::Give(change) => {
                 let _ = stream.schedule(change.clone(), Label::default());

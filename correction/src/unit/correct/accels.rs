@@ -2,19 +2,20 @@
 
 use core::array;
 
-use super::patch::{Patch, SOUND, within};
-use super::{Corrector, OnItsWay, of_sensors};
+use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, put};
 use crate::orientation::SensorMask;
 use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
+use crate::unit::flags::{SOUND, within};
 
 /// Terms of the accelerometers at a tick: S and 1/K, and r of their boards.
 pub(super) type AccelTerms<const N: usize> = ([[f64; N]; 2], [[f64; N]; 1]);
 
 /// Specific force along the input axes in a tick (m/s²), a lane for each accelerometer.
+#[derive(Clone, Copy)]
 pub(super) struct Felt<const N: usize> {
     pub(super) forces: [f64; N],
     /// Accelerometers whose reading counts.
@@ -25,27 +26,25 @@ pub(super) struct Felt<const N: usize> {
     duration_s: f64,
 }
 
-/// Specific force along the input axis of one accelerometer (m/s²) that reads this over a tick (models §3).
+/// Specific forces along the input axes of accelerometers (m/s²) that read this over a tick (models §3).
 #[inline]
-fn felt<const N: usize>(
+fn sensed<const N: usize>(
     ([bias, per_scale_factor], [ratio]): &AccelTerms<N>,
     output: OutputKind,
-    lane: usize,
-    reading: f64,
+    mut readings: [f64; N],
     duration_s: f64,
-) -> f64 {
-    let output = match output {
-        OutputKind::Counts => reading / duration_s,
-        OutputKind::Mean => reading,
-    };
-    (output - bias[lane]) * ratio[lane] * per_scale_factor[lane]
+) -> [f64; N] {
+    if output == OutputKind::Counts {
+        readings = readings.map(|reading| reading / duration_s);
+    }
+    array::from_fn(|lane| (readings[lane] - bias[lane]) * ratio[lane] * per_scale_factor[lane])
 }
 
 impl Corrector {
     /// The terms of the accelerometers in use: S and 1/K, and r of their boards.
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     #[inline(always)]
-    pub(super) fn accel_terms<const N: usize>(&self, shares: &Shares) -> AccelTerms<N> {
+    pub(super) fn accel_terms<const N: usize>(&self, shares: Shares<'_>) -> AccelTerms<N> {
         let (mut terms, mut board) =
             (self.thermal.accels.at::<N>(shares), self.thermal.boards.at::<N>(shares));
         if let Some(slewing) = self.slewing() {
@@ -56,12 +55,13 @@ impl Corrector {
     }
 
     /// What the accelerometers feel in a tick; `None` without accelerometers, or without their tick.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     pub(super) fn accels_feel<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        tick: &OnItsWay<'_>,
-        shares: &Shares,
+        tick: &Paired<'_>,
+        shares: Shares<'_>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) -> Option<Felt<N>> {
@@ -85,76 +85,78 @@ impl Corrector {
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
         let terms = self.accel_terms::<N>(shares);
         let readings = narrow::<N>(&raw.readings);
-        let corrected =
-            |lane: usize, reading: f64| felt(&terms, calibration.accel_output, lane, reading, duration_s);
-        let mut forces: [f64; N] = array::from_fn(|i| corrected(i, readings[i]));
+        let output = calibration.accel_output;
+        let mut forces = sensed(&terms, output, *readings, duration_s);
 
         let mut usable = axes.included();
-        let footing = &self.thermal.accel_footing;
         let within = within(readings, narrow(&calibration.accel_limits));
-        let flags = if footing.is_sound(time) & within {
+        let mut flags = SOUND;
+        if self.thermal.accel_footing.is_sound(time) & within {
             put(&mut self.last_forces, forces);
             self.accel_health.note_sound();
-            SOUND
         } else {
-            let limits = &calibration.accel_limits;
-            let patch = Patch { count, readings: raw.readings(), limits, footing, time };
-            let last = &self.last_forces;
-            let flags = patch.apply(&mut usable, counters, |lane, reading| {
-                forces[lane] = reading.map_or(last[lane], |reading| corrected(lane, reading));
-            });
+            let (mut patched, mut counted) = (*readings, usable);
+            let patch = (&mut patched, &calibration.accel_limits, count);
+            let (found, numbers) = self.thermal.accel_footing.patch(time, patch, &mut counted, counters);
+            (usable, flags) = (counted, found);
+            let (felt, last): (_, [f64; N]) =
+                (sensed(&terms, output, patched, duration_s), *narrow(&self.last_forces));
+            forces = array::from_fn(|i| if numbers.contains(i) { felt[i] } else { last[i] });
             let taken = SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE;
-            for lane in (0..count).filter(|lane| !flags[*lane].intersects(taken)) {
-                self.last_forces[lane] = forces[lane];
-            }
+            let good: [f64; N] =
+                array::from_fn(|i| if flags[i].intersects(taken) { last[i] } else { forces[i] });
+            put(&mut self.last_forces, good);
             self.accel_health.note(flags);
-            flags
-        };
+        }
         let seen = &mut self.seen.accels;
         seen.count = count;
-        seen.reading = raw.readings;
+        put(&mut seen.reading, *readings);
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
-        if self.moves {
-            self.remove_squares(shares, &mut forces);
+        if self.calm.follows.any {
+            let (mut left, mut counted) = (forces, usable);
+            self.remove_squares(shares, &mut left);
             if self.holds_back() {
-                let held = (&mut forces, &mut usable);
-                self.hold_accels_back(calibration, tick.released, duration_s, held);
+                self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
             }
+            (forces, usable) = (left, counted);
         }
         Some(Felt { forces, usable, within, duration_s })
     }
 
     /// Resolves what the accelerometers feel in case axes, and watches its parity.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     pub(super) fn resolve_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        felt: &Felt<N>,
+        felt: Felt<N>,
         missed: u64,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let &Felt { mut forces, usable, duration_s, .. } = felt;
-        if self.moves {
-            self.remove_size_effect(calibration, missed, out, &mut forces);
+        let Felt { mut forces, usable, duration_s, .. } = felt;
+        if self.calm.follows.any {
+            let mut left = forces;
+            self.remove_size_effect(calibration, missed, out, &mut left);
+            forces = left;
         }
         let time = out.end_time;
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
         else {
             return;
         };
-        let excluded = orientation.sensors() > MIN_SENSORS
-            && axes.watch(
-                orientation,
-                usable,
-                &forces[..orientation.sensors()],
-                (&mut out.accel_parity, &mut out.flags),
-            );
+        let sensors = orientation.sensors();
+        let mut excluded = false;
+        if sensors > MIN_SENSORS {
+            let watched = forces;
+            let left_over = (&mut out.accel_parity, &mut out.flags);
+            excluded = axes.watch(orientation, usable, &watched[..sensors], left_over);
+        }
         let (force, trusted) = axes.resolve(orientation, usable, &forces, time);
         let force = self.slewing().map_or(force, |slewing| {
-            let old = slewing.from.accel_axes.as_ref();
-            slewing.axes(force, old, usable, &forces[..orientation.sensors()])
+            let (old, forces) = (slewing.from.accel_axes.as_ref(), forces);
+            slewing.axes(force, old, usable, &forces[..sensors])
         });
         out.delta_velocity = force.map(|f| f * duration_s);
         if !trusted {

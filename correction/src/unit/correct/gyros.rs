@@ -2,8 +2,7 @@
 
 use core::array;
 
-use super::patch::{Patch, SOUND, within};
-use super::{Corrector, OnItsWay, of_sensors};
+use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, of_readings, put};
 use crate::orientation::SensorMask;
@@ -14,7 +13,7 @@ use crate::sample::{
 use crate::servo::{ServoTick, Transient};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
-use crate::unit::pipeline::Released;
+use crate::unit::flags::{SOUND, within};
 
 /// What the substitution did, and the servo could not: counted.
 const SWITCHING: TickFlags = TickFlags::INTERPOLATED
@@ -28,96 +27,103 @@ const UNSETTLED: TickFlags = TickFlags::INTERPOLATED
     .union(TickFlags::SERVO_UNMEASURED);
 
 impl Corrector {
-    /// The terms of the gyros in use, the trend in the bias: increment weight, bias, magnetic and slow-meander term.
-    pub(super) fn gyro_terms<const N: usize>(
+    /// The terms of the gyros in use, given those of the bank: with the trend in the bias, and on their way from what was before a swap.
+    #[cold]
+    pub(super) fn special_terms<const N: usize>(
         &self,
         calibration: &Calibration,
-        shares: &Shares,
+        terms: &mut [[f64; N]; 4],
         since_turn_on_s: f64,
-    ) -> [[f64; N]; 4] {
-        let mut terms = self.thermal.gyros.at::<N>(shares);
+    ) {
         let trend = calibration.trends.as_ref().map_or([0.0; N], |trends| trends.at(since_turn_on_s));
         terms[1] = array::from_fn(|i| terms[1][i] + trend[i]);
         if let Some(slewing) = self.slewing() {
-            slewing.terms(&mut terms, &slewing.from.gyros);
+            slewing.terms(terms, &slewing.from.gyros);
         }
-        terms
     }
 
     /// Corrects the gyros' readings of a tick.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     pub(super) fn gyros<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        tick: &OnItsWay<'_>,
-        shares: &Shares,
+        tick: &Paired<'_>,
+        shares: Shares<'_>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let raw = tick.released.tick;
+        let raw = tick.gyro;
         let (time, duration_s) = (raw.end_time, raw.duration.as_s());
         let count = calibration.gyros.len();
-        let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick.released)));
+        let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick)));
         let lost = reversal.is_some_and(|(reversal, input)| self.substitution.is_lost(reversal, &input));
 
-        let [weight, bias, magnetic, meander] =
-            self.gyro_terms::<N>(calibration, shares, tick.since_turn_on_s);
-        let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
-        let mut bias: [f64; N] =
-            array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+        let mut terms = self.thermal.gyros.at::<N>(shares);
+        // What few ticks need is given copies: lanes of which nobody has the address stay in registers.
+        if self.calm.special {
+            let mut special = terms;
+            self.special_terms(calibration, &mut special, time.seconds_from(tick.turn_on));
+            terms = special;
+        }
+        let [weight, mut bias, magnetic, meander] = terms;
+        if self.calm.modal {
+            let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
+            bias = array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+        }
         let readings: [f64; N] = of_readings(&raw.readings);
-        let scaled = |lane: usize, reading: f64| match calibration.gyro_output {
-            OutputKind::Counts => weight[lane] * reading,
-            OutputKind::Mean => weight[lane] * (reading * duration_s),
-        };
+        let scale =
+            Scale { weight, times_s: (calibration.gyro_output == OutputKind::Mean).then_some(duration_s) };
         let mut clamped = SensorMask::NONE;
-        if self.moves {
+        if self.calm.follows.any {
             let limits = narrow::<N>(&calibration.gyro_limits);
-            let within = |lane: usize| readings[lane].max(-limits[lane]).min(limits[lane]);
-            let rates = array::from_fn(|lane| scaled(lane, within(lane)) / duration_s);
-            (bias, clamped) = self.gyros_in_motion::<N>(calibration, shares, &rates, bias);
+            let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
+            let rates = scale.angles(within).map(|angle| angle / duration_s);
+            let mut moved = bias;
+            clamped = self.gyros_in_motion::<N>(calibration, shares, &rates, &mut moved);
+            bias = moved;
         }
         self.servo.advance(lost, time, raw.duration);
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
             && !self.servo.pass_settled(settles_s, (time, raw.duration), &raw.half_periods)
         {
-            let (disturbed, flags) = self.servo_transients(calibration, raw, &weight, bias);
+            let (weight, mut disturbed) = (weight, bias);
+            out.flags |= self.servo_transients(calibration, raw, &weight, &mut disturbed);
             bias = disturbed;
-            out.flags |= flags;
         }
-        let drift: [f64; N] = if self.drift.subtracts() {
-            array::from_fn(|i| self.drift.subtrahend(i, time))
-        } else {
-            [0.0; N]
-        };
-        let subtrahend: [f64; N] = array::from_fn(|i| bias[i] + drift[i]);
-        let corrected = |lane: usize, reading| scaled(lane, reading) - subtrahend[lane] * duration_s;
-        let mut increments: [f64; N] = array::from_fn(|i| corrected(i, readings[i]));
+        let mut subtrahend = bias;
+        if self.calm.special && self.drift.subtracts() {
+            let drift: [f64; N] = array::from_fn(|i| self.drift.subtrahend(i, time));
+            put(&mut self.seen.gyros.drift, drift);
+            subtrahend = array::from_fn(|i| bias[i] + drift[i]);
+        }
+        let scaled = scale.angles(readings);
+        let mut increments: [f64; N] = array::from_fn(|i| scaled[i] - subtrahend[i] * duration_s);
 
         let mut usable = self.thermal.gyro_axes.included();
-        let footing = &self.thermal.gyro_footing;
         let outside = clamped != SensorMask::NONE;
-        let sound =
-            !(lost | outside) & footing.is_sound(time) & within(&readings, narrow(&calibration.gyro_limits));
-        let mut flags = if sound {
-            SOUND
-        } else {
-            let limits = &calibration.gyro_limits;
-            let patch = Patch { count, readings: &raw.readings, limits, footing, time };
-            if lost {
-                increments = [0.0; N];
-                patch.lost()
-            } else {
-                let good = &self.last_rates;
-                patch.apply(&mut usable, counters, |lane, reading| {
-                    increments[lane] = match reading {
-                        Some(reading) => corrected(lane, reading),
-                        None => good[lane] * duration_s,
-                    };
-                })
-            }
-        };
-        if clamped != SensorMask::NONE {
+        let sound = !(lost | outside)
+            & self.thermal.gyro_footing.is_sound(time)
+            & within(&readings, narrow(&calibration.gyro_limits));
+        let mut flags = SOUND;
+        if lost {
+            (increments, flags) = ([0.0; N], self.thermal.gyro_footing.lost(time));
+        } else if !sound {
+            let (mut patched, mut counted) = (readings, usable);
+            let patch = (&mut patched, &calibration.gyro_limits, count);
+            let (found, numbers) = self.thermal.gyro_footing.patch(time, patch, &mut counted, counters);
+            (usable, flags) = (counted, found);
+            let scaled = scale.angles(patched);
+            let last: [f64; N] = *narrow(&self.last_rates);
+            increments = array::from_fn(|i| {
+                if numbers.contains(i) {
+                    scaled[i] - subtrahend[i] * duration_s
+                } else {
+                    last[i] * duration_s
+                }
+            });
+        }
+        if outside {
             mark_clamped(&mut flags, clamped);
         }
         // Before the substitution: the angle that it restores is a lump, not a rate.
@@ -126,9 +132,9 @@ impl Corrector {
             put(&mut self.last_rates, rates);
             self.gyro_health.note_sound();
         } else {
-            for lane in (0..count).filter(|lane| flags[*lane].contains(SensorFlags::VALID)) {
-                self.last_rates[lane] = rates[lane];
-            }
+            let is_valid = |lane: usize| flags[lane].contains(SensorFlags::VALID);
+            let last: [f64; N] = *narrow(&self.last_rates);
+            put::<N>(&mut self.last_rates, array::from_fn(|i| if is_valid(i) { rates[i] } else { last[i] }));
             self.gyro_health.note(flags);
         }
 
@@ -137,21 +143,24 @@ impl Corrector {
         put(&mut seen.reading, readings);
         put::<N>(&mut seen.rate, array::from_fn(|i| rates[i] + subtrahend[i]));
         put(&mut seen.bias, bias);
-        put(&mut seen.drift, drift);
         seen.flags = flags;
         out.gyro_flags = of_sensors(flags, count);
 
-        out.flags |= self.substitute(reversal, &mut increments[..count]);
+        if reversal.is_some() | self.calm.special {
+            let mut bridged = increments;
+            out.flags |= self.substitute(reversal, &mut bridged[..count]);
+            increments = bridged;
+        }
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
         }
-        if self.moves && self.holds_back() {
-            let held = (&mut increments, &mut usable);
-            let held = self.hold_gyros_back(calibration, tick.released, &mut out.flags, held);
-            rates = held.unwrap_or(rates);
+        if self.calm.follows.any && self.holds_back() {
+            let (mut held, mut counted) = (increments, usable);
+            let given = self.hold_gyros_back(calibration, tick, &mut out.flags, (&mut held, &mut counted));
+            (increments, usable, rates) = (held, counted, given.unwrap_or(rates));
         }
         self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(UNSETTLED);
-        self.resolve_angle(calibration, usable, (&increments, &rates), counters, out);
+        self.resolve_angle(calibration, usable, (increments, rates), counters, out);
     }
 
     /// Adds what the gyros' servos show in a good tick to their biases (rad/s); `weight` in rad per count.
@@ -161,11 +170,11 @@ impl Corrector {
         calibration: &Calibration,
         tick: &GyroTick,
         weight: &[f64; N],
-        mut bias: [f64; N],
-    ) -> ([f64; N], TickFlags) {
+        bias: &mut [f64; N],
+    ) -> TickFlags {
         let mut flags = TickFlags::empty();
         let temperatures = &self.thermal.gyro_footing.temperature_deg_c;
-        let lanes = calibration.gyros.iter().zip(weight).zip(temperatures).zip(&mut bias).enumerate();
+        let lanes = calibration.gyros.iter().zip(weight).zip(temperatures).zip(bias).enumerate();
         for (lane, (((model, weight), temperature_deg_c), bias)) in lanes {
             let Some(servo) = &model.servo else { continue };
             let servo_tick = ServoTick {
@@ -183,7 +192,7 @@ impl Corrector {
                 Transient::Unmeasured => TickFlags::SERVO_UNMEASURED,
             };
         }
-        (bias, flags)
+        flags
     }
 
     /// Bridges a mode switch (models §5).
@@ -200,11 +209,13 @@ impl Corrector {
     }
 
     /// Resolves the increments (rad) in case axes, and watches the parity of the rates before the substitution (rad/s).
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     fn resolve_angle<const N: usize>(
         &mut self,
         calibration: &Calibration,
         usable: SensorMask,
-        (increments, rates): (&[f64; N], &[f64; N]),
+        (increments, rates): ([f64; N], [f64; N]),
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
@@ -212,11 +223,13 @@ impl Corrector {
         let axes = &mut self.thermal.gyro_axes;
         let mut excluded = false;
         if orientation.sensors() > MIN_SENSORS && !out.flags.contains(TickFlags::INTERPOLATED) {
-            let rates = &rates[..orientation.sensors()];
-            excluded = axes.watch(orientation, usable, rates, (&mut out.gyro_parity, &mut out.flags));
+            let watched = rates;
+            let watched = &watched[..orientation.sensors()];
+            excluded = axes.watch(orientation, usable, watched, (&mut out.gyro_parity, &mut out.flags));
         }
-        let (angle, trusted) = axes.resolve(orientation, usable, increments, out.end_time);
+        let (angle, trusted) = axes.resolve(orientation, usable, &increments, out.end_time);
         out.delta_angle = self.slewing().map_or(angle, |slewing| {
+            let increments = increments;
             slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &increments[..orientation.sensors()])
         });
         if !trusted {
@@ -229,16 +242,35 @@ impl Corrector {
     }
 }
 
+/// How readings become angles.
+#[derive(Debug, Clone, Copy)]
+struct Scale<const N: usize> {
+    /// rad per count, or rad per rad.
+    weight: [f64; N],
+    /// Duration of the tick (s), where the readings are rates.
+    times_s: Option<f64>,
+}
+
+impl<const N: usize> Scale<N> {
+    /// Angles of readings (rad).
+    #[inline]
+    fn angles(&self, mut readings: [f64; N]) -> [f64; N] {
+        if let Some(duration_s) = self.times_s {
+            readings = readings.map(|reading| reading * duration_s);
+        }
+        array::from_fn(|lane| self.weight[lane] * readings[lane])
+    }
+}
+
 /// What the substitution must know of a tick.
-fn input(released: &Released<'_>) -> TickInput {
-    let tick = released.tick;
+fn input(tick: &Paired<'_>) -> TickInput {
     TickInput {
-        end_time: tick.end_time,
-        duration: tick.duration,
-        mode: tick.mode,
-        switch_command: tick.switch_command,
-        missed: released.missed,
-        restart: released.restart,
+        end_time: tick.gyro.end_time,
+        duration: tick.gyro.duration,
+        mode: tick.gyro.mode,
+        switch_command: tick.gyro.switch_command,
+        missed: tick.before.missed,
+        restart: tick.before.restart,
     }
 }
 

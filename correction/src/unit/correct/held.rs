@@ -8,12 +8,11 @@ use core::array;
 
 use serde::{Deserialize, Serialize};
 
-use super::Corrector;
+use super::{Corrector, Paired};
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow, put};
 use crate::orientation::SensorMask;
 use crate::sample::{MAX_SENSORS, TickFlags};
-use crate::unit::pipeline::Released;
 use crate::units::Span;
 
 /// What holds for a tick that has part of such a tick in it, too.
@@ -99,12 +98,12 @@ impl Corrector {
     /// Whether sensors are held back, or something of them still is.
     #[inline]
     pub(super) fn holds_back(&self) -> bool {
-        self.motion.held.is_some() || self.follows.delays
+        self.motion.held.is_some() || self.calm.follows.delays
     }
 
     /// What is held back; before a tick that is the first of its series, nothing.
-    fn held(&mut self, released: &Released<'_>) -> &mut HeldBack {
-        let is_first = released.restart || self.seen.duration == Span::ZERO;
+    fn held(&mut self, tick: &Paired<'_>) -> &mut HeldBack {
+        let is_first = tick.before.restart || self.seen.duration == Span::ZERO;
         self.motion.held.get_or_insert_with(|| Box::new(HeldBack::new(is_first)))
     }
 
@@ -114,13 +113,13 @@ impl Corrector {
     pub(super) fn hold_gyros_back<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        released: &Released<'_>,
+        tick: &Paired<'_>,
         flags: &mut TickFlags,
         (increments, usable): (&mut [f64; N], &mut SensorMask),
     ) -> Option<[f64; N]> {
         let [gyros, accels] = [0, 1]
             .map(|kind: usize| self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[kind]));
-        let held = self.held(released);
+        let held = self.held(tick);
         held.gyros.pass(&gyros, (increments, usable));
         let before = core::mem::replace(&mut held.flags, *flags & CARRIED);
         *flags |= before;
@@ -129,7 +128,7 @@ impl Corrector {
             self.motion.held = None;
             self.disturb();
         }
-        let per_second = 1.0 / released.tick.duration.as_s();
+        let per_second = 1.0 / tick.gyro.duration.as_s();
         (!flags.intersects(CARRIED)).then(|| increments.map(|increment| increment * per_second))
     }
 
@@ -138,13 +137,13 @@ impl Corrector {
     pub(super) fn hold_accels_back<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        released: &Released<'_>,
+        tick: &Paired<'_>,
         duration_s: f64,
         (forces, usable): (&mut [f64; N], &mut SensorMask),
     ) {
         let ticks = self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[1]);
         let mut increments = forces.map(|force| force * duration_s);
-        self.held(released).accels.pass(&ticks, (&mut increments, usable));
+        self.held(tick).accels.pass(&ticks, (&mut increments, usable));
         *forces = increments.map(|increment| increment / duration_s);
     }
 }

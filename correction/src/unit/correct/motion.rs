@@ -43,6 +43,8 @@ pub(super) struct MotionMemory {
     reason = "terms that a unit has or has not, each asked for by its name"
 )]
 pub(super) struct Follows {
+    /// Any of these, or what is still held back.
+    pub(super) any: bool,
     /// Drift with the specific force.
     force: bool,
     /// Weights of gyros over their rate.
@@ -91,7 +93,7 @@ impl MotionMemory {
 
 impl Corrector {
     /// What is in use, for a slew away from it; `None` where it is nothing.
-    pub(super) fn motion_in_use(&self, calibration: &Calibration, shares: &Shares) -> Option<MotionInUse> {
+    pub(super) fn motion_in_use(&self, calibration: &Calibration, shares: Shares<'_>) -> Option<MotionInUse> {
         let motion = calibration.motion.as_deref().or(self.slew_from_motion().map(|old| &old.motion))?;
         let (gyros, accels) = (self.gyro_motion(shares), self.accel_motion(shares));
         Some(MotionInUse { motion: motion.clone(), gyros, accels })
@@ -102,13 +104,13 @@ impl Corrector {
     }
 
     /// Coefficients of the gyros' terms that follow motion.
-    fn gyro_motion<const N: usize>(&self, shares: &Shares) -> [[f64; N]; 4] {
+    fn gyro_motion<const N: usize>(&self, shares: Shares<'_>) -> [[f64; N]; 4] {
         let bank = self.thermal.motion.as_deref().map(|banks| &banks.gyros);
         self.coefficients(bank, self.slew_from_motion().map(|old| &old.gyros), shares)
     }
 
     /// Coefficients of the accelerometers' terms that follow motion.
-    fn accel_motion<const N: usize>(&self, shares: &Shares) -> [[f64; N]; 1] {
+    fn accel_motion<const N: usize>(&self, shares: Shares<'_>) -> [[f64; N]; 1] {
         let bank = self.thermal.motion.as_deref().map(|banks| &banks.accels);
         self.coefficients(bank, self.slew_from_motion().map(|old| &old.accels), shares)
     }
@@ -118,7 +120,7 @@ impl Corrector {
         &self,
         bank: Option<&Bank<T>>,
         old: Option<&[Lanes; T]>,
-        shares: &Shares,
+        shares: Shares<'_>,
     ) -> [[f64; N]; T] {
         let mut terms = bank.map_or([[0.0; N]; T], |bank| bank.at(shares));
         if let Some(slewing) = self.slewing() {
@@ -127,19 +129,18 @@ impl Corrector {
         terms
     }
 
-    /// Notes what follows motion, and what did before a swap that is on its way.
-    pub(super) fn follow_motion(&mut self, calibration: &Calibration) {
+    /// What follows motion, or did before a swap that is on its way.
+    pub(super) fn follow_motion(&self, calibration: &Calibration) -> Follows {
         let old = self.slew_from_motion().map(|old| &old.motion);
         let motions = || calibration.motion.as_deref().into_iter().chain(old);
-        let follows = Follows {
+        Follows {
+            any: motions().next().is_some() || self.motion.held.is_some(),
             force: motions().any(|motion| motion.feels_force),
             curves: motions().any(Motion::has_curves),
             squares: motions().any(Motion::has_squares),
             positions: motions().any(|motion| motion.has_positions),
             delays: motions().any(|motion| motion.holds_back),
-        };
-        self.moves = motions().next().is_some() || self.motion.held.is_some();
-        self.follows = follows;
+        }
     }
 
     /// A number of each sensor, on its way from the old one.
@@ -162,21 +163,21 @@ impl Corrector {
     pub(super) fn gyros_in_motion<const N: usize>(
         &self,
         calibration: &Calibration,
-        shares: &Shares,
+        shares: Shares<'_>,
         rates: &[f64; N],
-        bias: [f64; N],
-    ) -> ([f64; N], SensorMask) {
+        bias: &mut [f64; N],
+    ) -> SensorMask {
         let [x, y, z, asymmetry] = self.gyro_motion::<N>(shares);
         let (force, mut clamped, mut errors) = (self.motion.force, SensorMask::NONE, [0.0; N]);
-        if self.follows.curves {
+        if self.calm.follows.curves {
             clamped = self.errors_over_rate(calibration, rates, &mut errors);
         }
-        let bias = array::from_fn(|lane| {
+        *bias = array::from_fn(|lane| {
             let by_force = x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2];
             let rate = rates[lane];
             bias[lane] + (by_force - asymmetry[lane] * rate.abs() - errors[lane] * rate)
         });
-        (bias, clamped)
+        clamped
     }
 
     /// Relative errors of the gyros' weights at their rates (rad/s), and the gyros whose rate is outside the range of its curve.
@@ -211,7 +212,7 @@ impl Corrector {
         forces: &[f64; N],
         time: Timestamp,
     ) {
-        if !self.follows.force {
+        if !self.calm.follows.force {
             return;
         }
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
@@ -227,8 +228,8 @@ impl Corrector {
     /// Takes second-order terms out of the forces that the accelerometers feel (m/s²): m = f + K2·f² has the solution
     /// f = 2m/(1 + √(1 + 4·K2·m)) next to m.
     #[inline(never)]
-    pub(super) fn remove_squares<const N: usize>(&self, shares: &Shares, forces: &mut [f64; N]) {
-        if !self.follows.squares {
+    pub(super) fn remove_squares<const N: usize>(&self, shares: Shares<'_>, forces: &mut [f64; N]) {
+        if !self.calm.follows.squares {
             return;
         }
         let [second_order] = self.accel_motion::<N>(shares);
@@ -247,7 +248,7 @@ impl Corrector {
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
-        if !self.follows.positions {
+        if !self.calm.follows.positions {
             return;
         }
         let positions: [[f64; N]; 3] =

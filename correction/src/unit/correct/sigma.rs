@@ -6,7 +6,7 @@ use crate::orientation::Orientation;
 use crate::sample::{CorrectedTick, MAX_SENSORS};
 use crate::sigma::{Resolved, Sigma, SigmaMemory, SigmaModel, Watched};
 use crate::unit::axes::Axes;
-use crate::unit::footing::Footing;
+use crate::unit::flags::Footing;
 
 impl Corrector {
     /// σ of the tick that was just corrected to `out`.

@@ -41,7 +41,7 @@ impl Leader {
     }
 
     fn take(&mut self, sequence: u64) {
-        self.stream.take(GYRO, &frame(sequence)).unwrap();
+        self.stream.receive(GYRO, &frame(sequence)).unwrap();
         take_frames(&mut self.stream, &mut self.out);
     }
 
@@ -89,7 +89,7 @@ impl Standby {
         self.now_ns += TICK_NS;
         let frame = frame(sequence);
         self.follower.frame(GYRO, self.now_ns, &frame);
-        self.stream.take(GYRO, &frame).unwrap();
+        self.stream.receive(GYRO, &frame).unwrap();
         take_frames(&mut self.stream, &mut Vec::new());
         assert!(!self.go_on());
     }

@@ -18,17 +18,12 @@ pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Sen
 #[derive(Debug, Default)]
 pub(super) struct Units {
     // For messages: the key finds its unit without an allocation.
-    by_serial: HashMap<UnitId, Unit>,
+    pub(super) by_serial: HashMap<UnitId, Unit>,
     /// In the order of their serials, for those who look at all of them many times a second.
     in_order: Arc<Vec<(UnitId, Unit)>>,
 }
 
 impl Units {
-    /// The unit of a serial, if it has appeared.
-    pub(super) fn get(&self, serial: &str) -> Option<&Unit> {
-        self.by_serial.get(serial)
-    }
-
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.by_serial.len()

@@ -43,8 +43,7 @@ impl UnitActor {
     /// Measures the input rates anew: what the status shows until the next call.
     pub fn measure_rates(&mut self, now: Instant) {
         let counters = self.counters();
-        self.rates.measure(now, &counters);
-        if let Some(words) = self.producers.look(&counters) {
+        if let Some(words) = self.arrivals.look(now, &counters) {
             self.fault(FaultKind::TwoProducers, 1, || words);
         }
     }
@@ -57,7 +56,7 @@ impl UnitActor {
             instance,
             version: env!("CARGO_PKG_VERSION"),
             now_unix_s: now.ok().and_then(|since| i64::try_from(since.as_secs()).ok()),
-            input_rates: self.rates.rates(),
+            input_rates: self.arrivals.rates(),
             latency: self.latency(),
             swaps: self.account.swaps.clone(),
             overlay: self.account.overlay,

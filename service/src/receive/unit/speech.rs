@@ -257,7 +257,7 @@ impl UnitActor {
             self.speech.uncertain = true;
         }
         if self.speech.following.is_none() {
-            if standing.deserted && self.stream_timeout.is_over(now) {
+            if standing.deserted && self.arrivals.is_over(now) {
                 tracing::info!(unit = %self.stream.id(), "nothing is received from the other instance or the \
                     producer: standby");
                 self.follow(now, Footing::Isolated);

@@ -220,6 +220,6 @@ fn a_revision_that_was_given_already_is_passed_over() {
     actor.change(change.clone());
     actor.take_status_due();
     assert_eq!(actor.change(change), None);
-    assert!(!actor.is_status_due());
+    assert!(!actor.take_status_due());
     assert_eq!(actor.present().revision, 4);
 }

@@ -1,0 +1,236 @@
+//! What comes in for a unit, by the clock: how much, whether its gyro stream has stopped, and whether one producer sends it.
+//!
+//! Here alone a clock decides anything, and only about a stream's tail.
+
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::key::{Input, RawStream};
+use isotherm_protocol::status::{Counter, InputRates};
+
+/// Distance of messages that is assumed before two have been heard.
+const ASSUMED_INTERVAL: Duration = Duration::from_millis(250);
+/// A stream is stopped after this many times its usual distance of messages.
+const INTERVALS: u32 = 4;
+/// Longest distance of messages that is followed; what is longer was a pause.
+const LONGEST_INTERVAL: Duration = Duration::from_millis(2500);
+
+/// Counters of what comes in, in the order of [`InputRates`].
+const COUNTERS: [&str; 3] = ["gyro_ticks_in", "accel_ticks_in", "temperature_readings_in"];
+
+/// How long a run that another one has followed is remembered.
+const REMEMBERED: Duration = Duration::from_secs(10);
+/// Returns to such a run from which on two producers are at work: one is what a late message does.
+const RETURNS: u32 = 3;
+/// Fewest ticks in an interval, and their smallest share, that contradict the others.
+const FEWEST: u64 = 20;
+const ONE_IN: u64 = 5;
+/// Counters of ticks that a second producer's become.
+const CONTRADICTING: [&str; 3] = ["gyro_late", "gyro_implausible", "gyro_duplicates"];
+
+/// Limits of a stream that may have stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StreamTimeoutSettings {
+    /// Shortest silence that counts as a stop.
+    pub tail_flush: Duration,
+    /// Pairing window of the unit; twice as long must pass.
+    pub pairing_window: Duration,
+}
+
+/// Follows the messages of one unit.
+///
+/// A producer that sends a batch of 64 ticks every 640 ms has not stopped 500 ms after the last one. The silence that
+/// counts as a stop therefore grows with the distance of the messages, so that a flush by the clock never meets a
+/// stream that goes on.
+#[derive(Debug)]
+pub(super) struct Arrivals {
+    timeout: StreamTimeoutSettings,
+    /// When the last gyro message came, and the distance of such messages.
+    last: Option<Instant>,
+    interval: Duration,
+    messages: u64,
+    /// The counters at the last look, and the rates between the last two looks.
+    looked: (Instant, [u64; 4]),
+    rates: InputRates,
+    /// The runs of the producer that were heard last.
+    series: Option<u64>,
+    previous: Option<(u64, Instant)>,
+    returns: u32,
+    /// Ticks that contradict others, at the last look.
+    contradicting: u64,
+}
+
+impl Arrivals {
+    pub(super) fn new(timeout: StreamTimeoutSettings, now: Instant) -> Self {
+        Self {
+            timeout,
+            last: None,
+            interval: ASSUMED_INTERVAL,
+            messages: 0,
+            looked: (now, [0; 4]),
+            rates: InputRates::default(),
+            series: None,
+            previous: None,
+            returns: 0,
+            contradicting: 0,
+        }
+    }
+
+    /// A message has come; `series` is the producer's run that gyro ticks are of, where they could be read.
+    pub(super) fn note(&mut self, input: Input, series: Option<u64>, now: Instant) {
+        self.messages += 1;
+        if input != Input::Raw(RawStream::Gyro) {
+            return;
+        }
+        if let Some(last) = self.last.replace(now) {
+            let interval = now.saturating_duration_since(last).min(LONGEST_INTERVAL);
+            // Up at once, down slowly: bursts do not make the stream look faster than it is.
+            self.interval = interval.max(self.interval * 15 / 16);
+        }
+        if series.is_some() && series != self.series {
+            let before = std::mem::replace(&mut self.series, series);
+            if let (Some(series), Some(before)) = (series, before) {
+                let remembered = |at: Instant| now.saturating_duration_since(at) < REMEMBERED;
+                let returns =
+                    self.previous.is_some_and(|(previous, at)| previous == series && remembered(at));
+                self.returns = if returns { self.returns.saturating_add(1) } else { 0 };
+                self.previous = Some((before, now));
+            }
+        }
+    }
+
+    /// Whether no gyro message came for longer than a stated time; not before the first one.
+    pub(super) fn is_silent_for(&self, now: Instant, longest: Duration) -> bool {
+        self.last.is_some_and(|last| now.saturating_duration_since(last) > longest)
+    }
+
+    /// Whether the gyro stream has been silent for long enough to be called stopped.
+    pub(super) fn is_over(&self, now: Instant) -> bool {
+        let StreamTimeoutSettings { tail_flush, pairing_window } = self.timeout;
+        let shortest = tail_flush.max(pairing_window * 2).max(self.interval * INTERVALS);
+        self.last.is_none_or(|last| now.saturating_duration_since(last) >= shortest)
+    }
+
+    /// Looks at what has come since the last look: measures the rates; in words where two producers are at work, which looks like an
+    /// input of twice the rate and is none.
+    #[expect(clippy::cast_precision_loss, reason = "fewer than 2⁵³ messages")]
+    pub(super) fn look(&mut self, now: Instant, counters: &[Counter]) -> Option<String> {
+        let value = |name: &str| {
+            counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value)
+        };
+        let [gyro, accel, temperature] = COUNTERS.map(value);
+        let counts = [gyro, accel, temperature, self.messages];
+        let (then, before) = std::mem::replace(&mut self.looked, (now, counts));
+        let [ticks, ..] = before;
+        let elapsed_s = now.saturating_duration_since(then).as_secs_f64();
+        if elapsed_s > 0.0 {
+            let mut per_s =
+                counts.iter().zip(before).map(|(now, then)| now.saturating_sub(then) as f64 / elapsed_s);
+            let mut next = || per_s.next().unwrap_or_default();
+            self.rates = InputRates {
+                gyro_ticks_per_s: next(),
+                accel_ticks_per_s: next(),
+                temperature_readings_per_s: next(),
+                messages_per_s: next(),
+            };
+        }
+        self.two_producers(gyro.saturating_sub(ticks), CONTRADICTING.iter().map(|name| value(name)).sum())
+    }
+
+    /// Whether two producers are at work, in words; `ticks` came since the last look, and so many contradicted others so far.
+    fn two_producers(&mut self, ticks: u64, contradicting: u64) -> Option<String> {
+        let before = std::mem::replace(&mut self.contradicting, contradicting);
+        let contradicting = contradicting.saturating_sub(before);
+        if std::mem::take(&mut self.returns) >= RETURNS {
+            let (one, other) = (self.previous.map_or(0, |(series, _)| series), self.series.unwrap_or(0));
+            return Some(format!(
+                "two producers: ticks of series {one} and {other} alternate; stop one of them"
+            ));
+        }
+        let two = contradicting >= FEWEST && contradicting * ONE_IN >= ticks;
+        two.then(|| {
+            format!(
+                "probably two producers: {contradicting} of {ticks} gyro ticks were late, contradictory or \
+                 duplicates; stop one of them"
+            )
+        })
+    }
+
+    /// The rates between the last two looks.
+    pub(super) fn rates(&self) -> InputRates {
+        self.rates
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+    const GYRO: Input = Input::Raw(RawStream::Gyro);
+
+    fn arrivals(tail_flush: u32, pairing_window: u32, now: Instant) -> Arrivals {
+        let [tail_flush, pairing_window] = [tail_flush, pairing_window].map(|ms| MS * ms);
+        Arrivals::new(StreamTimeoutSettings { tail_flush, pairing_window }, now)
+    }
+
+    fn counters(ticks: u64, late: u64) -> [Counter; 2] {
+        let counter = |name: &str, value| Counter { name: name.to_owned(), value };
+        [counter("gyro_ticks_in", ticks), counter("gyro_late", late)]
+    }
+
+    /// Silence (ms) after which a stream counts as stopped, when its messages came at these distances (ms).
+    fn silence(tail_flush: u32, pairing_window: u32, distances: &[u32]) -> u32 {
+        let mut now = Instant::now();
+        let mut arrivals = arrivals(tail_flush, pairing_window, now);
+        arrivals.note(GYRO, None, now);
+        for distance in distances {
+            now += MS * *distance;
+            arrivals.note(GYRO, None, now);
+        }
+        (0..20_000).find(|ms| arrivals.is_over(now + MS * *ms)).unwrap()
+    }
+
+    #[test]
+    fn the_silence_that_counts_as_a_stop_grows_with_the_distance_of_messages() {
+        let fast = [5; 200];
+        assert_eq!(silence(100, 50, &fast), 100, "the configured silence");
+        assert_eq!(silence(100, 300, &fast), 600, "twice the pairing window");
+        assert_eq!(silence(100, 50, &[640; 10]), 2560, "four times the distance");
+        assert_eq!(silence(100, 50, &[]), 1000, "nothing is known of the distance yet");
+        assert_eq!(silence(100, 50, &[3_600_000]), 10_000, "a pause is not a distance");
+    }
+
+    #[test]
+    fn rates_are_those_since_the_last_look() {
+        let start = Instant::now();
+        let mut arrivals = arrivals(100, 50, start);
+        (0..50).for_each(|_| arrivals.note(Input::Reference, None, start));
+        arrivals.look(start + Duration::from_millis(500), &counters(100, 0));
+        assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (200.0, 100.0));
+        arrivals.look(start + Duration::from_millis(1500), &counters(110, 0));
+        assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (10.0, 0.0));
+    }
+
+    #[test]
+    fn one_producer_is_one_though_it_restarts_and_sends_a_late_message() {
+        let now = Instant::now();
+        let mut arrivals = arrivals(100, 50, now);
+        for series in [1, 1, 2, 2, 1, 2, 2, 3, 3] {
+            arrivals.note(GYRO, Some(series), now);
+        }
+        assert_eq!(arrivals.look(now, &counters(400, 19)), None);
+        assert_eq!(arrivals.look(now, &counters(800, 60)), None, "41 of 400 is below a fifth");
+    }
+
+    #[test]
+    fn runs_by_turns_and_late_ticks_galore_are_two() {
+        let now = Instant::now();
+        let mut arrivals = arrivals(100, 50, now);
+        for series in [1, 2, 1, 2, 1] {
+            arrivals.note(GYRO, Some(series), now);
+        }
+        assert!(arrivals.look(now, &counters(400, 0)).unwrap().contains("series 2 and 1"));
+        assert_eq!(arrivals.look(now, &counters(800, 0)), None, "it is over");
+        assert!(arrivals.look(now, &counters(1200, 200)).unwrap().contains("200 of 400"));
+    }
+}
