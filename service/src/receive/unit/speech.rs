@@ -15,7 +15,7 @@ use isotherm_protocol::pair::{Role, UnitRole};
 use isotherm_protocol::replay::Follower;
 
 use super::{Plan, UnitActor};
-use crate::control::swap_manager::Notice;
+use crate::control::Notice;
 use kept::Kept;
 
 /// How often the memory is asked for while none comes.
