@@ -101,13 +101,13 @@ boot:
 static:
     packaging/static
 
-# Build the package in two folders and compare the bytes (twice a full build)
-reproducible:
-    packaging/reproducible
+# Build the packages in two folders and compare the bytes (twice a full build; --rehearse: unoptimised)
+reproducible *options:
+    packaging/reproducible {{options}}
 
-# Make a release in target/release-VERSION: checks, packages, static programs, SBOM, checksums
-release:
-    packaging/release
+# Make a release in target/release-VERSION: checks, packages, static programs, SBOM, checksums (--rehearse: without checks, unoptimised)
+release *options:
+    packaging/release {{options}}
 
 # Run the demo briefly and print its figures
 demo:

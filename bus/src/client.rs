@@ -57,8 +57,17 @@ pub enum Role {
 #[derive(Debug, Clone)]
 pub struct Way {
     config: Config,
-    tried: Vec<String>,
+    /// Who says where it leads: the variable, or the user's file.
+    said_by: Option<String>,
     name: Option<String>,
+}
+
+/// What the options, the variable and the user's file say together.
+#[derive(Debug)]
+struct Stated {
+    options: SessionOptions,
+    /// Who says where the service is, if it is neither the command line nor the default.
+    said_by: Option<String>,
 }
 
 /// What the file of a user may say.
@@ -92,11 +101,11 @@ impl ClientOptions {
     /// # Errors
     /// [`BusError::Endpoint`], [`BusError::UserFile`], [`BusError::Configuration`] and [`BusError::Option`].
     pub fn way(&self, role: Role) -> Result<Way, BusError> {
-        let mut options = self.stated()?;
-        if options.config.is_none() && options.connect.is_empty() && options.listen.is_empty() {
-            options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
+        let mut stated = self.stated()?;
+        if !says_where(&stated.options) {
+            stated.options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
         }
-        options.way(role)
+        stated.way(role)
     }
 
     /// The way for who needs no service: where nothing says where to connect, it is a peer on its own.
@@ -107,12 +116,11 @@ impl ClientOptions {
         self.stated()?.way(role)
     }
 
-    fn stated(&self) -> Result<SessionOptions, BusError> {
+    fn stated(&self) -> Result<Stated, BusError> {
         self.resolved(std::env::var(CONNECT_VARIABLE).ok().as_deref(), user_file().as_deref())
     }
 
-    /// What the options, the variable and the user's file say together.
-    fn resolved(&self, variable: Option<&str>, file: Option<&Path>) -> Result<SessionOptions, BusError> {
+    fn resolved(&self, variable: Option<&str>, file: Option<&Path>) -> Result<Stated, BusError> {
         let mut options = SessionOptions {
             config: self.zenoh_config.clone(),
             connect: self.connect.clone(),
@@ -120,12 +128,14 @@ impl ClientOptions {
             namespace: self.namespace.clone(),
             lease: None,
         };
-        let said = |options: &SessionOptions| {
-            options.config.is_some() || !options.connect.is_empty() || !options.listen.is_empty()
-        };
+        let mut said_by = None;
         let user = file.map_or(Ok(UserKeys::default()), read_user_file)?;
-        options.namespace = options.namespace.or(user.namespace);
-        if !said(&options) {
+        let mut of_file = SessionOptions::default();
+        if options.namespace.is_none() {
+            options.namespace.clone_from(&user.namespace);
+            of_file.namespace = user.namespace;
+        }
+        if !says_where(&options) {
             let endpoints = variable.unwrap_or_default().split(',').map(str::trim);
             for text in endpoints.filter(|text| !text.is_empty()) {
                 let read = endpoint(text).map_err(|reason| BusError::Endpoint {
@@ -134,48 +144,59 @@ impl ClientOptions {
                     reason,
                 });
                 options.connect.push(read?);
+                said_by = Some(CONNECT_VARIABLE.to_owned());
             }
         }
-        if !said(&options) {
+        if let Some(file) = file
+            && !says_where(&options)
+        {
             options.connect = user.connect;
-            options.config = user.zenoh_config.map(|path| match file.and_then(Path::parent) {
-                Some(folder) => folder.join(path),
-                None => path.into(),
-            });
+            options.config = user.zenoh_config.map(|path| file.parent().unwrap_or(Path::new("")).join(path));
+            of_file.config.clone_from(&options.config);
+            said_by = says_where(&options).then(|| file.display().to_string());
         }
-        Ok(options)
+        match (of_file.to_config(), file) {
+            (Err(error), Some(file)) => Err(BusError::UserFile(vec![format!("{}: {error}", file.display())])),
+            _ => Ok(Stated { options, said_by }),
+        }
     }
 }
 
-impl SessionOptions {
-    fn way(&self, role: Role) -> Result<Way, BusError> {
-        let mut config = self.to_config()?;
+/// Whether options say where the service is.
+fn says_where(options: &SessionOptions) -> bool {
+    options.config.is_some() || !options.connect.is_empty() || !options.listen.is_empty()
+}
+
+impl Stated {
+    fn way(self, role: Role) -> Result<Way, BusError> {
+        let Self { options, said_by } = self;
+        let mut config = options.to_config()?;
         if role == Role::Listener
-            && self.config.is_none()
-            && self.connect.len() == 1
-            && self.listen.is_empty()
+            && options.config.is_none()
+            && options.connect.len() == 1
+            && options.listen.is_empty()
         {
             set(&mut config, "mode", "client")?;
             set(&mut config, "listen/endpoints", Vec::<String>::new())?;
         }
-        if self.config.is_none() && !self.connect.is_empty() {
+        if options.config.is_none() && !options.connect.is_empty() {
             // Once: what does not answer is reported at once, not after many trials.
             set(&mut config, "connect/timeout_ms", 0)?;
         }
-        let tried = match endpoints(&config, "connect/endpoints") {
-            tried if tried.is_empty() => endpoints(&config, "listen/endpoints"),
-            tried => tried,
-        };
         let name = common_name(&config);
-        Ok(Way { config, tried, name })
+        Ok(Way { config, said_by, name })
     }
 }
 
 impl Way {
-    /// Endpoints at which the service is looked for.
+    /// Endpoints at which the service is looked for, and who says so, in words.
     #[must_use]
-    pub fn tried(&self) -> &[String] {
-        &self.tried
+    pub fn tried(&self) -> String {
+        let tried = match endpoints(&self.config, "connect/endpoints") {
+            tried if tried.is_empty() => endpoints(&self.config, "listen/endpoints"),
+            tried => tried,
+        };
+        tried.join(", ") + &from(self.said_by.as_deref())
     }
 
     /// Common name of the certificate that is shown there; `None` without one.
@@ -220,10 +241,16 @@ impl Way {
             Ok(Err(join)) => join.into(),
             Err(_) => format!("not connected within {limit:?}").into(),
         };
-        let config = self.config.clone();
-        let known = tokio::task::spawn_blocking(move || obstacle::after(&config, limit)).await;
+        let (config, said_by) = (self.config.clone(), self.said_by.clone());
+        let known =
+            tokio::task::spawn_blocking(move || obstacle::after(&config, limit, said_by.as_deref())).await;
         Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
     }
+}
+
+/// The words behind an endpoint that name who says it.
+pub(crate) fn from(said_by: Option<&str>) -> String {
+    said_by.map_or_else(String::new, |source| format!(" (from {source})"))
 }
 
 /// Reads the user's file; one that is not there says nothing.
@@ -259,7 +286,7 @@ mod tests {
     use super::*;
 
     fn connect(options: &ClientOptions, variable: Option<&str>, file: Option<&Path>) -> Vec<String> {
-        options.resolved(variable, file).unwrap().connect
+        options.resolved(variable, file).unwrap().options.connect
     }
 
     #[test]
@@ -273,13 +300,17 @@ mod tests {
         assert_eq!(connect(&nothing, Some("b:2, tls/d:4"), Some(&file)), ["tcp/b:2", "tls/d:4"]);
         assert_eq!(connect(&nothing, Some(""), Some(&file)), ["tcp/c:3"]);
         assert_eq!(connect(&nothing, None, Some(&folder.path().join("none/x"))), Vec::<String>::new());
-        let tried = |way: Result<Way, BusError>| way.unwrap().tried().to_vec();
-        assert_eq!(tried(given.way(Role::Peer)), ["tcp/a:1"]);
-        assert_eq!(tried(given.way_if_stated(Role::Listener)), ["tcp/a:1"]);
+        let tried = |way: Result<Way, BusError>| way.unwrap().tried();
+        assert_eq!(tried(given.way(Role::Peer)), "tcp/a:1");
+        assert_eq!(tried(given.way_if_stated(Role::Listener)), "tcp/a:1");
+        let way = |variable, file| tried(nothing.resolved(variable, file).unwrap().way(Role::Peer));
+        assert_eq!(way(Some("b:2,d:4"), Some(&*file)), "tcp/b:2, tcp/d:4 (from ISOTHERM_CONNECT)");
+        assert_eq!(way(None, Some(&*file)), format!("tcp/c:3 (from {})", file.display()));
         let listens = ClientOptions { listen: vec!["tcp/a:1".to_owned()], ..nothing.clone() };
         assert_eq!(connect(&listens, Some("b:2"), Some(&file)), Vec::<String>::new());
         // The site does not depend on who says where the service is.
-        assert_eq!(given.resolved(None, Some(&file)).unwrap().namespace.as_deref(), Some("site/c"));
+        let resolved = given.resolved(None, Some(&file)).unwrap();
+        assert_eq!(resolved.options.namespace.as_deref(), Some("site/c"));
     }
 
     #[test]
@@ -300,5 +331,18 @@ mod tests {
             key.contains("client.toml:2:1: namespaces") && key.contains("did you mean `namespace`?"),
             "{key}"
         );
+        for (text, part) in [
+            ("namespace = \"a//b\"\n", "namespace = \"a//b\" is not valid"),
+            ("zenoh_config = \"none.json5\"\n", "none.json5"),
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let error = nothing.resolved(None, Some(&file)).unwrap_err();
+            let words = error.to_string();
+            assert!(
+                error.is_configuration() && words.starts_with(&format!("{}: ", file.display())),
+                "{words}"
+            );
+            assert!(words.contains(part), "{words}");
+        }
     }
 }

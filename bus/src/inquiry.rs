@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use isotherm_protocol::codec;
 use isotherm_protocol::journal::JournalPart;
-use tokio::sync::mpsc::unbounded_channel;
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use tokio::time::{Instant, timeout, timeout_at};
 use zenoh::Session;
 use zenoh::query::{ConsolidationMode, Querier, QueryTarget, Reply};
@@ -13,16 +13,16 @@ use zenoh::sample::Sample;
 
 use crate::BusError;
 
-/// The replies of all who answer a question, and whether their end has come within `limit` too.
+/// Asks all who answer a question; their replies come until `limit`, and end before where all have answered.
 ///
 /// # Errors
 /// [`BusError::Declare`].
-pub async fn ask_all(
+pub async fn ask_each(
     session: &Session,
     selector: &str,
     limit: Duration,
-) -> Result<(Vec<Reply>, bool), BusError> {
-    let (sender, mut replies) = unbounded_channel();
+) -> Result<UnboundedReceiver<Reply>, BusError> {
+    let (sender, replies) = unbounded_channel();
     // Not Zenoh's own queue: it holds the receive thread up where it is full.
     let callback = move |reply| drop(sender.send(reply));
     session
@@ -33,6 +33,19 @@ pub async fn ask_all(
         .callback(callback)
         .await
         .map_err(|source| BusError::Declare { key: selector.to_owned(), source })?;
+    Ok(replies)
+}
+
+/// The replies of all who answer a question, and whether their end has come within `limit` too.
+///
+/// # Errors
+/// [`BusError::Declare`].
+pub async fn ask_all(
+    session: &Session,
+    selector: &str,
+    limit: Duration,
+) -> Result<(Vec<Reply>, bool), BusError> {
+    let mut replies = ask_each(session, selector, limit).await?;
     let mut all = Vec::new();
     let collected = timeout(limit, async {
         while let Some(reply) = replies.recv().await {

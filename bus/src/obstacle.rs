@@ -7,6 +7,7 @@ use std::time::Duration;
 use zenoh::Config;
 
 use crate::BusError;
+use crate::client::from;
 use crate::endpoint::{address, host_and_port};
 use crate::session::endpoints;
 
@@ -41,16 +42,16 @@ fn listen(endpoint: &str) -> Result<(), BusError> {
     Err(BusError::Listen { endpoint: address(endpoint).to_owned(), reason })
 }
 
-/// What has kept a session from connecting within `limit`.
-pub(crate) fn after(config: &Config, limit: Duration) -> Option<BusError> {
+/// What has kept a session from connecting within `limit`, to endpoints that `said_by` has named.
+pub(crate) fn after(config: &Config, limit: Duration, said_by: Option<&str>) -> Option<BusError> {
     let endpoints = endpoints(config, "connect/endpoints");
-    let reasons: Vec<_> = endpoints.iter().filter_map(|endpoint| silent(endpoint, limit)).collect();
+    let reasons: Vec<_> = endpoints.iter().filter_map(|endpoint| silent(endpoint, limit, said_by)).collect();
     (!reasons.is_empty()).then(|| BusError::Unreachable { reasons })
 }
 
 /// Why nothing came of an endpoint, with what to do next.
-fn silent(endpoint: &str, limit: Duration) -> Option<String> {
-    let at = address(endpoint);
+fn silent(endpoint: &str, limit: Duration, said_by: Option<&str>) -> Option<String> {
+    let at = address(endpoint).to_owned() + &from(said_by);
     let address = host_and_port(endpoint)?;
     let elsewhere = "give the service's address: --connect HOST:PORT or ISOTHERM_CONNECT";
     let addresses: Vec<SocketAddr> = match address.to_socket_addrs() {

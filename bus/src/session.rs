@@ -208,7 +208,7 @@ pub async fn open_config(config: Config) -> Result<Session, BusError> {
         Ok(session) => Ok(session),
         Err(source) => {
             let waited = started.elapsed();
-            let known = tokio::task::spawn_blocking(move || obstacle::after(&config, waited)).await;
+            let known = tokio::task::spawn_blocking(move || obstacle::after(&config, waited, None)).await;
             Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
         }
     }

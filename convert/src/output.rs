@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use flate2::{Compression, write::GzEncoder};
-use isotherm_log::file::refuse_overwriting;
+use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 use isotherm_protocol::key::UnitId;
 
 use isotherm_log::error::Error;
@@ -35,11 +35,10 @@ impl Place {
     pub fn check(&self, path: &Path) -> Result<(), Error> {
         let inputs: Vec<_> = self.inputs.iter().map(PathBuf::as_path).collect();
         refuse_overwriting(path, &inputs)?;
-        if !self.overwrite && path.symlink_metadata().is_ok() {
-            let path = path.display();
-            return Err(Error::Usage(format!("{path} exists: give another name, or --overwrite")));
+        if path.exists() && !path.is_file() {
+            return Err(Error::Usage(format!("{} is no file: give another name", path.display())));
         }
-        Ok(())
+        refuse_replacing(path, self.overwrite)
     }
 
     /// Refuses a folder that has something in it, or a file in its place.

@@ -53,6 +53,19 @@ pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
     }
 }
 
+/// Refuses an output that would replace what is there, unless it may; a device or a pipe is written to as it is.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn refuse_replacing(out: &Path, overwrite: bool) -> Result<(), Error> {
+    // A link that leads nowhere is something, too.
+    let there = out.is_file() || out.is_dir() || (out.is_symlink() && !out.exists());
+    if there && !overwrite {
+        return Err(Error::Usage(format!("{} exists: give another name, or --overwrite", out.display())));
+    }
+    Ok(())
+}
+
 /// Writes a file beside its place and moves it there: on a full disk the old one stays, and nothing is there by halves. One that is
 /// there only where that is allowed.
 ///
@@ -104,6 +117,19 @@ mod tests {
         }
         let null = Path::new("/dev/null");
         assert!(refuse_overwriting(null, &[null]).is_ok());
+
+        std::os::unix::fs::symlink(path("nowhere"), path("dangling.csv")).unwrap();
+        for (out, allowed) in [
+            ("log.csv", false),
+            ("link.csv", false),
+            ("dangling.csv", false),
+            (".", false),
+            ("new.csv", true),
+        ] {
+            assert_eq!(refuse_replacing(&path(out), false).is_ok(), allowed, "{out}");
+            assert!(refuse_replacing(&path(out), true).is_ok(), "{out}");
+        }
+        assert!(refuse_replacing(null, false).is_ok());
     }
 
     #[test]

@@ -61,7 +61,7 @@ impl Client {
     pub(super) async fn open(args: &ClientArgs) -> Result<Self, ConsoleError> {
         let way = args.session.way(Role::Peer)?;
         let session = way.open(args.timeout).await?;
-        let (tried, name) = (way.tried().join(", "), way.name().map(ToOwned::to_owned));
+        let (tried, name) = (way.tried(), way.name().map(ToOwned::to_owned));
         Ok(Self { session, timeout: args.timeout, tried, name })
     }
 

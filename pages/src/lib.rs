@@ -50,7 +50,7 @@ use encode::Store;
 const STYLE: &str = include_str!("style.css");
 
 /// The parts of the script that draw a chart, in this order: class `Chart` of the last draws into a figure what a shape says,
-/// numbers from its method `list`. The first three know nothing of the page and are tested by themselves.
+/// numbers from its method `list`. The first two know nothing of the page and are tested by themselves.
 pub const CHART_SCRIPT: [&str; 5] = [
     include_str!("script/scale.js"),
     include_str!("script/samples.js"),
@@ -59,8 +59,8 @@ pub const CHART_SCRIPT: [&str; 5] = [
     include_str!("script/chart.js"),
 ];
 
-/// Charts of a page: they take their numbers from it, and one can zoom into them.
-const ZOOM_SCRIPT: &str = include_str!("script/zoom.js");
+/// Charts of a page: they take their numbers from it, can have lanes, and one can zoom into them.
+const PAGE_SCRIPT: [&str; 2] = [include_str!("script/pages.js"), include_str!("script/zoom.js")];
 
 /// A table whose first column names the rows.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -158,8 +158,9 @@ impl Page {
             String::new()
         } else {
             format!(
-                "<script>\n\"use strict\";\n(() => {{\n{}{ZOOM_SCRIPT}}})();\n</script>\n",
-                CHART_SCRIPT.concat()
+                "<script>\n\"use strict\";\n(() => {{\n{}{}}})();\n</script>\n",
+                CHART_SCRIPT.concat(),
+                PAGE_SCRIPT.concat()
             )
         };
         format!(

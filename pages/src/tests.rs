@@ -122,7 +122,7 @@ fn a_page_without_charts_has_no_script() {
 
 #[test]
 fn the_script_maps_decimates_and_labels_as_it_should_where_node_is_there() {
-    let parts = CHART_SCRIPT.get(..2).unwrap().concat();
+    let parts = [&CHART_SCRIPT[..2], &PAGE_SCRIPT[..1]].concat().concat();
     let script = format!(
         "\"use strict\";\nconst assert = require('assert');\n{parts}\n{}",
         include_str!("script/tests.js")
@@ -146,7 +146,7 @@ fn the_whole_script_can_be_parsed_where_node_is_there() {
     let path = folder.path().join("script.js");
     std::fs::write(
         &path,
-        format!("\"use strict\";\n(() => {{\n{}{ZOOM_SCRIPT}}})();\n", CHART_SCRIPT.concat()),
+        format!("\"use strict\";\n(() => {{\n{}{}}})();\n", CHART_SCRIPT.concat(), PAGE_SCRIPT.concat()),
     )
     .unwrap();
     match Command::new("node").arg("--check").arg(&path).output() {

@@ -32,10 +32,13 @@ pub use memory::{MEMORY_VERSION, MemoryError};
 use outgoing::Last;
 pub use outgoing::Outgoing;
 pub use revisions::InForce;
-use revisions::Revisions;
+use revisions::{Given, Revisions};
 
 use crate::codec::{self, CodecError};
+use crate::control::Schedule;
 use crate::corrected::{Head, Revision};
+use crate::digest::Digest;
+use crate::journal::JournalEvent;
 use crate::key::{Input, RawStream, UnitId};
 use crate::raw::{self, HealthBatch};
 use crate::reference::Reference;
@@ -360,6 +363,24 @@ impl UnitStream {
         self.unit
             .calibration()
             .map_or_else(Revision::default, |(_, counter)| self.revisions.revision(counter))
+    }
+
+    /// The calibrations that the unit was given and has not passed, as a journal says it: the one in force, and one that waits for its
+    /// tick. `text` finds a document by its digest.
+    pub fn given(&self, text: impl Fn(&Digest) -> Option<String>) -> impl Iterator<Item = JournalEvent> {
+        let in_force = self.unit.calibration().map(|(_, counter)| (counter, Schedule::NextTick));
+        let pending = self.unit.pending().map(|(counter, at)| (counter, at.into()));
+        in_force.into_iter().chain(pending).filter_map(move |(counter, at)| {
+            let Given { revision, label, slew, .. } = self.revisions.find(counter)?;
+            Some(JournalEvent::Changed {
+                revision: *revision,
+                at,
+                slew_ns: slew.as_ns(),
+                document: label.digest.as_ref().and_then(&text),
+                overlay: label.overlay,
+                source: label.source.clone(),
+            })
+        })
     }
 
     /// The unit's state machine, to look at.

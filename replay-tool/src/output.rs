@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use clap::ValueEnum;
+use isotherm_log::file::refuse_replacing;
 
 pub use isotherm_log::offline::rows::{write_frame, write_header, write_tick};
 
@@ -38,11 +39,14 @@ impl Output {
     /// Creates a file, or takes standard output for `-`.
     ///
     /// # Errors
-    /// [`Error::Log`] where it cannot be created.
-    pub fn create(path: &Path) -> Result<Self, Error> {
+    /// [`Error::Log`] where it cannot be created, or is there already and may not be replaced.
+    pub fn create(path: &Path, overwrite: bool) -> Result<Self, Error> {
         let writer: Box<dyn Write> = match path.to_str() {
             Some("-") => Box::new(io::stdout()),
-            _ => Box::new(File::create(path).map_err(|source| Error::file(path, "create", source))?),
+            _ => {
+                refuse_replacing(path, overwrite)?;
+                Box::new(File::create(path).map_err(|source| Error::file(path, "create", source))?)
+            }
         };
         Ok(Self { writer: BufWriter::with_capacity(1 << 16, writer), name: path.display().to_string() })
     }

@@ -94,6 +94,11 @@ impl Pair {
         self.others.read().unwrap_or_else(PoisonError::into_inner).values().cloned().collect()
     }
 
+    /// Whether another instance of the pair is there.
+    fn is_there(&self, instance: &str) -> bool {
+        self.others.read().unwrap_or_else(PoisonError::into_inner).contains_key(instance)
+    }
+
     /// Whether there are any.
     pub(crate) fn has_others(&self) -> bool {
         self.accompanied.load(Ordering::Acquire)

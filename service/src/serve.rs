@@ -15,7 +15,7 @@ use crate::config::Settings;
 use crate::control::revision::Calibrations;
 use crate::logging::LogArgs;
 use crate::observe::metrics::Endpoint;
-use crate::service::{open_store, start_on};
+use crate::service::{open_store, start_on, tell_state};
 use crate::supervisor;
 use crate::{ServiceError, Totals};
 
@@ -153,6 +153,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
         }
     };
 
+    tell_state(&settings);
     let state = open_store(settings.state.as_deref())?;
     let awaited = settings.zenoh.session.awaited()?;
     let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;

@@ -66,6 +66,7 @@ pub struct RunningService {
 /// [`ServiceError::Metrics`] where the configured address cannot be had; [`ServiceError::Declare`] and
 /// [`ServiceError::Thread`].
 pub async fn start(settings: Settings, session: Session) -> Result<RunningService, ServiceError> {
+    tell_state(&settings);
     start_with(settings, Calibrations::default(), session).await
 }
 
@@ -132,7 +133,7 @@ pub(crate) async fn start_on(
         None => None,
     };
     // First to hear the others: what they have published of a tick that comes now is to be known.
-    let (questions, _asker) = Asker::start(&session, &pair, &intake, inbox.clone());
+    let (questions, _tasks) = Asker::start(&session, &pair, &intake, inbox.clone());
     let watch = Watch::start(&session, &pair, &intake, questions).await?;
     let inputs = (&pair, settings.units.as_slice(), &pulse);
     let declared = Declared::new(&session, &intake, &status_publisher.bell(), &inbox, inputs).await?;
@@ -172,12 +173,7 @@ async fn members(session: &Session) -> Result<Vec<Member>, ServiceError> {
 ///
 /// Before any port is taken: who starts a service twice is to read that it runs already, not that a port is taken.
 pub(crate) fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
-    let Some(folder) = folder else {
-        tracing::warn!(
-            "no state folder is configured (`state`): swaps and history are lost when the service ends"
-        );
-        return Ok((Store::in_memory(), Opened::default()));
-    };
+    let Some(folder) = folder else { return Ok((Store::in_memory(), Opened::default())) };
     let (store, opened) = Store::open(folder)?;
     for warning in opened.warnings() {
         tracing::warn!("{warning}");
@@ -187,6 +183,15 @@ pub(crate) fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), Servi
     }
     tracing::info!(folder = %folder.display(), entries = opened.entries, "state folder opened");
     Ok((store, opened))
+}
+
+/// Says what a service without a state folder forgets. Who starts one with calibrations of its own, as the demo does, knows it.
+pub(crate) fn tell_state(settings: &Settings) {
+    if settings.state.is_none() {
+        tracing::warn!(
+            "no state folder is configured (`state`): swaps and history are lost when the service ends"
+        );
+    }
 }
 
 /// Says what is wrong with the folder of trusted keys: it is read again at each swap, and now is the time to mend it.

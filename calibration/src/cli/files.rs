@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_log::file::refuse_overwriting;
+use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 
 use crate::document::written::write_file;
 use crate::error::Error;
@@ -58,7 +58,7 @@ impl Files<'_> {
     /// Checks the files of one unit of several, before any of them is looked at.
     pub(super) fn check_unit(&self, unit: &str) -> Result<(), Error> {
         let mut outputs = self.out.into_iter().chain(self.html);
-        outputs.try_for_each(|out| keep(&of_unit(out, unit), self.overwrite))
+        outputs.try_for_each(|out| Ok(refuse_replacing(&of_unit(out, unit), self.overwrite)?))
     }
 
     /// Writes the page, where one is wanted, under what its name is turned into.
@@ -77,7 +77,7 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
     if out.is_dir() {
         return Err(Error::Usage(format!("{} is a folder: give the name of a file in it", out.display())));
     }
-    keep(out, overwrite)?;
+    refuse_replacing(out, overwrite)?;
     let folder = match out.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
@@ -97,14 +97,6 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
         )));
     }
     probe(out, folder).map_err(|source| Error::file(out, "write", source))
-}
-
-/// Leaves a file alone that is there, unless it may be written over.
-fn keep(out: &Path, overwrite: bool) -> Result<(), Error> {
-    if out.exists() && !overwrite {
-        return Err(Error::Usage(format!("{} exists: give another name, or --overwrite", out.display())));
-    }
-    Ok(())
 }
 
 /// Tries whether a file can be written, and leaves everything as it was: permissions do not tell of a file system that is read only.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import unittest
+import unittest.mock
 from typing import Any
 
 import isotherm
@@ -221,6 +222,13 @@ class NoService(unittest.TestCase):
     def test_nobody_there_is_an_error_with_the_endpoint(self) -> None:
         with self.assertRaisesRegex(isotherm.BusError, "tcp/127.0.0.1:1: no service or router answers within 0.3 s"):
             isotherm.connect("tcp/127.0.0.1:1", timeout_s=0.3)
+
+    def test_the_environment_says_where_it_is(self) -> None:
+        with unittest.mock.patch.dict("os.environ", ISOTHERM_CONNECT=" 127.0.0.1:1,tcp/127.0.0.1:2"):
+            with self.assertRaisesRegex(isotherm.BusError, "tcp/127.0.0.1:1 or tcp/127.0.0.1:2: no service"):
+                isotherm.connect(timeout_s=0.3)
+            with self.assertRaisesRegex(isotherm.BusError, "^tcp/127.0.0.1:3: no service"):
+                isotherm.connect("127.0.0.1:3", timeout_s=0.3)
 
 
 if __name__ == "__main__":

@@ -45,7 +45,11 @@ fn environment_and_the_users_file_say_where_the_service_is() {
     // What stands in the variable counts before the file.
     let nobody = free();
     let both = [("XDG_CONFIG_HOME", home), ("ISOTHERM_CONNECT", nobody.as_str())];
-    refused(&status, &both, 1, &[&format!("tcp/{nobody}: nothing listens there")]);
+    refused(&status, &both, 1, &[&format!("tcp/{nobody} (from ISOTHERM_CONNECT): nothing listens there")]);
+    std::fs::write(user.join("client.toml"), format!("connect = [\"{nobody}\"]\n")).unwrap();
+    let file = user.join("client.toml").display().to_string();
+    let parts = [&*format!("tcp/{nobody} (from {file}): nothing listens there")];
+    refused(&status, &[("XDG_CONFIG_HOME", home)], 1, &parts);
     std::fs::write(user.join("client.toml"), "conect = [\"a:1\"]\n").unwrap();
     refused(
         &status,

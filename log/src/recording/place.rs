@@ -5,12 +5,14 @@ use std::io;
 use std::path::Path;
 
 use crate::error::Error;
+use crate::file::refuse_replacing;
 
 /// Creates a file to be written by nobody else at the same time.
 ///
 /// # Errors
-/// [`Error::File`]: it is there already and may not be written over, or somebody writes it.
+/// [`Error::Usage`] where it is there already and may not be written over, [`Error::File`] also where somebody writes it.
 pub(super) fn create(path: &Path, overwrite: bool) -> Result<File, Error> {
+    refuse_replacing(path, overwrite)?;
     let failed = |source| Error::file(path, "create the recording", source);
     let mut options = File::options();
     options.write(true);
@@ -20,10 +22,7 @@ pub(super) fn create(path: &Path, overwrite: bool) -> Result<File, Error> {
     } else {
         options.create_new(true)
     };
-    let file = options.open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::AlreadyExists => failed(io::Error::other("it exists already")),
-        _ => failed(source),
-    })?;
+    let file = options.open(path).map_err(failed)?;
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => return Err(failed(io::Error::other("it is being written"))),
         // A file system without locks is none to do without recordings for.

@@ -128,51 +128,6 @@ function strokeRuns(g, count, point, width) {
   g.stroke();
 }
 
-/** Rows of what is the case. */
-function drawLanes(g, view, lanes, rowHeight, colours, density) {
-  const columns = Math.max(1, Math.round(view.width * density));
-  const cache = new Map();
-  lanes.forEach((lane, row) => {
-    const top = view.top + row * rowHeight + 3, height = rowHeight - 6;
-    if (lane.stretches) {
-      for (const part of lane.stretches) drawStretch(g, view, part, top, height, colours);
-      return;
-    }
-    if (!cache.has(lane.samples)) {
-      cache.set(lane.samples, bitColumns(lane.samples, view.range, columns, x => view.to(x) * density));
-    }
-    const bits = cache.get(lane.samples);
-    g.fillStyle = colours[lane.ink];
-    for (let c = 0; c < columns; c++) {
-      if (!(bits[c] >>> lane.bit & 1)) continue;
-      let end = c + 1;
-      while (end < columns && bits[end] >>> lane.bit & 1) end++;
-      g.fillRect(view.left + c / density, top, Math.max((end - c) / density, 1), height);
-      c = end;
-    }
-  });
-}
-
-function drawStretch(g, view, part, top, height, colours) {
-  const from = Math.max(view.to(part.from), 0), to = Math.min(view.to(part.to), view.width);
-  if (to < 0 || from > view.width) return;
-  g.fillStyle = colours[part.ink];
-  g.globalAlpha = 0.3;
-  g.fillRect(view.left + from, top, Math.max(to - from, 1), height);
-  g.globalAlpha = 1;
-  g.fillRect(view.left + from, top, 1.5, height);
-  if (to - from < 24) return;
-  g.fillStyle = colours.ink;
-  g.textAlign = "left";
-  g.textBaseline = "middle";
-  g.save();
-  g.beginPath();
-  g.rect(view.left + from, top, to - from - 2, height);
-  g.clip();
-  g.fillText(part.label, view.left + from + 5, top + height / 2 + 0.5);
-  g.restore();
-}
-
 /** Lines where something happened; where they would bury the curves, short ones at the upper edge. */
 function drawMarks(g, view, marks, colours) {
   const inks = new Map();

@@ -1,19 +1,5 @@
 // The numbers of a chart: reading them, and what of them falls into a column of pixels. Nothing here knows the page.
 
-/** A typed array of its bytes, first ones first, compressed and in base64. */
-async function unpacked(text, type) {
-  const packed = Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
-  const array = { f64: Float64Array, f32: Float32Array, u32: Uint32Array }[type];
-  const [size, count] = [array.BYTES_PER_ELEMENT, planes.length / array.BYTES_PER_ELEMENT];
-  const bytes = new Uint8Array(planes.length);
-  for (let byte = 0; byte < size; byte++) {
-    for (let i = 0; i < count; i++) bytes[i * size + byte] = planes[byte * count + i];
-  }
-  return new array(bytes.buffer);
-}
-
 /** Samples with their lists read; `list` gives the array of a reference. */
 function resolved(samples, list) {
   const values = ref => ({ list: list(ref), middle: ref.middle ?? 0 });
@@ -100,22 +86,6 @@ function columnsOf(s, range, columns, to) {
     max[c] += s.max.middle;
   }
   return { min, max, mean };
-}
-
-/** The bits of all ticks of a column, joined. */
-function bitColumns(s, range, columns, to) {
-  const bits = new Uint32Array(columns);
-  const [from, end] = visible(s, range);
-  for (let i = from; i < end; i++) {
-    if (s.bits[i] === 0) continue;
-    // A bin fills its width; a tick reaches from the one before it.
-    const begin = s.x ? Math.max(i > 0 ? s.x[i - 1] : s.x[i], s.x[i] - s.usual) : s.first + i * s.width;
-    const stop = s.x ? s.x[i] : begin + s.width;
-    const first = Math.max(Math.floor(to(begin)), 0);
-    const last = Math.min(Math.max(Math.ceil(to(stop)), first + 1), columns);
-    for (let c = first; c < last; c++) bits[c] |= s.bits[i];
-  }
-  return bits;
 }
 
 /** The value range of a part of the axis: of all extremes, or, without outliers, of 98 in 100 means. */

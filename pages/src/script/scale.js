@@ -100,25 +100,11 @@ function clock(seconds, step) {
   return sign + (h ? h + ":" + String(m).padStart(2, "0") : m) + ":" + tail;
 }
 
-/** What a part of the axis is after zooming by `factor` about `at`, held inside `whole`. */
-function zoomed([low, high], at, factor, whole, least) {
-  const span = Math.min(Math.max((high - low) * factor, least), whole[1] - whole[0]);
-  const share = (at - low) / (high - low);
-  return held([at - share * span, at + (1 - share) * span], whole);
-}
-
 /** A range with a share of itself more at either end. */
 function widened([low, high], share, logarithmic) {
   if (logarithmic) return widened([Math.log(low), Math.log(high)], share, false).map(Math.exp);
   const by = share * (high - low);
   return [low - by, high + by];
-}
-
-/** A part of the axis moved so far that it lies inside `whole`. */
-function held([low, high], whole) {
-  const span = Math.min(high - low, whole[1] - whole[0]);
-  const from = Math.min(Math.max(low, whole[0]), whole[1] - span);
-  return [from, from + span];
 }
 
 /** Place on the axis to pixel, and back. */

@@ -1,4 +1,4 @@
-// Tests of scale.js and samples.js, run behind them by tests.rs.
+// Tests of scale.js, samples.js and pages.js, run behind them by tests.rs.
 
 const values = ticks => ticks.values.map(value => Number(value.toPrecision(12)));
 const equal = assert.deepStrictEqual;

@@ -69,7 +69,7 @@ pub struct Follower {
     gone: u64,
     /// Behind the first anchor, by number; while there is no memory those of every instance.
     entries: Vec<(JournalEntry, u64)>,
-    /// How many of [`Self::entries`] the stream was not given.
+    /// How many of [`Self::entries`], the last ones, the stream was not given.
     waiting: usize,
 }
 
@@ -103,15 +103,13 @@ impl Follower {
     /// Whether entries wait for their frames.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
-        self.waiting > 0
+        self.has_joined() && self.waiting > 0
     }
 
-    /// The memory must be taken anew.
+    /// The memory must be taken anew. Entries behind the next one may have come already.
     pub fn lose(&mut self) {
         self.anchors.clear();
         self.memory = None;
-        // Entries behind the next memory may have come already.
-        self.waiting = 0;
     }
 
     /// Notes a frame that the stream is given.
@@ -137,6 +135,7 @@ impl Follower {
             if !same {
                 self.lose();
                 self.entries.retain(|(other, _)| is_behind(other, &entry));
+                self.waiting = self.waiting.min(self.entries.len());
                 self.memory = Some((entry, now_ns));
             }
             return !same;
@@ -156,7 +155,7 @@ impl Follower {
             self.entries.remove(0);
         }
         self.entries.insert(place.min(self.entries.len()), (entry, now_ns));
-        self.waiting += usize::from(self.has_joined());
+        self.waiting = self.entries.len().min(self.waiting + 1);
         true
     }
 
@@ -200,36 +199,56 @@ impl Follower {
             }
             return (None, false);
         }
-        let first = self.entries.len().saturating_sub(self.waiting);
         let late = |(_, at_ns): &(JournalEntry, u64)| at_ns.saturating_add(LONGEST_WAIT_NS) < now_ns;
         let Some(last) = self.entries.last() else { return (None, false) };
         if !reaches(&own.heard(), &last.0.heard) {
-            let stuck = self.entries.iter().skip(first).any(late);
+            let stuck = self.untaken().any(late);
             if stuck {
                 self.lose();
             }
             return (None, stuck);
         }
-        // Back to before the first of them.
-        let before = self.entries.get(first).map(|(entry, _)| entry.heard);
-        while let (Some(anchor), Some(before)) = (self.anchors.back(), &before) {
-            if reaches(before, &anchor.entry.heard) {
-                break;
-            }
-            self.anchors.pop_back();
-        }
-        let Some(anchor) = self.anchors.pop_back() else {
-            self.lose();
-            return (None, true);
-        };
-        let rebuilt = self.rebuild(&anchor, true);
-        self.anchors.push_back(anchor);
-        self.waiting = 0;
+        let rebuilt = self.give_waiting();
         let stuck = !rebuilt.as_ref().is_some_and(|rebuilt| rebuilt.exact);
         if stuck {
             self.lose();
         }
         (rebuilt, stuck)
+    }
+
+    /// The other service is not followed any more: what it did to the unit is done to `own` too, though frames that came before it there are
+    /// missing here. What is given back takes the stream's place.
+    pub fn finish(mut self, own: &mut UnitStream) -> Option<Rebuilt> {
+        let waiting: Vec<_> = self.untaken().map(|(entry, _)| entry.clone()).collect();
+        let rebuilt = self.give_waiting();
+        if rebuilt.is_none() {
+            let orders = |event: &&JournalEvent| {
+                matches!(event, JournalEvent::Changed { .. } | JournalEvent::Commanded { .. })
+            };
+            for event in waiting.iter().map(|entry| &entry.event).filter(orders) {
+                // A revision that the stream was given before is passed over.
+                let _ = own.carry_out(event);
+            }
+        }
+        rebuilt
+    }
+
+    /// Entries that the stream was not given.
+    fn untaken(&self) -> impl Iterator<Item = &(JournalEntry, u64)> {
+        self.entries.iter().skip(self.entries.len().saturating_sub(self.waiting))
+    }
+
+    /// A stream that goes on from before the first entry that waits; `None` where none is known from before it.
+    fn give_waiting(&mut self) -> Option<Rebuilt> {
+        let before = self.untaken().next()?.0.heard;
+        while self.anchors.back().is_some_and(|anchor| !reaches(&before, &anchor.entry.heard)) {
+            self.anchors.pop_back();
+        }
+        let anchor = self.anchors.pop_back()?;
+        let rebuilt = self.rebuild(&anchor, true);
+        self.anchors.push_back(anchor);
+        self.waiting = 0;
+        rebuilt
     }
 
     fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {

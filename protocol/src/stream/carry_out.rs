@@ -108,6 +108,16 @@ impl From<Schedule> for At {
     }
 }
 
+impl From<At> for Schedule {
+    fn from(at: At) -> Self {
+        match at {
+            At::NextTick => Self::NextTick,
+            At::Sequence(sequence) => Self::Sequence(sequence),
+            At::Time(time) => Self::TimeNs(time.as_ns()),
+        }
+    }
+}
+
 impl UnitStream {
     /// Does what the service did, between the same two frames: where [`UnitStream::heard`] is what the entry says.
     ///

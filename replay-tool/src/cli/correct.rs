@@ -36,6 +36,9 @@ pub(super) struct CorrectArgs {
     /// Corrected ticks: a file for one unit (- for stdout), a folder ending in /, or FILE.mcap for all (default: none)
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
+    /// Replace existing files
+    #[arg(long)]
+    overwrite: bool,
     /// Format, except for FILE.mcap (default: csv)
     #[arg(long, value_enum, hide_short_help = true)]
     format: Option<Format>,

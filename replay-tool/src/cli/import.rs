@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use isotherm_cli::Exit;
 use isotherm_correction::units::Span;
-use isotherm_log::file::{refuse_overwriting, write_whole};
+use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
 use isotherm_log::mapping::{Encoding, Mapping};
@@ -129,12 +129,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
     let inputs: Vec<_> = args.log.iter().map(PathBuf::as_path).collect();
     for path in std::iter::once(&out).chain(&page) {
         refuse_overwriting(path, &inputs)?;
-        if path.exists() && !args.overwrite {
-            return Err(Error::Usage(format!(
-                "{} exists: give another name, or --overwrite",
-                path.display()
-            )));
-        }
+        refuse_replacing(path, args.overwrite)?;
     }
     let mut hints = args.hints();
     let mut proposal = settled(args, &mut hints)?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{read_small_text, refuse_overwriting, write_whole};
+use isotherm_log::file::{read_small_text, refuse_overwriting, refuse_replacing, write_whole};
 use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
@@ -48,6 +48,9 @@ pub(super) struct PlotArgs {
     /// HTML file to write
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    overwrite: bool,
     /// Most bins per curve; up to three times as many ticks are drawn one by one
     #[arg(long, value_name = "BINS", default_value_t = DETAIL, value_parser = clap::value_parser!(u32).range(64..=1_048_576))]
     detail: u32,
@@ -101,6 +104,7 @@ pub(super) fn first_plot(log: &LogArgs, out: &Path) -> Result<(), Error> {
         beside_unit: Vec::new(),
         calibration: None,
         out: out.to_owned(),
+        overwrite: true,
         detail: DETAIL,
         json: false,
     };
@@ -124,6 +128,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     inputs.extend(other.iter().flat_map(LogArgs::inputs));
     inputs.extend(args.calibration.clone());
     refuse_overwriting(&args.out, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    refuse_replacing(&args.out, args.overwrite)?;
     let calibration = args.calibration.as_deref();
     let calibration =
         calibration.map(|path| read_small_text(path, "read the calibration document")).transpose()?;

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::{print, seconds, show};
 use crate::error::Error;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
-use isotherm_log::file::{read_small_text, refuse_overwriting};
+use isotherm_log::file::{read_small_text, refuse_overwriting, refuse_replacing};
 use isotherm_log::mapping::Mapping;
 
 /// Simulate a log, with the mapping that reads it back
@@ -45,6 +45,9 @@ pub(super) struct SimulateArgs {
     /// Truth to write: increments, temperatures and drifts
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// Replace existing files
+    #[arg(long)]
+    overwrite: bool,
     /// Seed of all noise (default: the scenario's)
     #[arg(long)]
     seed: Option<u64>,
@@ -128,11 +131,12 @@ impl SimulateArgs {
         Ok(scenario)
     }
 
-    /// Refuses files that are given twice, or would be written over the scenario.
+    /// Refuses files that are given twice, that would be written over the scenario, or that are there already.
     fn refuse_overwriting(&self, out: &Path, mapping: &Path) -> Result<(), Error> {
         let mut others: Vec<&Path> = self.scenario.as_deref().into_iter().collect();
         for file in [Some(out), Some(mapping), self.truth.as_deref()].into_iter().flatten() {
             refuse_overwriting(file, &others)?;
+            refuse_replacing(file, self.overwrite)?;
             others.push(file);
         }
         Ok(())

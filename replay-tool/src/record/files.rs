@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use isotherm_log::file::refuse_replacing;
 use isotherm_log::recording::is_being_written;
 
 use crate::error::Error;
@@ -50,12 +51,8 @@ impl Files {
         if let Some(path) = found.iter().find(|path| is_being_written(path)) {
             return Err(Error::Usage(format!("{} is being written by another recorder", path.display())));
         }
-        match found.first() {
-            Some(path) if !overwrite => {
-                Err(Error::Usage(format!("{} exists: give another name, or --overwrite", path.display())))
-            }
-            _ => Ok(files),
-        }
+        found.first().map_or(Ok(()), |path| refuse_replacing(path, overwrite))?;
+        Ok(files)
     }
 
     /// The next file to be written. Before the first, those of an earlier recording of the same name are deleted, so that

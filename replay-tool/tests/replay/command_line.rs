@@ -160,14 +160,14 @@ fn completions_and_presets_go_to_standard_output() {
     let presets = stdout(&replay(folder.path(), &["simulate", "--list-presets"]));
     assert_eq!(presets.lines().count(), 6);
     for name in presets.lines().map(|line| line.split_whitespace().next().unwrap()) {
-        let output =
-            replay(folder.path(), &["simulate", "--preset", name, "--duration", "1", "--out", "x.csv.gz"]);
-        check(&output, 0, "");
+        let out = ["--out", "x.csv.gz", "--overwrite"];
+        let preset = ["simulate", "--preset", name, "--duration", "1"];
+        check(&replay(folder.path(), &[&preset[..], &out].concat()), 0, "");
         // What is printed is the same scenario.
         let bytes = fs::read(folder.path().join("x.csv.gz")).unwrap();
         let printed = replay(folder.path(), &["simulate", "--print-preset", name, "--duration", "1"]);
         fs::write(folder.path().join("mine.toml"), stdout(&printed)).unwrap();
-        check(&replay(folder.path(), &["simulate", "mine.toml", "--out", "x.csv.gz"]), 0, "");
+        check(&replay(folder.path(), &[&["simulate", "mine.toml"], &out[..]].concat()), 0, "");
         assert_eq!(fs::read(folder.path().join("x.csv.gz")).unwrap(), bytes, "{name}");
     }
     let output = replay(folder.path(), &["simulate", "--print-preset", "none"]);
@@ -210,6 +210,45 @@ fn no_output_is_written_over_an_input() {
     check(&replay(path, &[&simulate[..], &["x.mapping.toml"]].concat()), 2, "would be overwritten");
     assert_eq!(fs::read(path.join("mems.csv")).unwrap(), before);
     assert!(!path.join("x.csv").exists());
+}
+
+#[test]
+fn what_is_there_already_is_kept_unless_it_may_be_replaced() {
+    let folder = simulated();
+    let path = folder.path();
+    let calibration = calibration();
+    let log = ["mems.csv", "-c", &calibration];
+    for name in ["x.csv", "x.mcap", "x.html", "z.mapping.toml"] {
+        fs::write(path.join(name), "mine").unwrap();
+    }
+    fs::create_dir(path.join("units")).unwrap();
+    check(
+        &replay(path, &[&["convert"], &log[..1], &["-u", "MEMS-0001", "--out", "raw.mcap"]].concat()),
+        0,
+        "",
+    );
+    fs::write(path.join("units/MEMS-0001.csv"), "mine").unwrap();
+    let preset = ["simulate", "--preset", "mems-chamber", "--duration", "1"];
+    let kept: [(Vec<&str>, &str); 7] = [
+        ([&["correct"], &log[..], &["--out", "x.csv"]].concat(), "x.csv"),
+        ([&["correct"], &log[..], &["--out", "x.mcap"]].concat(), "x.mcap"),
+        (["correct", "raw.mcap", "-c", &calibration, "--out", "units/"].to_vec(), "units/MEMS-0001.csv"),
+        ([&["plot"], &log[..], &["--out", "x.html"]].concat(), "x.html"),
+        ([&preset[..], &["--out", "x.csv"]].concat(), "x.csv"),
+        // A log whose mapping would replace another one, or its truth.
+        ([&preset[..], &["--out", "z.csv"]].concat(), "z.mapping.toml"),
+        ([&preset[..], &["--out", "y.csv", "--truth", "x.html"]].concat(), "x.html"),
+    ];
+    for (arguments, name) in kept {
+        let words = format!("{name} exists: give another name, or --overwrite");
+        check(&replay(path, &arguments), 2, &words);
+        assert!(fs::read(path.join(name)).unwrap() == b"mine", "{arguments:?}");
+        assert!(!path.join("y.csv").exists(), "all is refused, not one file of several");
+        check(&replay(path, &[&arguments[..], &["--overwrite"]].concat()), 0, "");
+        assert!(fs::read(path.join(name)).unwrap() != b"mine", "{arguments:?}");
+        fs::write(path.join(name), "mine").unwrap();
+    }
+    check(&correct(path, &["--out", "/dev/null"]), 0, "");
 }
 
 #[test]

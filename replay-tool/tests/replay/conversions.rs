@@ -72,7 +72,7 @@ fn simulated_logs_come_back_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let presets = stdout(&replay(folder.path(), &["simulate", "--list-presets"]));
     for name in presets.lines().map(|line| line.split_whitespace().next().unwrap()) {
-        let simulate = ["simulate", "--preset", name, "--duration", "20", "--out", "log.csv"];
+        let simulate = ["simulate", "--preset", name, "--duration", "20", "--out", "log.csv", "--overwrite"];
         check(&replay(folder.path(), &simulate), 0, "");
         there_and_back(&folder.path().join("log.mapping.toml"), &folder.path().join("log.csv"));
     }

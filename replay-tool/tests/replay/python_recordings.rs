@@ -30,11 +30,9 @@ fn python_reads_what_convert_writes() {
     let options = RecordingOptions { json: true, ..RecordingOptions::default() };
     let mut writer = RecordingWriter::create(&path.join("log.mcap"), options).unwrap();
     for (unit, preset) in UNITS {
-        check(
-            &replay(path, &["simulate", "--preset", preset, "--duration", "20", "--out", "log.csv"]),
-            0,
-            "",
-        );
+        let simulate =
+            ["simulate", "--preset", preset, "--duration", "20", "--out", "log.csv", "--overwrite"];
+        check(&replay(path, &simulate), 0, "");
         record(path, unit, &mut writer);
     }
     writer.finish().unwrap();

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use isotherm_bus::inquiry::{ask_all, memories};
+use isotherm_bus::inquiry::{ask_all, ask_each};
 use isotherm_protocol::codec;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::AuditEntry;
@@ -23,38 +23,35 @@ use crate::receive::intake::Intake;
 
 /// How long an answer is waited for.
 const LIMIT: Duration = Duration::from_secs(2);
+/// How long the next question for memories waits for the answers to the one before: a connection may have been lost with it.
+const NEXT_MEMORY: Duration = Duration::from_millis(500);
 /// How long after an entry of the journal histories are asked for: by then what follows from it is in the audit file, as a rule; and
 /// once more, for the first tick of a calibration.
 const DELAYS: [Duration; 2] = [Duration::from_millis(200), Duration::from_millis(1500)];
 /// Entries of a history that are asked for.
 const ENTRIES: u32 = 1000;
 
-/// What is asked for.
-#[derive(Debug)]
-enum Question {
-    Memory(UnitId),
-    /// Of one unit, or of all.
-    Records(Option<UnitId>),
-}
-
 /// Where questions are handed in.
 #[derive(Debug, Clone)]
-pub(crate) struct Questions(UnboundedSender<Question>);
+pub(crate) struct Questions {
+    memories: UnboundedSender<UnitId>,
+    records: UnboundedSender<Option<UnitId>>,
+}
 
 impl Questions {
     /// The memory of a unit.
     pub(super) fn memory(&self, unit: UnitId) {
-        let _ = self.0.send(Question::Memory(unit));
+        let _ = self.memories.send(unit);
     }
 
     /// The histories of a unit, or of all, and the documents in them.
     pub(super) fn records(&self, unit: Option<UnitId>) {
-        let _ = self.0.send(Question::Records(unit));
+        let _ = self.records.send(unit);
     }
 }
 
-/// The task that asks; it ends with the last [`Questions`].
-#[derive(Debug)]
+/// What is asked with; its tasks end with the last [`Questions`].
+#[derive(Debug, Clone)]
 pub(crate) struct Asker {
     session: Session,
     pair: Arc<Pair>,
@@ -63,20 +60,37 @@ pub(crate) struct Asker {
 }
 
 impl Asker {
-    /// Starts it. The first it finds out is which units other instances speak for.
+    /// Starts its tasks: a memory is not to wait until histories have come. The first they find out is which units other instances
+    /// speak for.
     pub(crate) fn start(
         session: &Session,
         pair: &Arc<Pair>,
         intake: &Arc<Intake>,
         inbox: Inbox,
-    ) -> (Questions, JoinHandle<()>) {
-        let (sender, questions) = unbounded_channel();
+    ) -> (Questions, [JoinHandle<()>; 2]) {
+        let (memories, memories_due) = unbounded_channel();
+        let (records, records_due) = unbounded_channel();
         let asker =
             Self { session: session.clone(), pair: Arc::clone(pair), intake: Arc::clone(intake), inbox };
-        (Questions(sender), tokio::spawn(asker.run(questions)))
+        let tasks = [
+            tokio::spawn(asker.clone().ask_memories(memories_due)),
+            tokio::spawn(asker.ask_records(records_due)),
+        ];
+        (Questions { memories, records }, tasks)
     }
 
-    async fn run(self, mut questions: UnboundedReceiver<Question>) {
+    async fn ask_memories(self, mut questions: UnboundedReceiver<UnitId>) {
+        while let Some(unit) = questions.recv().await {
+            let mut units = BTreeSet::from([unit]);
+            while let Ok(unit) = questions.try_recv() {
+                units.insert(unit);
+            }
+            let answered = tokio::spawn(self.clone().memories(units));
+            let _ = tokio::time::timeout(NEXT_MEMORY, answered).await;
+        }
+    }
+
+    async fn ask_records(self, mut questions: UnboundedReceiver<Option<UnitId>>) {
         if self.pair.is_opening() {
             self.records(None).await;
             let spoken = self.spoken().await;
@@ -88,21 +102,11 @@ impl Asker {
             let next = due.values().flatten().min().copied();
             let wait =
                 next.map_or(Duration::from_secs(3600), |next| next.saturating_duration_since(Instant::now()));
-            let mut units = BTreeSet::new();
             match tokio::time::timeout(wait, questions.recv()).await {
                 Ok(None) => break,
-                Ok(Some(question)) => {
-                    let mut question = Some(question);
-                    while let Some(asked) = question {
-                        match asked {
-                            Question::Memory(unit) => drop(units.insert(unit)),
-                            Question::Records(unit) => {
-                                let now = Instant::now();
-                                due.entry(unit).or_default().extend(DELAYS.map(|delay| now + delay));
-                            }
-                        }
-                        question = questions.try_recv().ok();
-                    }
+                Ok(Some(unit)) => {
+                    let now = Instant::now();
+                    due.entry(unit).or_default().extend(DELAYS.map(|delay| now + delay));
                 }
                 Err(_) => {
                     let now = Instant::now();
@@ -119,9 +123,6 @@ impl Asker {
                     }
                     due.retain(|_, at| !at.is_empty());
                 }
-            }
-            if !units.is_empty() {
-                self.memories(&units).await;
             }
         }
     }
@@ -151,29 +152,39 @@ impl Asker {
         units.filter_map(|unit| UnitId::new(&unit.unit).ok()).collect()
     }
 
-    /// Has units go on from the memory of the instance that speaks for them.
-    async fn memories(&self, units: &BTreeSet<UnitId>) {
+    /// Has units go on from the memory of the instance that speaks for them, each as it comes.
+    async fn memories(self, mut units: BTreeSet<UnitId>) {
         let all = units.len() > 8;
         let selectors: Vec<_> =
             if all { vec![key::ALL_JOURNALS.to_owned()] } else { units.iter().map(key::journal).collect() };
+        let mut joiner = Joiner::new();
         for selector in selectors {
-            let samples = self.ask(&selector).await;
-            for (_, frames) in memories(&samples) {
-                let mut joiner = Joiner::new();
-                let parts = frames.iter().filter_map(|frame| codec::decode::<JournalPart>(frame).ok());
-                let entry = parts.filter_map(|part| joiner.join(part).ok().flatten()).last();
-                let Some(entry) = entry.filter(|entry| entry.instance != self.pair.me().instance) else {
+            let mut replies = match ask_each(&self.session, &selector, LIMIT).await {
+                Ok(replies) => replies,
+                Err(error) => {
+                    tracing::warn!("{error}");
+                    continue;
+                }
+            };
+            while let Some(reply) = replies.recv().await {
+                let Ok(sample) = reply.into_result() else { continue };
+                let part = codec::decode::<JournalPart>(&sample.payload().to_bytes()).ok();
+                let entry = part.and_then(|part| joiner.join(part).ok().flatten());
+                let entry = entry.filter(|entry| entry.instance != self.pair.me().instance);
+                let Some(unit) = entry.as_ref().and_then(|entry| UnitId::new(&entry.unit).ok()) else {
                     continue;
                 };
-                let Some(unit) = UnitId::new(&entry.unit).ok().filter(|unit| units.contains(unit)) else {
-                    continue;
-                };
-                let standing = self.pair.standing();
-                self.intake.with(&unit, |actor| {
-                    if !actor.speaks() {
-                        actor.hear_journal(entry, Instant::now(), &standing);
+                if let Some(entry) = entry.filter(|_| units.remove(&unit)) {
+                    let standing = self.pair.standing();
+                    self.intake.with(&unit, |actor| {
+                        if !actor.speaks() {
+                            actor.hear_journal(entry, Instant::now(), &standing);
+                        }
+                    });
+                    if !all || units.is_empty() {
+                        break;
                     }
-                });
+                }
             }
         }
     }

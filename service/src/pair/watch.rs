@@ -159,13 +159,18 @@ impl Work {
         }
     }
 
-    /// An entry of another instance's journal.
+    /// An entry of another instance's journal. Who speaks takes nothing of one that is none of the pair.
     fn entry(&self, entry: JournalEntry) {
         let Ok(unit) = UnitId::new(&entry.unit) else { return };
         let is_written_down =
             matches!(entry.event, JournalEvent::Changed { .. } | JournalEvent::Commanded { .. });
         let standing = self.pair.standing();
-        self.intake.with(&unit, |actor| actor.hear_journal(entry, Instant::now(), &standing));
+        let is_member = self.pair.is_there(&entry.instance);
+        self.intake.with(&unit, |actor| {
+            if is_member || !actor.speaks() {
+                actor.hear_journal(entry, Instant::now(), &standing);
+            }
+        });
         if is_written_down {
             self.questions.records(Some(unit));
         }

@@ -9,6 +9,7 @@ mod rates;
 mod seen;
 mod speech;
 mod stream_timeout;
+mod unknown_channels;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -40,6 +41,7 @@ pub use present::Present;
 pub(crate) use seen::TickSeen;
 pub(crate) use speech::{Alarm, Footing, Standing, Wants};
 pub use stream_timeout::StreamTimeoutSettings;
+use unknown_channels::UnknownChannels;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
 pub type Outlet = Box<dyn FnMut(Vec<u8>) -> Result<(), zenoh::Error> + Send>;
@@ -63,6 +65,7 @@ pub struct UnitActor {
     stream_timeout: StreamTimeout,
     rates: Rates,
     producers: Producers,
+    unknown_channels: UnknownChannels,
     notices: NoticeCollector,
     journal_writer: JournalWriter,
     speech: Speech,
@@ -103,6 +106,7 @@ impl UnitActor {
             stream_timeout: StreamTimeout::new(stream_timeout),
             rates: Rates::new(Instant::now()),
             producers: Producers::default(),
+            unknown_channels: UnknownChannels::default(),
             notices: NoticeCollector::default(),
             journal_writer: JournalWriter::default(),
             speech: Speech::default(),
@@ -145,7 +149,7 @@ impl UnitActor {
             let (at, slew) = ((*at).into(), *slew);
             self.stream.schedule(unit::Change { calibration, revision: revision.counter, at, slew }, label)
         };
-        self.journal(|_| journal_writer::changed(change));
+        self.journal_order(|_| journal_writer::changed(change));
         replaced
     }
 
@@ -155,7 +159,7 @@ impl UnitActor {
     /// [`Refusal`]: the state is as before.
     pub fn command(&mut self, command: &Command) -> Result<State, Refusal> {
         let done = self.stream.command(command);
-        self.journal(|_| journal_writer::commanded(command, &done));
+        self.journal_order(|_| journal_writer::commanded(command, &done));
         // A self-test without a calibration changes no state, and yet has a report.
         self.status_due |= done.is_ok();
         self.look();
@@ -174,6 +178,9 @@ impl UnitActor {
         let taken = self.stream.receive(stream, frame);
         if stream == RawStream::Gyro && taken.is_ok() {
             self.producers.heard(self.stream.incoming_series(), arrival);
+        }
+        if stream == RawStream::Temperature {
+            self.unknown_channels.heard(self.stream.unit(), frame, arrival);
         }
         self.taken(taken, &format_args!("raw/{}", stream.chunk()), arrival);
     }

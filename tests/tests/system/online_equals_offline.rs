@@ -51,7 +51,7 @@ async fn i2_online_equals_offline_to_the_bit() {
             "isotherm-replay",
             &["correct", &log, "--mapping", &mapping, "--calibration", document, "--duration", &seconds]
                 .into_iter()
-                .chain(["--format", "wire", "--out", &corrected])
+                .chain(["--format", "wire", "--out", &corrected, "--overwrite"])
                 .collect::<Vec<_>>(),
         );
         let offline = ticks_of(Path::new(&corrected));

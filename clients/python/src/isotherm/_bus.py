@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pathlib
 from types import TracebackType
 from typing import Any, Callable
@@ -41,14 +42,15 @@ def connect(
     timeout_s: float = 10.0,
     name: str | None = None,
 ) -> Bus:
-    """Opens a session with the service or router at an endpoint (default: `ENDPOINT`), or with each of several; use it in a `with`
-    statement.
+    """Opens a session with the service or router at an endpoint (default: the environment's ISOTHERM_CONNECT, else `ENDPOINT`), or with
+    each of several; `host:port` is TCP. Use it in a `with` statement.
 
     Nothing is searched for on the network. `config` replaces the configuration altogether. `name` is the common name of your
     certificate, where access control asks for one: swaps and commands are given under it. Raises `BusError` if nobody is there within
     `timeout_s`.
     """
-    endpoints = endpoints or (ENDPOINT,)
+    stated = endpoints or tuple(filter(None, map(str.strip, os.environ.get("ISOTHERM_CONNECT", "").split(",")))) or (ENDPOINT,)
+    endpoints = tuple(endpoint if "/" in endpoint else f"tcp/{endpoint}" for endpoint in stated)
     if config is None:
         config = zenoh.Config()
         options: dict[str, Any] = {

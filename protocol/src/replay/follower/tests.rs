@@ -1,6 +1,6 @@
 //! A stream follows another one: frames at once, entries late, and the same bits in the end.
 
-use isotherm_correction::operation::Command;
+use isotherm_correction::operation::{Command, State};
 use isotherm_correction::sample::{GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
 
@@ -191,4 +191,27 @@ fn a_frame_that_was_lost_is_found_out_with_the_next_entry() {
     assert!(standby.go_on(), "the memory is to be asked for anew");
     assert!(!standby.follower.has_joined());
     assert!(standby.entry(leader.memory()));
+}
+
+#[test]
+fn an_order_that_waits_for_lost_frames_holds_when_the_leader_is_gone() {
+    for joins in [true, false] {
+        let (mut leader, mut standby) = joined();
+        if !joins {
+            standby.follower.lose();
+        }
+        for sequence in 500..600 {
+            leader.take(sequence);
+            if sequence != 550 {
+                standby.take(sequence);
+            }
+        }
+        standby.entry(leader.command(&Command::Standby));
+        assert_ne!(standby.stream.unit().state(), State::Standby);
+        let Standby { mut stream, follower, .. } = standby;
+        if let Some(rebuilt) = follower.finish(&mut stream) {
+            stream = rebuilt.stream;
+        }
+        assert_eq!(stream.unit().state(), State::Standby, "{joins}");
+    }
 }

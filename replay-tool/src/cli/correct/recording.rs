@@ -72,7 +72,7 @@ fn make(
 ) -> Result<Exit, Error> {
     let units: Vec<_> = plans.iter().map(|plan| plan.id.clone()).collect();
     let inputs: Vec<_> = args.log.inputs().into_iter().chain(args.calibration.iter().cloned()).collect();
-    let mut sink = Sink::open(args.out.as_deref(), args.format, &units, &inputs)?;
+    let mut sink = Sink::open(args, &units, &inputs)?;
     for path in documents {
         sink.document(read_small(path, "read the calibration document")?)?;
     }

@@ -2,14 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::create_dir_all;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use isotherm_log::file::refuse_overwriting;
+use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 use isotherm_log::offline::{Form, Made};
 use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 
+use super::CorrectArgs;
 use crate::error::Error;
 use crate::output::{Format, Output, write_header};
 
@@ -27,21 +28,17 @@ impl Sink {
     /// Opens it.
     ///
     /// # Errors
-    /// [`Error::Usage`] where several units do not fit, [`Error::Log`] where it cannot be created.
-    pub(super) fn open(
-        out: Option<&Path>,
-        format: Option<Format>,
-        units: &[UnitId],
-        inputs: &[PathBuf],
-    ) -> Result<Self, Error> {
-        let Some(out) = out else { return Ok(Self::None) };
+    /// [`Error::Usage`] where several units do not fit, [`Error::Log`] where it cannot be created or replaced.
+    pub(super) fn open(args: &CorrectArgs, units: &[UnitId], inputs: &[PathBuf]) -> Result<Self, Error> {
+        let CorrectArgs { out: Some(out), format, overwrite, .. } = args else { return Ok(Self::None) };
         let inputs: Vec<_> = inputs.iter().map(PathBuf::as_path).collect();
         if out.extension().is_some_and(|extension| extension == "mcap") {
             if format.is_some() {
                 return Err(Error::Usage("--format is for files other than FILE.mcap".to_owned()));
             }
             refuse_overwriting(out, &inputs)?;
-            let options = RecordingOptions { json: true, ..RecordingOptions::default() };
+            let options =
+                RecordingOptions { json: true, overwrite: *overwrite, ..RecordingOptions::default() };
             let writer = Box::new(RecordingWriter::create(out, options)?);
             return Ok(Self::Recording { writer, attached: BTreeSet::new(), received_ns: 0 });
         }
@@ -62,10 +59,13 @@ impl Sink {
                 )));
             }
         };
+        for path in &paths {
+            refuse_overwriting(path, &inputs)?;
+            refuse_replacing(path, *overwrite)?;
+        }
         let mut files = Vec::new();
         for path in paths {
-            refuse_overwriting(&path, &inputs)?;
-            let mut file = Output::create(&path)?;
+            let mut file = Output::create(&path, *overwrite)?;
             if format == Format::Csv {
                 file.write(|writer| write_header(writer))?;
             }

@@ -67,7 +67,8 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         let inputs = events.inner().paths().iter().chain(&mapping).map(PathBuf::as_path);
         refuse_overwriting(out, &inputs.chain([calibration]).collect::<Vec<_>>())?;
     }
-    let mut output = args.out.as_deref().map(Output::create).transpose()?;
+    let out = args.out.as_deref();
+    let mut output = out.map(|out| Output::create(out, args.overwrite)).transpose()?;
     if let Some(output) = output.as_mut().filter(|_| format == Format::Csv) {
         output.write(|writer| write_header(writer))?;
     }

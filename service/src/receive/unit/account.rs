@@ -67,9 +67,12 @@ impl UnitActor {
         });
         status.counters = self.counters();
         status.counters.extend(self.faults.counters());
-        if let Some(problem) = &self.account.problem {
+        let problem = self.account.problem.as_ref();
+        let untrusted = problem.map(|problem| standing("untrusted_calibration", 1, problem.clone()));
+        let unknown = self.unknown_channels.fault(self.stream.unit(), Instant::now());
+        for fault in untrusted.into_iter().chain(unknown) {
             status.faults.truncate(MAX_FAULTS - 1);
-            status.faults.push(standing("untrusted_calibration", 1, problem.clone()));
+            status.faults.push(fault);
         }
         // The core knows that it was given up, not what for.
         if let (Some(outcome), Some(reason)) = (&mut status.pre_launch_outcome, self.notices.given_up())

@@ -74,7 +74,21 @@ impl UnitActor {
     /// has heard what it had heard before.
     pub(super) fn journal(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
         // That of the instance that speaks is the unit's.
-        let Some(journal) = self.journal_writer.journal.as_ref().filter(|_| self.speaks()) else { return };
+        if self.speaks() {
+            self.write_entry(event);
+        }
+    }
+
+    /// Tells what was ordered here, though another instance may have begun to speak since the order was taken: that one does it too. What
+    /// a unit is given when it appears is none of this.
+    pub(super) fn journal_order(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
+        if self.speaks() || self.stream.heard().iter().any(|heard| heard.frames > 0) {
+            self.write_entry(event);
+        }
+    }
+
+    fn write_entry(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
+        let Some(journal) = &self.journal_writer.journal else { return };
         self.journal_writer.number += 1;
         let entry = JournalEntry {
             unit: self.stream.id().to_string(),

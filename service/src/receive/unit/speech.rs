@@ -9,10 +9,12 @@ mod output;
 
 use std::time::{Duration, Instant};
 
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::journal::JournalEntry;
 use isotherm_protocol::key::Input;
 use isotherm_protocol::pair::{Role, UnitRole};
 use isotherm_protocol::replay::Follower;
+use isotherm_protocol::stream::UnitStream;
 
 use super::{Plan, UnitActor};
 use crate::control::Notice;
@@ -116,6 +118,8 @@ struct Following {
     also_out: bool,
     /// Calibrations that came with the journal, the newest last.
     changes: Vec<JournalEntry>,
+    /// Documents that came with the other's memory.
+    documents: Vec<String>,
 }
 
 impl Following {
@@ -123,6 +127,23 @@ impl Following {
     fn lose(&mut self) {
         self.follower.lose();
         (self.asked, self.intact) = (None, false);
+    }
+
+    /// What the unit was given before the memory was taken may be in nobody else's audit file any more when the other instance is gone.
+    fn note_given(&mut self, stream: &UnitStream) {
+        let documents = std::mem::take(&mut self.documents);
+        let text =
+            |digest: &Digest| documents.iter().find(|text| Digest::of(text.as_bytes()) == *digest).cloned();
+        let (unit, instance) =
+            (stream.id().to_string(), self.follower.instance().unwrap_or_default().to_string());
+        let entry = |event| JournalEntry {
+            unit: unit.clone(),
+            instance: instance.clone(),
+            number: 0,
+            heard: stream.heard(),
+            event,
+        };
+        self.changes.splice(..0, stream.given(text).map(entry));
     }
 
     fn ns(&self, now: Instant) -> u64 {
@@ -151,6 +172,7 @@ impl UnitActor {
             listens: now,
             also_out: false,
             changes: Vec::new(),
+            documents: Vec::new(),
         }));
         self.status_due = true;
     }
@@ -188,6 +210,7 @@ impl UnitActor {
         let Some(following) = following else { return (self.outlet)(frame) };
         let now = Instant::now();
         let lacks = following.kept.computed(frame, now);
+        following.intact &= following.follower.has_joined() || !lacks;
         if !following.also_out {
             return Ok(());
         }
@@ -218,6 +241,7 @@ impl UnitActor {
         (following.isolated, following.intact) = (false, true);
         self.stream = rebuilt.stream;
         if !had_joined && following.follower.has_joined() {
+            following.note_given(&self.stream);
             tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the \
                 publishing instance");
         }
@@ -269,8 +293,10 @@ impl UnitActor {
         // Nor does a unit that sends nothing wait for ever.
         let still_silent = now.saturating_duration_since(following.listens) > standing.takeover * 2;
         let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, silence);
+        // Who has just yielded knows what the other does, before the other's memory has come.
+        let knows = joined || (following.intact && !following.doubt);
         let is_due =
-            lonely || (joined && (alone.is_some() || late)) || (following.doubt && (late || still_silent));
+            lonely || (knows && (alone.is_some() || late)) || (following.doubt && (late || still_silent));
         if is_due && !following.isolated {
             wants.spoke = !following.doubt;
             self.speak(now, standing.takeover);
@@ -288,7 +314,12 @@ impl UnitActor {
     /// last `overlap` is published again: of what it sent at its end, some may have come here and nowhere else.
     pub(crate) fn speak(&mut self, now: Instant, overlap: Duration) {
         let Some(following) = self.speech.following.take() else { return };
-        let Following { mut kept, doubt, changes, .. } = *following;
+        let Following { mut kept, doubt, changes, follower, .. } = *following;
+        // Of what an operator ordered nothing is lost with the instance that took it.
+        if let Some(rebuilt) = follower.finish(&mut self.stream) {
+            kept.replace(rebuilt.frames, true, now);
+            self.stream = rebuilt.stream;
+        }
         self.publish_kept(kept.due(now, overlap));
         if !doubt {
             self.speech.takeovers += 1;

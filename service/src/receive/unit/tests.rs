@@ -2,13 +2,13 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind};
+use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::{decode, encode};
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::stream::Label;
 
 use super::*;
@@ -113,6 +113,38 @@ fn a_bad_frame_is_counted_by_its_kind_and_changes_nothing_else() {
     assert_eq!(second.totals().bad, 120);
     assert_eq!(dirty.sequences().len(), 20);
     assert!(status.last_fault.is_some());
+}
+
+#[test]
+fn a_channel_that_the_calibration_does_not_have_is_named_while_one_of_its_own_is_silent() {
+    let mut actor = actor(Sink::default().outlet());
+    let laser = Document::parse(include_str!("../../../../config/calibration/ZLG-0001.toml"), None).unwrap();
+    install(&mut actor, Arc::new(laser.calibration), [1; 8]);
+    let temperatures = |time_ms: i64, channels: &[&str]| {
+        // In volts: 25 °C.
+        let (time, raw) = (Timestamp::from_ns(time_ms * 1_000_000), 1.75);
+        let reading = |name: &&str| TemperatureReading { channel: name.parse().unwrap(), time, raw };
+        encode(&TemperatureBatch { readings: channels.iter().map(reading).collect() }).unwrap()
+    };
+    let mut feed = |from: i64, channels: &[&str]| {
+        for sequence in from..from + 40 {
+            actor.receive(RawStream::Temperature, &temperatures(sequence * 5, channels), Instant::now());
+            for (stream, frame) in frames(u64::try_from(sequence).unwrap()) {
+                actor.receive(stream, &frame, Instant::now());
+            }
+        }
+        let faults = actor.status("test").faults;
+        faults.into_iter().find(|fault| fault.kind == "unknown_temperature_channel")
+    };
+    let others = ["gyro1", "gyro2", "accel0", "accel1", "accel2", "board", "housing"];
+    let with = |more: &[&'static str]| [&others, more].concat();
+    assert_eq!(feed(0, &with(&["gyro0"])), None);
+    // One more than the calibration asks for does no harm.
+    assert_eq!(feed(40, &with(&["gyro0", "case"])), None);
+    let fault = feed(4000, &with(&["Gyro0"])).expect("gyro0 is silent");
+    assert!(fault.first.contains("readings of case, Gyro0 arrive"), "{fault:?}");
+    assert!(fault.first.contains("waits for gyro0: ") && fault.count >= 40, "{fault:?}");
+    assert_eq!(feed(4040, &with(&["gyro0"])), None);
 }
 
 #[test]

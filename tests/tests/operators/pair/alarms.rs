@@ -7,6 +7,7 @@ use isotherm_bus::{SessionOptions, close, open};
 use isotherm_protocol::codec;
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
 use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::AuditEvent;
 use isotherm_protocol::key;
 use isotherm_protocol::service_status::ServiceStatus;
@@ -140,6 +141,47 @@ async fn a_second_producer_of_a_unit_is_an_alarm() {
         .await;
     assert!(words.contains("two producers") && words.contains("stop one of them"), "{words}");
     close(session, LIMIT).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_overlay_holds_when_the_instance_that_took_it_is_gone() {
+    let mut stand = Stand::start(1, &configuration("")).await;
+    until_compared(&stand.session, 1, 50).await;
+    let speaking = stand.speaker().await;
+    let of = Digest::of(base(UNIT).as_bytes());
+    let overlay = format!(
+        "schema = 1\noverlay_of = \"{of}\"\nunit = \"{UNIT}\"\n\n[[gyro]]\nname = \"x\"\n\
+         static_bias_change_deg_per_h = 0.5\nstatic_bias_sigma_deg_per_h = 0.004\n"
+    );
+    let reply = stand.operator.swap(UNIT, overlay.as_bytes(), &SwapOptions::default()).await.unwrap();
+    assert_eq!((reply.outcome, reply.revision), (SwapOutcome::Accepted, 2), "{reply:?}");
+    let holds = |status: &Status| {
+        let active = status.calibration.as_ref()?;
+        (active.revision.counter == 2).then_some(active.overlay)?
+    };
+    assert_eq!(stand.operator.until(UNIT, holds).await, Digest::of(overlay.as_bytes()));
+    until_paired(&stand.session, 1).await;
+    stand.pair.kill(speaking);
+    until_speaks(&stand.session, 1 - speaking, 1).await;
+    assert_eq!(stand.operator.until(UNIT, holds).await, Digest::of(overlay.as_bytes()));
+    // Another overlay lies on the base, not on the sum.
+    let second = overlay.replace("= 0.5", "= 0.25");
+    let reply = stand.operator.swap(UNIT, second.as_bytes(), &SwapOptions::default()).await.unwrap();
+    assert_eq!((reply.outcome, reply.revision), (SwapOutcome::Accepted, 3), "{reply:?}");
+    // The one that comes back has them too, text and all.
+    stand.restart(speaking);
+    until_paired(&stand.session, 1).await;
+    let kept = |text: &String| {
+        let name = format!("overlays/{}.toml", Digest::of(text.as_bytes()));
+        [0, 1].map(|index| std::fs::read_to_string(stand.pair.state(index).join(&name)).ok())
+    };
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    while [&overlay, &second].map(kept).iter().flatten().any(Option::is_none) {
+        assert!(tokio::time::Instant::now() < deadline, "{:?}", [&overlay, &second].map(kept));
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    stand.judged = 0;
+    stand.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -24,7 +24,7 @@ use crate::documents::{base, valid};
 
 const TICK: Duration = Duration::from_millis(5);
 /// How far ahead a swap is scheduled, in ticks: both services have heard of it by then.
-const AHEAD: u64 = 100;
+const AHEAD: u64 = 200;
 /// How long an instance of the pair may be silent before others give the connection up.
 pub(super) const LEASE: Duration = Duration::from_millis(500);
 
@@ -41,6 +41,8 @@ pub(super) struct Stand {
     over: Arc<AtomicBool>,
     playing: JoinHandle<()>,
     pub(super) revisions: Vec<u64>,
+    /// From which tick on the last of them is in force.
+    due: Vec<u64>,
     /// Units, the first ones, that are swapped and judged.
     pub(super) judged: usize,
     pub(super) dice: Dice,
@@ -66,7 +68,8 @@ impl Stand {
             move || Pair::start(&path, &documents, &extra)
         });
         let pair = starting.await.unwrap();
-        let session = pair.session().await;
+        // As docs/operations.md tells producers: a service that hangs holds nobody for longer.
+        let session = pair.session_with(Some(LEASE)).await;
         let sink = Sink::declare(&session).await;
         let mut sources = Vec::new();
         for (seed, (unit, document)) in (1..).zip(&documents) {
@@ -74,7 +77,7 @@ impl Stand {
         }
         let (sources, over) = (Arc::new(Mutex::new(sources)), Arc::default());
         let playing = tokio::spawn(play(Arc::clone(&sources), Arc::clone(&over)));
-        let (operator, revisions) = (Operator::new(session.clone()), vec![1; units]);
+        let (operator, revisions, due) = (Operator::new(session.clone()), vec![1; units], vec![0; units]);
         let stand = Self {
             _folder: folder,
             pair,
@@ -85,6 +88,7 @@ impl Stand {
             over,
             playing,
             revisions,
+            due,
             judged: units,
             dice: Dice::new(21),
             _turn: turn,
@@ -99,8 +103,17 @@ impl Stand {
 
     /// Puts another document in force, from a tick on that is still to come.
     pub(super) async fn swap(&mut self, index: usize) {
-        let mut sources = self.sources.lock().await;
+        // One that is replaced while it waits would be in force there and not here, or the other way round.
+        let mut sources = loop {
+            let sources = self.sources.lock().await;
+            if sources[index].last > self.due[index] + AHEAD / 10 {
+                break sources;
+            }
+            drop(sources);
+            tokio::time::sleep(TICK).await;
+        };
         let (unit, at) = (sources[index].unit().to_owned(), sources[index].last + AHEAD);
+        self.due[index] = at;
         let document = valid(&unit, &mut self.dice);
         self.revisions[index] += 1;
         sources[index].swap(&document, self.revisions[index], At::Sequence(at));

@@ -7,6 +7,9 @@ class Refused extends Error {
   }
 }
 
+/** What kept an answer away; `then` is what to do about silence. */
+const reason = (error, then = "") => error instanceof Refused ? error.message : "The service does not answer" + then + ".";
+
 const TOKEN = "isotherm-token";
 
 /** The token of the address bar is kept for this tab, and taken out of the bar. */

@@ -1,6 +1,7 @@
 // Another calibration for a unit: look at the difference, then put it in force.
 
 const BY = "isotherm-by";
+const NAMELESS = "Enter your name: it goes into the audit file.";
 
 /** Who asks, for the audit file; remembered on this computer, and the same in all fields. */
 function byField() {
@@ -14,6 +15,12 @@ function byField() {
       other.dispatchEvent(new Event("input"));
     }
   });
+  input.named = () => {
+    const name = input.value.trim();
+    if (!name) input.focus();
+    return name;
+  };
+  input.option = () => input.value.trim() ? " --by " + quoted(input.value.trim()) : "";
   return input;
 }
 
@@ -71,11 +78,8 @@ class Proposal {
   async ask(dryRun) {
     let asked;
     try { asked = this.question(dryRun); } catch (error) { return this.say("bad", error.message); }
-    const by = this.by.value.trim();
-    if (!dryRun && !by) {
-      this.by.focus();
-      return this.say("bad", "Enter your name: it goes into the audit file.");
-    }
+    const by = dryRun ? this.by.value.trim() : this.by.named();
+    if (!dryRun && !by) return this.say("bad", NAMELESS);
     this.look.disabled = this.act.disabled = true;
     this.say("", "Asking…");
     try {
@@ -83,7 +87,7 @@ class Proposal {
       const reply = await ask(path, { ...body, by });
       this.show(reply.swap === undefined && reply.allowed ? { refused: reply.reason } : reply.swap ?? reply);
     } catch (error) {
-      this.say("bad", error instanceof Refused ? error.message : "The service does not answer: look at the unit's history before you try again.");
+      this.say("bad", reason(error, ": look at the unit's history before you try again"));
     }
     this.look.disabled = false;
     this.page.history.load();
@@ -152,8 +156,8 @@ function swap(page) {
       slew_s: number(slew), at_sequence: number(at) }];
   };
   const line = () => ["isotherm swap", quoted(serial), quoted(file.files[0]?.name ?? serial + ".toml"),
-    slew.value && "--slew " + slew.value, at.value && "--at-sequence " + at.value, any.checked && "--any-serial", force.checked && "--force",
-    by.value.trim() && "--by " + quoted(by.value.trim())].filter(Boolean).join(" ") + page.options();
+    slew.value && "--slew " + slew.value, at.value && "--at-sequence " + at.value, any.checked && "--any-serial", force.checked && "--force"]
+    .filter(Boolean).join(" ") + by.option() + page.options();
   const proposal = new Proposal(page, by, question, line);
   file.addEventListener("change", async () => {
     if (file.files[0]) text.value = await file.files[0].text();
@@ -177,8 +181,7 @@ async function rollback(page) {
   const by = byField();
   const revision = () => choose.value === "" ? null : Number(choose.value);
   const question = dryRun => [unitPath(serial, "command"), { command: "rollback", revision: revision(), dry_run: dryRun }];
-  const line = () => ["isotherm rollback", quoted(serial), choose.value && "--to " + choose.value,
-    by.value.trim() && "--by " + quoted(by.value.trim())].filter(Boolean).join(" ") + page.options();
+  const line = () => "isotherm rollback " + quoted(serial) + (choose.value && " --to " + choose.value) + by.option() + page.options();
   const proposal = new Proposal(page, by, question, line);
   choose.addEventListener("change", () => proposal.renew());
   by.addEventListener("input", () => proposal.line.renew());

@@ -74,7 +74,7 @@ class LiveTicks {
         this.draw();
       } catch (error) {
         if (signal.aborted) return;
-        say(this.status, error instanceof Refused ? error.message : "The service does not answer.");
+        say(this.status, reason(error));
         await pause(1000, signal);
       }
     }

@@ -32,9 +32,8 @@ class CommandPart {
   }
 
   words(name, more = "") {
-    const by = this.by.value.trim();
     const place = name === "rest" || name === "pre-launch" ? more || " --latitude … --heading …" : more;
-    return "isotherm command " + quoted(this.page.serial) + " " + name + place + (by ? " --by " + quoted(by) : "") + this.page.options();
+    return "isotherm command " + quoted(this.page.serial) + " " + name + place + this.by.option() + this.page.options();
   }
 
   choose(name) {
@@ -69,18 +68,15 @@ class CommandPart {
   }
 
   async give(order) {
-    const by = this.by.value.trim();
-    if (!by) {
-      this.by.focus();
-      return this.tell("bad", "Enter your name: it goes into the audit file.");
-    }
+    const by = this.by.named();
+    if (!by) return this.tell("bad", NAMELESS);
     this.tell("", "Asking…");
     try {
       const reply = await ask(unitPath(this.page.serial, "command"), { ...order, by });
       const words = [reply.accepted ? reply.state : null, reply.reason].filter(Boolean).join("; ");
       this.tell(reply.accepted ? "good" : "bad", words);
     } catch (error) {
-      this.tell("bad", error instanceof Refused ? error.message : "The service does not answer: look at the unit's state before you try again.");
+      this.tell("bad", reason(error, ": look at the unit's state before you try again"));
     }
     return this.page.history.load();
   }

@@ -22,7 +22,7 @@ class HistoryPart {
       this.table.show(shown.map(row));
       say(this.note, shown.length ? "" : "Nothing yet.");
     } catch (error) {
-      say(this.note, error instanceof Refused ? error.message : "The service does not answer.");
+      say(this.note, reason(error));
     }
   }
 }

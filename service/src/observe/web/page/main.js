@@ -124,7 +124,7 @@ class App {
     try {
       await download(path, name + "-report-" + time + ".tar.gz");
     } catch (error) {
-      dialog("Fault report", make("p", { className: "bad" }, error instanceof Refused ? error.message : "The service does not answer."));
+      dialog("Fault report", make("p", { className: "bad" }, reason(error)));
     }
   }
 

@@ -4,11 +4,12 @@ use std::time::{Duration, Instant};
 
 use isotherm_correction::operation::State;
 use isotherm_protocol::codec;
-use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::raw::GyroBatch;
 
 use super::{Alarm, Footing, Standing};
+use crate::control::swap_manager::Notice;
 use crate::receive::unit::UnitActor;
 
 /// How long after the other instance is lost what the producer sent before may still come.
@@ -93,15 +94,52 @@ impl UnitActor {
         if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
             self.follow(now, Footing::All);
         }
-        let Some(following) = &mut self.speech.following else { return };
+        let Some(following) = &mut self.speech.following else {
+            self.adopt(entry);
+            return;
+        };
         let ns = following.ns(now);
         let change = matches!(entry.event, JournalEvent::Changed { .. }).then(|| entry.clone());
+        let documents = match &entry.event {
+            JournalEvent::Memory { document, pending, .. } => Some([document, pending].map(Clone::clone)),
+            _ => None,
+        };
         if following.follower.entry(entry, ns) {
+            if let Some(documents) = documents {
+                following.documents = documents.into_iter().flatten().collect();
+            }
             following.changes.extend(change);
             let beyond = following.changes.len().saturating_sub(MOST_CHANGES);
             following.changes.drain(..beyond);
         }
         self.catch_up(now);
+    }
+
+    /// Another instance that spoke too took an order: it holds here, as this one goes on.
+    fn adopt(&mut self, entry: JournalEntry) {
+        let given = |revision| self.stream.given(|_| None).any(|event| is_of(&event, revision));
+        let is_new = match &entry.event {
+            JournalEvent::Changed { revision, .. } => !given(*revision),
+            JournalEvent::Commanded { accepted, .. } => *accepted,
+            _ => false,
+        };
+        if !is_new {
+            return;
+        }
+        let (unit, name, before) = (self.stream.id().clone(), entry.event.name(), self.stream.unit().state());
+        if let Err(error) = self.stream.carry_out(&entry.event) {
+            tracing::warn!(%unit, instance = entry.instance, "{name} by another instance, not here: {error}");
+            return;
+        }
+        // A command that changed nothing is not told again, or two that speak would tell it to each other for ever.
+        let is_change = matches!(entry.event, JournalEvent::Changed { .. });
+        if is_change || self.stream.unit().state() != before {
+            tracing::info!(%unit, instance = entry.instance, "{name} by another instance: done here too");
+            self.journal(|_| entry.event.clone());
+            self.notices.push(Notice::Followed(Box::new(entry)));
+        }
+        self.status_due = true;
+        self.look();
     }
 
     /// Whether two speak for so long that it is an alarm.
@@ -120,4 +158,9 @@ impl UnitActor {
             ))
         })
     }
+}
+
+/// Whether an event gave the unit that revision.
+fn is_of(event: &JournalEvent, given: Revision) -> bool {
+    matches!(event, JournalEvent::Changed { revision, .. } if *revision == given)
 }

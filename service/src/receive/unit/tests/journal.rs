@@ -2,6 +2,7 @@
 
 use isotherm_correction::earth::Place;
 use isotherm_correction::prelaunch::PreLaunchSettings;
+use isotherm_correction::unit::At;
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::Input;
 
@@ -71,6 +72,13 @@ impl Bench {
             drop(self.follower.receive(stream, &frame));
         }
         self.same();
+    }
+
+    /// The actor alone is given frames.
+    fn hear(&mut self, frames: impl IntoIterator<Item = (RawStream, Vec<u8>)>) {
+        for (stream, frame) in frames {
+            self.actor.receive(stream, &frame, Instant::now());
+        }
     }
 
     /// The follower knows exactly what the actor's stream knows.
@@ -206,4 +214,54 @@ fn an_entry_that_cannot_be_published_is_counted() {
     let counter = actor.status("a1").counters.into_iter().find(|c| c.name == "journal_entries_unpublished");
     assert_eq!(counter.map(|counter| counter.value), Some(2));
     assert_eq!(actor.memory("a1").number, 2, "whoever reads misses them");
+}
+
+#[test]
+fn of_two_that_speak_each_does_what_the_other_was_ordered_once() {
+    let (mut first, mut second) = (Bench::new(), Bench::new());
+    let standing = Standing {
+        takeover: Duration::from_millis(20),
+        active: false,
+        yields: false,
+        alone_since: None,
+        deserted: false,
+    };
+    for bench in [&mut first, &mut second] {
+        bench.change(Schedule::NextTick, Span::ZERO);
+        bench.hear((0..40).flat_map(example_frames));
+        bench.tape.take();
+    }
+    first.change(Schedule::Sequence(50), Span::ZERO);
+    first.command(&Command::Standby);
+    let mut told = first.tape.take();
+    let names = |entries: &[JournalEntry]| entries.iter().map(|it| it.event.name()).collect::<Vec<_>>();
+    for teller in [true, false] {
+        assert_eq!(names(&told), ["changed", "commanded"]);
+        let hearer = if teller { &mut second } else { &mut first };
+        for entry in told {
+            hearer.actor.hear_journal(
+                JournalEntry { instance: "b2".into(), ..entry },
+                Instant::now(),
+                &standing,
+            );
+        }
+        told = hearer.tape.take();
+    }
+    assert_eq!(names(&told), [""; 0], "it is not told for ever");
+    let unit = |bench: &Bench| (bench.actor.stream.unit().pending(), bench.actor.stream.unit().state());
+    assert_eq!(unit(&second), unit(&first));
+    assert_eq!(unit(&second), (Some((2, At::Sequence(50))), State::Standby));
+}
+
+#[test]
+fn what_was_ordered_here_is_told_though_another_instance_speaks_by_now() {
+    let mut bench = Bench::new();
+    bench.actor.follow(Instant::now(), Footing::All);
+    bench.change(Schedule::NextTick, Span::ZERO);
+    assert_eq!(bench.tape.take().len(), 0, "as it appears");
+    bench.hear((0..40).flat_map(example_frames));
+    bench.change(Schedule::Sequence(50), Span::ZERO);
+    bench.command(&Command::Standby);
+    let told: Vec<_> = bench.tape.take().iter().map(|entry| entry.event.name()).collect();
+    assert_eq!(told, ["changed", "commanded"]);
 }

@@ -73,11 +73,30 @@ fn an_isolated_unit_that_lacks_ticks_says_nothing_of_them() {
 }
 
 #[test]
-fn a_unit_without_a_calibration_follows_whoever_goes_before_it() {
-    for yields in [true, false] {
+fn a_unit_that_has_just_yielded_and_lacks_nothing_speaks_again_where_the_other_is_silent() {
+    for (ticks, speaks) in [(30..40, true), (32..42, false)] {
+        let (mut actor, sink, start) = deserted();
+        let standing = Standing { alone_since: None, deserted: false, ..lost(start) };
+        actor.follow(start + ms(20), Footing::All);
+        give(&mut actor, ticks, start + ms(20));
+        // By the clock of this machine: frames are kept with the time at which they were computed.
+        let late = Instant::now() + TAKEOVER * 2;
+        assert_eq!(actor.watch_speech(late, &standing).spoke, speaks);
+        assert_eq!(sink.sequences().len(), if speaks { 40 } else { 30 });
+    }
+}
+
+#[test]
+fn of_two_that_speak_the_one_that_goes_before_goes_on() {
+    for (yields, calibrated) in [(true, true), (true, false), (false, true), (false, false)] {
         let (mut other, heard, now) = deserted();
         give(&mut other, 30..40, now);
         let (mut actor, ..) = deserted();
+        if calibrated {
+            let text = include_str!("../../../../../config/calibration/ZLG-0001.toml");
+            install(&mut actor, Arc::new(Document::parse(text, None).unwrap().calibration), [7; 8]);
+            give(&mut actor, 30..40, now);
+        }
         let standing =
             Standing { takeover: TAKEOVER, active: false, yields, alone_since: None, deserted: false };
         let batch = heard.0.lock().unwrap().last().cloned().unwrap();
