@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use isotherm_document::file::check_regular;
 use isotherm_protocol::digest::Digest;
@@ -97,9 +97,15 @@ impl Store {
         self.index.said_by_folder(unit)
     }
 
+    /// The file that a document is kept in; `None` where there is no state folder.
+    #[must_use]
+    pub fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
+        self.documents.file(digest)
+    }
+
     /// What problems of a document that is kept are to call it: its file, or what is given where there is no state folder.
     pub(crate) fn document_name(&self, digest: &Digest, otherwise: impl FnOnce() -> String) -> String {
-        self.documents.file(digest).map_or_else(otherwise, |file| file.display().to_string())
+        self.document_file(digest).map_or_else(otherwise, |file| file.display().to_string())
     }
 
     /// The newest entries of a unit, or of all, the oldest of them first: at most `limit`, and no more than 10 000. They are

@@ -7,7 +7,6 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::Input;
 
 use super::*;
-use crate::control::compressed::CompressedText;
 
 const EXAMPLE: &str = include_str!("../../../../../config/calibration/example-full.toml");
 
