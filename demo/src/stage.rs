@@ -10,7 +10,7 @@ use isotherm_protocol::key;
 use isotherm_protocol::status::Status;
 use zenoh::Session;
 
-use isotherm_service::control::calibrations::Calibrations;
+use isotherm_service::control::revision::Calibrations;
 use isotherm_service::{RunningService, Settings, start_with};
 
 use super::fleet::Member;

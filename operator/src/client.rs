@@ -129,8 +129,7 @@ impl Client {
         let first = self.answers(key, parameters, payload).await?.into_iter().next();
         let ended = || ConsoleError::Ended { key: key.to_owned(), tried: self.tried.clone() };
         let bytes = first.ok_or_else(ended)?;
-        String::from_utf8(bytes)
-            .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
+        String::from_utf8(bytes).map_err(unread(key))
     }
 
     /// The first answer to a question, from JSON.
@@ -141,20 +140,13 @@ impl Client {
         payload: Option<&[u8]>,
     ) -> Result<T, ConsoleError> {
         let text = self.text(key, parameters, payload).await?;
-        serde_json::from_str(&text)
-            .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
+        serde_json::from_str(&text).map_err(unread(key))
     }
 
     /// Every answer to a question, from frames; frames of another version are passed over with a word.
     async fn frames<M: Message>(&self, key: &str) -> Result<Vec<M>, ConsoleError> {
         let answers = self.answers(key, "", None).await?;
-        answers
-            .iter()
-            .map(|frame| {
-                codec::decode(frame)
-                    .map_err(|error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() })
-            })
-            .collect()
+        answers.iter().map(|frame| codec::decode(frame).map_err(unread(key))).collect()
     }
 
     /// Status of every unit, in the order of their serials.
@@ -180,13 +172,8 @@ impl Client {
     /// What every service instance does for which unit.
     pub(super) async fn pairs(&self) -> Result<Vec<PairReport>, ConsoleError> {
         let answers = self.answers(key::ALL_PAIRS, "", None).await?;
-        let read = |json: &Vec<u8>| {
-            serde_json::from_slice::<PairReport>(json).map_err(|error| ConsoleError::Answer {
-                key: key::ALL_PAIRS.to_owned(),
-                reason: error.to_string(),
-            })
-        };
-        let mut reports = answers.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        let read = |json: &Vec<u8>| serde_json::from_slice(json).map_err(unread(key::ALL_PAIRS));
+        let mut reports = answers.iter().map(read).collect::<Result<Vec<PairReport>, _>>()?;
         reports
             .sort_by(|a, b| (&a.member.name, &a.member.instance).cmp(&(&b.member.name, &b.member.instance)));
         Ok(reports)
@@ -196,6 +183,11 @@ impl Client {
     pub(super) async fn status(&self, unit: &UnitId) -> Result<Option<Status>, ConsoleError> {
         Ok(self.statuses().await?.into_iter().find(|status| status.unit == unit.as_str()))
     }
+}
+
+/// For `map_err`: an answer that cannot be read.
+fn unread<E: std::fmt::Display>(key: &str) -> impl Fn(E) -> ConsoleError {
+    move |error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() }
 }
 
 /// The serial that was given.

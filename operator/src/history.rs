@@ -10,6 +10,7 @@ use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key;
 
 use super::client::{self, Client, ClientArgs};
+use super::page::{of, short};
 use super::status::or_none;
 use super::{ConsoleError, show};
 
@@ -102,11 +103,10 @@ fn table(entries: &[AuditEntry]) -> String {
 /// One line of the table, and what changed.
 fn row(entry: &AuditEntry) -> (Vec<String>, String) {
     let AuditEntry { number, time, by, event, .. } = entry;
-    let head = |digest: &dyn std::fmt::Display| digest.to_string().chars().take(12).collect::<String>();
     let [revision, digest, from, changes] = match event {
         AuditEvent::Accepted(accepted) => [
             accepted.revision.to_string(),
-            head(&accepted.digest),
+            short(accepted.digest),
             source(&accepted.source),
             effect(accepted.schedule, accepted.slew_ms, &accepted.changed),
         ],
@@ -121,11 +121,11 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
         }
         AuditEvent::Refused(refused) => [
             String::new(),
-            head(&refused.digest),
+            short(refused.digest),
             source(&refused.source),
             format!(
                 "{}: {}",
-                show::count(usize::try_from(refused.count).unwrap_or(usize::MAX), "problem"),
+                of(usize::try_from(refused.count).unwrap_or(usize::MAX), "problem"),
                 refused.problems.first().map_or("", String::as_str)
             ),
         ],

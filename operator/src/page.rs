@@ -25,11 +25,12 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::status::Status;
 
 pub use figure::fit;
+pub(crate) use figure::{deg_per_h, of, short};
 pub use pairs::{of_unit, pairs, said as said_of_pairs};
 pub use remark::{Level, is_running, knows_rates, state_word};
 pub use services::{services, tally};
 pub use sheet::sheet;
-pub use units::{channel_in_view, length, range, units};
+pub use units::{applied, channel_in_view, range, units};
 
 /// A unit: its status, and what only an onlooker knows.
 #[derive(Debug, Clone)]
@@ -69,7 +70,7 @@ impl<'a> Unit<'a> {
     }
 }
 
-/// By how much counters grew over the last minute.
+/// Counters that stand in the line of a unit: by how much they grew over the last minute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Lately {
     /// Gaps announced.
@@ -84,6 +85,31 @@ pub struct Lately {
     pub stuck: bool,
 }
 
+impl Lately {
+    /// What the counters of a status have counted since its service started.
+    #[must_use]
+    pub fn counted(status: &Status) -> Self {
+        Self {
+            gaps: status.counter("gaps"),
+            duplicates: total(status, &["gyro_duplicates", "accel_duplicates"]),
+            late: total(status, &["gyro_late", "accel_late", "temperature_late", "references_late"]),
+            bad: status.counter("bad_frames"),
+            stuck: false,
+        }
+    }
+
+    /// By how much it has grown since then.
+    pub(crate) fn since(&self, before: &Self) -> Self {
+        Self {
+            gaps: self.gaps.saturating_sub(before.gaps),
+            duplicates: self.duplicates.saturating_sub(before.duplicates),
+            late: self.late.saturating_sub(before.late),
+            bad: self.bad.saturating_sub(before.bad),
+            stuck: false,
+        }
+    }
+}
+
 /// Every channel at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Past {
@@ -94,17 +120,6 @@ pub struct Past {
 }
 
 /// Counters that stand in one column.
-#[must_use]
-pub fn duplicates(status: &Status) -> u64 {
-    total(status, &["gyro_duplicates", "accel_duplicates"])
-}
-
-/// As [`duplicates`], of what came too late.
-#[must_use]
-pub fn late(status: &Status) -> u64 {
-    total(status, &["gyro_late", "accel_late", "temperature_late", "references_late"])
-}
-
 fn total(status: &Status, names: &[&str]) -> u64 {
     names.iter().fold(0, |total, name| total.saturating_add(status.counter(name)))
 }

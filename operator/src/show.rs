@@ -27,11 +27,6 @@ pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, r
     table
 }
 
-/// "1 problem", "3 problems".
-pub(super) fn count(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
-}
-
 /// A problem under the name that the operator gave the file; without one, under the service's own. What is no matter of a
 /// file is told without a place.
 pub(super) fn problem(problem: &Problem, name: Option<&str>) -> String {

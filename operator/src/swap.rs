@@ -13,6 +13,7 @@ use isotherm_protocol::key::{self, UnitId};
 use super::ConsoleError;
 use super::client::{self, Client, ClientArgs};
 use super::follow::Follow;
+use super::page::{of, short};
 use super::show;
 
 /// Arguments of `swap`.
@@ -200,12 +201,12 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
         return print(&(serde_json::to_string_pretty(reply).unwrap_or_default() + "\n"), exit);
     }
     // A service before 0.2 says the proposed digest in the place of the one in force.
-    let digest: String = reply.proposed.as_ref().unwrap_or(&reply.digest).chars().take(12).collect();
+    let digest = short(reply.proposed.as_ref().unwrap_or(&reply.digest));
     let line = match reply.outcome {
         SwapOutcome::Refused => format!(
             "{}: refused with {}; revision {} stays in force\n",
             reply.unit,
-            show::count(reply.problems.len(), "problem"),
+            of(reply.problems.len(), "problem"),
             reply.revision
         ),
         SwapOutcome::Unchanged => {

@@ -5,7 +5,7 @@
 //! | `watch` | the thread that notices a silent instance, and hears the journals of others |
 //! | `ask` | memories, histories and documents of the instance that speaks, asked for |
 //! | [`crate::receive::unit`] `speech` | one unit: what is kept, compared and published in the other's place |
-//! | [`crate::control::swap_manager`] `carry` | histories and documents, written down here too |
+//! | [`crate::control`] `carry` | histories and documents, written down here too |
 
 mod ask;
 mod watch;
@@ -246,7 +246,7 @@ mod tests {
     use isotherm_protocol::raw::GyroBatch;
 
     use super::*;
-    use crate::control::calibrations::Calibrations;
+    use crate::control::revision::Calibrations;
     use crate::receive::intake::OutletMaker;
 
     fn other() -> Member {

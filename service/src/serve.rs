@@ -12,7 +12,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
 
 use crate::config::Settings;
-use crate::control::calibrations::Calibrations;
+use crate::control::revision::Calibrations;
 use crate::logging::LogArgs;
 use crate::observe::metrics::Endpoint;
 use crate::service::{open_store, start_on, tell_state};

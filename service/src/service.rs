@@ -1,13 +1,13 @@
 //! The service as a whole: start it on a session, stop it within its time.
 
-mod declare;
+pub(crate) mod declare;
 
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::SystemTime;
 
 use isotherm_bus::receipt;
+use isotherm_operator::status::unix_ms;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::pair::Member;
 use isotherm_protocol::status::Status;
@@ -17,10 +17,10 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::control::calibrations::Calibrations;
+use crate::control::revision::Calibrations;
 use crate::control::store::{Opened, Store};
-use crate::control::swap_manager::{Found, Inbox, Opening, SwapManager, Worker};
 use crate::control::watch::{WatchSettings, Watcher};
+use crate::control::{Found, Inbox, SwapManager, Worker};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
 use crate::observe::subscribers::Subscribers;
@@ -99,13 +99,12 @@ pub(crate) async fn start_on(
              any name"
         );
     }
-    let opening = Opening::new();
-    let inbox = opening.inbox();
+    let inbox = Inbox::default();
     let outlets = declare::outlets(session.clone(), settings.congestion);
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(inbox.clone());
     let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
     isotherm_bus::connected(&session, &settings.zenoh.session, MEMBERS_LIMIT).await?;
-    let pair = Pair::new(&settings, session.zid().to_string(), now_unix_ms(), members(&session).await?);
+    let pair = Pair::new(&settings, session.zid().to_string(), unix_ms(), members(&session).await?);
     let pair = Arc::new(pair);
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
     let pulse = Arc::new(Pulse::new(settings.congestion));
@@ -121,7 +120,7 @@ pub(crate) async fn start_on(
         Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
     let subscribers = Arc::<Subscribers>::default();
     let source = source.feeling(Arc::clone(&pulse)).asking(Arc::clone(&subscribers));
-    let swap_manager = SwapManager::start(opening, work).map_err(ServiceError::Thread)?;
+    let swap_manager = SwapManager::start(&inbox, work).map_err(ServiceError::Thread)?;
     let said = (control_status, Arc::clone(&subscribers));
     let status_publisher = StatusPublisher::start(&session, Arc::clone(&intake), said, &pair, &settings)
         .map_err(ServiceError::Thread)?;
@@ -168,12 +167,6 @@ async fn members(session: &Session) -> Result<Vec<Member>, ServiceError> {
         members.extend(reply.into_result().ok().and_then(|sample| Member::parse(sample.key_expr().as_str())));
     }
     Ok(members)
-}
-
-/// The present time by the clock of this machine (ms since 1970-01-01 UTC).
-fn now_unix_ms() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }
 
 /// Opens the state folder, or its stand-in.

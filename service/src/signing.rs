@@ -16,3 +16,4 @@ pub use trusted::read_trusted_keys;
 pub(crate) use files::create;
 pub use keygen::run as keygen;
 pub use sign::run as sign;
+pub(crate) use trusted::check_signature;

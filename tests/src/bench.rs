@@ -8,7 +8,7 @@ use isotherm_bus::{Consumer, SessionOptions, close, locators, open, presence};
 use isotherm_correction::calibration::Calibration;
 use isotherm_protocol::corrected::CorrectedTick;
 use isotherm_protocol::key::UnitId;
-use isotherm_service::control::calibrations::Calibrations;
+use isotherm_service::control::revision::Calibrations;
 use isotherm_service::{RunningService, Settings, Stuck, Totals, start_with};
 use zenoh::Session;
 use zenoh::qos::CongestionControl;

@@ -1,11 +1,9 @@
-//! The table of a tick's path in `ARCHITECTURE.md` is true: every file is there, every function is in it, and the counts are the table's.
+//! The tables of the paths of a tick and of a swap in `ARCHITECTURE.md` are true: every file is there, every function and type is in it,
+//! and the counts are the table's.
 
 #![expect(clippy::panic, reason = "what does not hold ends the test")]
 
 use std::path::Path;
-
-/// What the section begins with, up to the next one.
-const HEADING: &str = "## The path of a gyro tick";
 
 /// A row of the table.
 struct Row<'a> {
@@ -44,32 +42,63 @@ fn defines(source: &str, function: &str) -> bool {
 fn stated(section: &str, word: &str) -> usize {
     let before = section.split_once(&format!(" {word}")).map(|(before, _)| before);
     let number = before.and_then(|before| before.split_whitespace().last()?.parse().ok());
-    number.unwrap_or_else(|| panic!("{HEADING:?} does not state how many {word} there are"))
+    number.unwrap_or_else(|| panic!("it is not stated how many {word} there are: {section}"))
 }
 
-#[test]
-fn the_path_of_a_tick_is_as_the_architecture_says() {
+/// The types that a row says are in its file, or in the file behind them.
+fn types<'a>(row: &Row<'a>) -> Vec<(&'a str, &'a str)> {
+    let parts = row.text.split("type `").skip(1);
+    let types = parts.map(|part| {
+        let name = part.split('`').next().unwrap();
+        let file = part.split_once("` (`").filter(|(before, _)| *before == name);
+        (name, file.map_or(row.file, |(_, file)| file.split('`').next().unwrap()))
+    });
+    types.collect()
+}
+
+/// Checks the table of a section against its files, and these counts against the table.
+fn check(heading: &str, stated_counts: &[&str]) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let page = std::fs::read_to_string(root.join("ARCHITECTURE.md")).unwrap();
-    let (_, section) = page.split_once(HEADING).unwrap_or_else(|| panic!("there is no {HEADING:?}"));
+    let read = |file: &str| {
+        std::fs::read_to_string(root.join(file))
+            .unwrap_or_else(|error| panic!("{file} cannot be read: {error}"))
+    };
+    let page = read("ARCHITECTURE.md");
+    let (_, section) = page.split_once(heading).unwrap_or_else(|| panic!("there is no {heading:?}"));
     let section = section.split("\n## ").next().unwrap();
     let rows = rows(section);
-    let mut seen = Vec::new();
-    for Row { text, file, functions } in &rows {
+    let (mut seen, mut named) = (Vec::new(), 0);
+    for row in &rows {
+        let Row { text, file, functions } = row;
         assert!(!seen.contains(file), "{file} has two rows; the second is {text:?}");
         seen.push(file);
-        let source = std::fs::read_to_string(root.join(file))
-            .unwrap_or_else(|error| panic!("{file} of row {text:?} cannot be read: {error}"));
+        let source = read(file);
         assert!(!functions.is_empty(), "row {text:?} names no function");
         for (index, function) in functions.iter().enumerate() {
             assert!(!functions[..index].contains(function), "row {text:?} names {function} twice");
             assert!(defines(&source, function), "{file} has no `fn {function}`, which row {text:?} names");
         }
+        for (name, file) in types(row) {
+            let is_there = read(file).contains(&format!("struct {name} {{"));
+            assert!(is_there, "{file} has no `struct {name}`, which row {text:?} names");
+            named += 1;
+        }
     }
     let functions = rows.iter().map(|row| row.functions.len()).sum::<usize>();
     let copies = rows.iter().filter(|row| row.text.contains("(copy ")).count();
-    for (word, counted) in [("files", rows.len()), ("functions", functions), ("copies", copies)] {
+    let counts = [("files", rows.len()), ("functions", functions), ("copies", copies), ("types", named)];
+    for (word, counted) in counts.into_iter().filter(|(word, _)| stated_counts.contains(word)) {
         let stated = stated(section, word);
-        assert_eq!(stated, counted, "{HEADING:?} states {stated} {word}, its table has {counted}");
+        assert_eq!(stated, counted, "{heading:?} states {stated} {word}, its table has {counted}");
     }
+}
+
+#[test]
+fn the_path_of_a_tick_is_as_the_architecture_says() {
+    check("## The path of a gyro tick", &["files", "functions", "copies"]);
+}
+
+#[test]
+fn the_path_of_a_swap_is_as_the_architecture_says() {
+    check("## The path of a swap", &["files", "types"]);
 }

@@ -15,7 +15,7 @@ use isotherm_protocol::document::Document;
 use isotherm_protocol::key::{self, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_service::config::Settings;
-use isotherm_service::control::calibrations::Calibrations;
+use isotherm_service::control::revision::Calibrations;
 use isotherm_service::receive::intake::Intake;
 use isotherm_service::receive::unit::Outlet;
 

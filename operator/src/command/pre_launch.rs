@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use isotherm_cli::{Bar, Exit, print, say};
-use isotherm_correction::units::AngularRate;
 use isotherm_protocol::control::CommandOrder;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::{
@@ -13,6 +12,7 @@ use tokio::time::{Instant, timeout_at};
 
 use crate::client::Client;
 use crate::follow::Follow;
+use crate::page::{deg_per_h, short};
 use crate::{ConsoleError, show};
 
 /// Without a status for so long the unit, or the service, is gone.
@@ -95,10 +95,8 @@ fn words(unit: &UnitId, outcome: &PreLaunchOutcome) -> String {
     let next = super::in_standby(unit);
     match &outcome.verdict {
         PreLaunchVerdict::Accepted(changes) => {
-            let overlay = outcome.overlay.as_ref().map_or_else(String::new, |digest| {
-                let head: String = digest.to_string().chars().take(12).collect();
-                format!(", overlay {head}")
-            });
+            let overlay = outcome.overlay.map(|digest| format!(", overlay {}", short(digest)));
+            let overlay = overlay.unwrap_or_default();
             let header = ["gyro", "C0 change °/h", "± °/h", "B0 change °/h", "± °/h", "Earth rate °/h"];
             let table = show::table(header, changes.iter().map(row).collect(), 1);
             format!("{unit}: pre-launch calibration accepted{overlay}\n{table}\n{next}")
@@ -126,8 +124,4 @@ fn row(change: &ConstantsChange) -> Vec<String> {
         change.magnetic_bias_sigma_rad_per_s.map_or("—".to_owned(), |s| format!("{:.5}", deg_per_h(s))),
         format!("{:+.4}", deg_per_h(change.earth_rate_rad_per_s)),
     ]
-}
-
-fn deg_per_h(rad_per_s: f64) -> f64 {
-    AngularRate::from_rad_per_s(rad_per_s).as_deg_per_h()
 }

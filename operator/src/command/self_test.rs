@@ -9,6 +9,7 @@ use isotherm_protocol::status::{SelfTestItem, SelfTestReport, State};
 
 use crate::client::Client;
 use crate::follow::Follow;
+use crate::page::of;
 use crate::{ConsoleError, show};
 
 /// The service ends a self-test after 14 s at the latest.
@@ -50,7 +51,7 @@ fn words(unit: &UnitId, report: &SelfTestReport) -> String {
     let verdict = if report.passed {
         "passed".to_owned()
     } else {
-        format!("failed: {} of {}", failed, show::count(report.items.len(), "check"))
+        format!("failed: {} of {}", failed, of(report.items.len(), "check"))
     };
     let rows = report.items.iter().map(row).collect();
     let table = show::table(["check", "value", "at least", "at most", "unit", "verdict"], rows, 1);

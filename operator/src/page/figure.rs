@@ -2,11 +2,28 @@
 
 use std::time::Duration;
 
+use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::digest::Digest;
+use isotherm_protocol::status::PreLaunchProgress;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Stands where a value is not known.
 pub(super) const NONE: &str = "–";
+
+/// A value in words, or that it is not known.
+pub(super) fn or_none<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| NONE.to_owned(), words)
+}
+
+/// Angular rate (rad/s) in °/h.
+pub(crate) fn deg_per_h(rad_per_s: f64) -> f64 {
+    AngularRate::from_rad_per_s(rad_per_s).as_deg_per_h()
+}
+
+/// Specific force (m/s²) in thousandths of standard gravity.
+pub(super) fn milli_g(m_per_s2: f64) -> f64 {
+    m_per_s2 / STANDARD_GRAVITY_M_PER_S2 * 1e3
+}
 
 /// Seconds in a day.
 const DAY_S: u64 = 86_400;
@@ -29,7 +46,7 @@ pub(super) fn count(number: u64) -> String {
 }
 
 /// "1 unit", "3 units".
-pub(super) fn of(number: usize, what: &str) -> String {
+pub(crate) fn of(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
@@ -52,14 +69,14 @@ pub(super) fn signed(value: f64) -> String {
 
 /// Temperature (°C).
 pub(super) fn temperature(deg_c: Option<f64>) -> String {
-    deg_c.filter(|value| value.is_finite()).map_or_else(|| NONE.to_owned(), |value| format!("{value:.1}"))
+    or_none(deg_c.filter(|value| value.is_finite()), |value| format!("{value:.1}"))
 }
 
 /// Rate of a temperature (°C/s), shown in °C/min.
 pub(super) fn temperature_rate(deg_c_per_s: Option<f64>) -> String {
     let per_min = deg_c_per_s.map(|rate| rate * 60.0).filter(|rate| rate.is_finite());
     // Zero without the sign of what was rounded away.
-    per_min.map_or_else(|| NONE.to_owned(), |rate| format!("{:+.2}", (rate * 100.0).round() / 100.0 + 0.0))
+    or_none(per_min, |rate| format!("{:+.2}", (rate * 100.0).round() / 100.0 + 0.0))
 }
 
 /// Frequency (1/s).
@@ -97,6 +114,13 @@ pub(crate) fn since(time: Duration) -> String {
     }
 }
 
+/// Share of a pre-launch calibration that is done (0…1), and the time that is left.
+pub(super) fn progress(progress: &PreLaunchProgress) -> (f64, String) {
+    let left = Duration::try_from_secs_f64((progress.duration_s - progress.elapsed_s).max(0.0));
+    let share = (progress.elapsed_s / progress.duration_s).clamp(0.0, 1.0);
+    (share, or_none(left.ok(), since))
+}
+
 /// As [`since`], of seconds that may be negative: what lies ahead is "in 3 h".
 pub(super) fn since_s(seconds: i64) -> String {
     let words = since(Duration::from_secs(seconds.unsigned_abs()));
@@ -108,11 +132,16 @@ pub(super) fn ago(unix_ms: i64, now_unix_ms: i64) -> Duration {
     Duration::from_millis(u64::try_from(now_unix_ms.saturating_sub(unix_ms)).unwrap_or(0))
 }
 
-/// The first twelve hexadecimal digits of a digest, of which perhaps only the head is known.
+/// A digest of which perhaps only the head is known.
 pub(super) fn digest(digest: Option<Digest>, head: [u8; 8]) -> String {
     let mut bytes = [0; 32];
     bytes.iter_mut().zip(head).for_each(|(byte, of_head)| *byte = of_head);
-    digest.unwrap_or(Digest(bytes)).to_string().chars().take(12).collect()
+    short(digest.unwrap_or(Digest(bytes)))
+}
+
+/// The first twelve hexadecimal digits of a digest.
+pub(crate) fn short(digest: impl ToString) -> String {
+    digest.to_string().chars().take(12).collect()
 }
 
 /// How many columns a text takes.

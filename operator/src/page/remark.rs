@@ -205,10 +205,8 @@ fn work(status: &Status, add: &mut impl FnMut(Level, String)) {
         add(Level::Fault, format!("self-test failed: {}", failed.join(", ")));
     }
     if let Some(progress) = &status.pre_launch {
-        let left = Duration::try_from_secs_f64((progress.duration_s - progress.elapsed_s).max(0.0));
-        let left = left.map_or_else(|_| figure::NONE.to_owned(), figure::since);
-        let share = (progress.elapsed_s / progress.duration_s * 100.0).clamp(0.0, 100.0);
-        add(Level::Note, format!("{share:.0} % done, {left} left"));
+        let (share, left) = figure::progress(progress);
+        add(Level::Note, format!("{:.0} % done, {left} left", share * 100.0));
     }
     if let Some(PreLaunchVerdict::Refused(reasons)) =
         status.pre_launch_outcome.as_ref().map(|outcome| &outcome.verdict)

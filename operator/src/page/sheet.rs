@@ -15,7 +15,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Widget};
 
 use super::figure::{fit, frequency, width, wrap};
-use super::grid::drawn;
+use super::grid::{Column, Grid, drawn};
 use super::remark::{Level, knows_rates};
 use super::{Unit, tone};
 
@@ -48,6 +48,14 @@ impl Section {
             self.lines.push(Line::from_iter([head, Span::styled(part, style)]));
             name = "";
         }
+    }
+
+    /// A table, moved in from the left; how wide it is.
+    fn grid(&mut self, layout: &[Column], rows: &[Vec<Span<'static>>], columns: usize) -> usize {
+        let grid = Grid::set(layout, rows, columns.saturating_sub(2));
+        let width = usize::from(grid.width) + 2;
+        self.lines.extend(grid.indented());
+        width
     }
 
     fn is_empty(&self) -> bool {

@@ -1,13 +1,12 @@
 //! One line a unit.
 
-use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::status::{ChannelStatus, Place, Status};
 use ratatui::style::Style;
 use ratatui::text::Span;
 
 use super::grid::{Column, Grid};
 use super::remark::{Level, is_running, knows_rates};
-use super::{Unit, duplicates, figure, late, state_word, tone};
+use super::{Lately, Unit, figure, state_word, tone};
 
 /// Widest that a serial may stand; a longer one is cut in its middle.
 const WIDEST_SERIAL: usize = 24;
@@ -44,7 +43,7 @@ pub fn units(units: &[Unit<'_>], columns: usize) -> Grid {
 }
 
 fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
-    let (status, lately) = (unit.status, unit.lately);
+    let (status, lately, counted) = (unit.status, unit.lately, Lately::counted(unit.status));
     let remarks = unit.remarks();
     let level = unit.level();
     let (mark, mark_style) = level.mark(status.state);
@@ -62,37 +61,31 @@ fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
         Span::styled(figure::count(count), or_base(style))
     };
     let rate = status.input_rates.gyro_ticks_per_s;
-    let rate = if knows_rates(status) { figure::frequency(rate) } else { figure::NONE.to_owned() };
+    let rate = figure::or_none(knows_rates(status).then_some(rate), figure::frequency);
     let in_view = channel_in_view(status);
     let age_s = status.calibration.as_ref().and_then(|calibration| calibration.age_s);
     let note = remarks.first();
     let cell = |text: String| Span::styled(text, base);
+    let (deg_per_h, mg) = applied(status).map(Into::into).unzip();
+    let revision = status.calibration.as_ref().map(|calibration| calibration.revision.counter);
+    let p99_ns = Some(status.latency.p99_ns).filter(|p99_ns| *p99_ns > 0);
     vec![
         Span::styled(mark, mark_style),
         Span::styled(serial, if level > Level::Warning { level.style() } else { base }),
         cell(state_word(status.state).to_owned()),
-        cell(
-            status
-                .calibration
-                .as_ref()
-                .map_or_else(|| figure::NONE.to_owned(), |c| c.revision.counter.to_string()),
-        ),
+        cell(figure::or_none(revision, |counter| counter.to_string())),
         Span::styled(figure::temperature(in_view.and_then(|c| c.temperature_deg_c)), or_base(range_style)),
         cell(figure::temperature_rate(in_view.and_then(|c| c.rate_deg_c_per_s))),
         Span::styled(range, or_base(range_style)),
-        cell(applied_deg_per_h(status)),
-        cell(applied_mg(status)),
+        cell(figure::or_none(deg_per_h, figure::digits)),
+        cell(figure::or_none(mg, figure::digits)),
         cell(rate),
-        counter(status.counter("gaps"), lately.gaps),
-        counter(duplicates(status), lately.duplicates),
-        counter(late(status), lately.late),
-        counter(status.counter("bad_frames"), lately.bad),
-        cell(if status.latency.p99_ns == 0 {
-            figure::NONE.to_owned()
-        } else {
-            figure::latency(status.latency.p99_ns)
-        }),
-        cell(age_s.map_or_else(|| figure::NONE.to_owned(), figure::since_s)),
+        counter(counted.gaps, lately.gaps),
+        counter(counted.duplicates, lately.duplicates),
+        counter(counted.late, lately.late),
+        counter(counted.bad, lately.bad),
+        cell(figure::or_none(p99_ns, figure::latency)),
+        cell(figure::or_none(age_s, figure::since_s)),
         Span::styled(
             note.map_or_else(String::new, |remark| remark.words.clone()),
             note.map_or(
@@ -129,26 +122,15 @@ pub fn range(status: &Status) -> (&'static str, Style) {
     }
 }
 
-/// Length of the angular rate that is subtracted (°/h).
-fn applied_deg_per_h(status: &Status) -> String {
-    let rate = status.applied.map(|applied| length(applied.angular_rate_rad_per_s));
-    rate.map_or_else(
-        || figure::NONE.to_owned(),
-        |rate| figure::digits(AngularRate::from_rad_per_s(rate).as_deg_per_h()),
-    )
-}
-
-/// Length of the specific force that is subtracted (mg).
-fn applied_mg(status: &Status) -> String {
-    let force = status.applied.map(|applied| length(applied.specific_force_m_per_s2));
-    force.map_or_else(
-        || figure::NONE.to_owned(),
-        |force| figure::digits(force / STANDARD_GRAVITY_M_PER_S2 * 1e3),
-    )
+/// Sizes of angular rate (°/h) and specific force (mg) that are subtracted.
+#[must_use]
+pub fn applied(status: &Status) -> Option<[f64; 2]> {
+    let applied = status.applied?;
+    let rate = figure::deg_per_h(length(applied.angular_rate_rad_per_s));
+    Some([rate, figure::milli_g(length(applied.specific_force_m_per_s2))])
 }
 
 /// Length of a vector.
-#[must_use]
-pub fn length(vector: [f64; 3]) -> f64 {
+fn length(vector: [f64; 3]) -> f64 {
     vector.iter().map(|value| value * value).sum::<f64>().sqrt()
 }

@@ -8,7 +8,7 @@ use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{Output, State, Status};
 
 use super::feed::News;
-use crate::page::{Lately, Past, Unit, duplicates, late};
+use crate::page::{Lately, Past, Unit};
 use crate::status::clock_of;
 
 /// How far growth of counters is looked back for.
@@ -64,10 +64,7 @@ struct Look {
     running: bool,
     ticks_in: u64,
     ticks_out: u64,
-    gaps: u64,
-    duplicates: u64,
-    late: u64,
-    bad: u64,
+    counted: Lately,
 }
 
 impl Look {
@@ -79,10 +76,7 @@ impl Look {
             running,
             ticks_in: status.counter("gyro_ticks_in"),
             ticks_out: status.counter("ticks_out"),
-            gaps: status.counter("gaps"),
-            duplicates: duplicates(status),
-            late: late(status),
-            bad: status.counter("bad_frames"),
+            counted: Lately::counted(status),
         }
     }
 }
@@ -214,12 +208,6 @@ impl Row {
             let ran = since.clone().all(|look| look.running) && last.running;
             ran && last.ticks_in > far.ticks_in && last.ticks_out == far.ticks_out
         });
-        Lately {
-            gaps: last.gaps.saturating_sub(first.gaps),
-            duplicates: last.duplicates.saturating_sub(first.duplicates),
-            late: last.late.saturating_sub(first.late),
-            bad: last.bad.saturating_sub(first.bad),
-            stuck,
-        }
+        Lately { stuck, ..last.counted.since(&first.counted) }
     }
 }

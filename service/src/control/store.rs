@@ -16,17 +16,13 @@
 //! state folder uses [`Store::in_memory`]: the same, and nothing survives.
 
 mod blobs;
-mod durable;
 mod error;
-mod history;
+mod folder;
 mod index;
-mod keep;
-mod lock;
 mod log;
-mod mark;
 mod opened;
+mod read;
 mod retention;
-mod scan;
 mod verify;
 
 pub use error::StoreError;
@@ -38,14 +34,14 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{AuditEntry, AuditEvent, GoodSet, Intent};
+use isotherm_protocol::history::chain::Chain;
+use isotherm_protocol::history::{AuditEntry, AuditEvent};
 use isotherm_protocol::key::UnitId;
 
 use blobs::BlobStore;
+use folder::{Lock, Mark};
 use index::Index;
-use lock::Lock;
-use log::{Found, Log};
-use mark::Mark;
+use log::Log;
 
 use crate::control::compressed::CompressedBytes;
 
@@ -61,8 +57,6 @@ pub struct Store {
     documents: BlobStore,
     overlays: BlobStore,
     index: Index,
-    /// Number of the next entry.
-    next_number: u64,
     /// Length at which a new audit file is begun (bytes).
     full_bytes: u64,
     /// No new file could be begun; told once.
@@ -88,30 +82,17 @@ impl Store {
     /// [`StoreError::Folder`], [`StoreError::Held`], [`StoreError::Read`] or [`StoreError::Write`].
     pub fn open(folder: &Path) -> Result<(Self, Opened), StoreError> {
         let unusable = |source| StoreError::Folder { path: folder.to_owned(), source };
-        durable::make_folder(folder).map_err(unusable)?;
+        folder::make_folder(folder).map_err(unusable)?;
         // Taken before anything else is touched: the files may be another instance's.
         let lock = Lock::take(folder)?;
         let being_begun_anew = log::was_being_begun_anew(folder);
-        durable::sweep(folder).map_err(unusable)?;
+        folder::sweep(folder).map_err(unusable)?;
         let documents = BlobStore::open(folder.join("documents"))?;
         let overlays = BlobStore::open(folder.join("overlays"))?;
 
         let mut opened = Opened::default();
         let mut index = Index::default();
-        let mut next_number = 1;
-        let log = Log::open(folder, &mut opened, &mut |found| match found {
-            Found::Entry(entry) => {
-                next_number = next_number.max(entry.number.saturating_add(1));
-                index.apply(&entry);
-            }
-            // Whatever stood there had a number.
-            Found::Skipped { number, acceptance } => {
-                next_number = next_number.max(number.unwrap_or(next_number).saturating_add(1));
-                if let Some((unit, revision)) = acceptance {
-                    index.lose(&unit, revision);
-                }
-            }
-        })?;
+        let log = Log::open(folder, &mut opened, &mut index)?;
         let mut mark = Mark::read(folder);
         let unmarked = |source| StoreError::Write { path: folder.to_owned(), source };
         let has_older = log.is_empty_behind_a_full_one()? && !being_begun_anew;
@@ -119,14 +100,16 @@ impl Store {
         if has_older || (opened.entries == 0 && kept > 0) {
             mark.lose(folder).map_err(unmarked)?;
             // The numbers of what is lost are missed.
-            next_number = next_number.max(Mark::last_entry(folder).unwrap_or(0).saturating_add(1));
+            index.next_number =
+                index.next_number.max(Mark::last_entry(folder).unwrap_or(0).saturating_add(1));
             let (folder, floor) = (folder.to_owned(), mark.floor);
             opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
         // The last line alone may be missing after a crash in mid-write.
-        } else if let Some(written) = Mark::last_entry(folder).filter(|written| *written > next_number) {
+        } else if let Some(written) = Mark::last_entry(folder).filter(|written| *written > index.next_number)
+        {
             mark.lose(folder).map_err(unmarked)?;
-            opened.cut = Some(Cut { last: next_number - 1, written, floor: mark.floor });
-            next_number = written.saturating_add(1);
+            opened.cut = Some(Cut { last: index.next_number - 1, written, floor: mark.floor });
+            index.next_number = written.saturating_add(1);
         } else if index.highest() > 0 {
             mark.reserve(folder, index.highest()).map_err(unmarked)?;
         }
@@ -144,17 +127,7 @@ impl Store {
         let full_bytes = FULL_BYTES;
         let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
         let (stuck, prune_due) = (false, true);
-        let store = Self {
-            journal,
-            documents,
-            overlays,
-            index,
-            next_number,
-            full_bytes,
-            stuck,
-            prune_due,
-            is_damaged,
-        };
+        let store = Self { journal, documents, overlays, index, full_bytes, stuck, prune_due, is_damaged };
         Ok((store, opened))
     }
 
@@ -166,7 +139,6 @@ impl Store {
             documents: BlobStore::in_memory(),
             overlays: BlobStore::in_memory(),
             index: Index::default(),
-            next_number: 1,
             full_bytes: FULL_BYTES,
             stuck: false,
             prune_due: false,
@@ -211,22 +183,6 @@ impl Store {
         self.overlays.put(bytes)
     }
 
-    /// A calibration document, checked against its digest; `None` where it is not kept.
-    ///
-    /// # Errors
-    /// [`StoreError::Read`], or [`StoreError::Corrupt`] where it has been changed.
-    pub fn document(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
-        self.documents.get(digest)
-    }
-
-    /// An overlay, as [`Self::document`] gives a document.
-    ///
-    /// # Errors
-    /// The same.
-    pub fn overlay(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
-        self.overlays.get(digest)
-    }
-
     /// Writes an entry down and gives its number; it is on the disk when this returns. Texts and lists are cut to their
     /// bounds. Entries of a unit come in the order of their revisions.
     ///
@@ -266,7 +222,7 @@ impl Store {
         {
             mark.reserve(path, highest).map_err(StoreError::write(path))?;
         }
-        let numbered = (self.next_number..).zip(entries);
+        let numbered = (self.index.next_number..).zip(entries);
         let entries: Vec<_> =
             numbered.map(|(number, (unit, by, event))| entry(number, time, unit, by, event)).collect();
         match &mut self.journal {
@@ -284,11 +240,10 @@ impl Store {
         for entry in &entries {
             self.index.apply(entry);
         }
-        self.next_number = self.next_number.saturating_add(entries.len() as u64);
         if let Journal::Folder { path, .. } = &self.journal {
-            Mark::note_entry(path, self.next_number.saturating_sub(1));
+            Mark::note_entry(path, self.index.next_number.saturating_sub(1));
         }
-        Ok(self.next_number.saturating_sub(1))
+        Ok(self.index.next_number.saturating_sub(1))
     }
 
     /// Refuses what would not survive a restart.
@@ -299,105 +254,108 @@ impl Store {
         document.or(overlay).map_or(Ok(()), |digest| Err(StoreError::NotStored { digest }))
     }
 
-    /// What an operator wants of a unit, by the commands that were carried out.
-    #[must_use]
-    pub fn intent(&self, unit: &UnitId) -> Option<&Intent> {
-        self.index.intent(unit)
+    /// Refuses to write into a folder that is not the one that was opened.
+    fn check_held(&self) -> Result<(), StoreError> {
+        let Journal::Folder { path, lock, .. } = &self.journal else { return Ok(()) };
+        if lock.is_in(path) {
+            return Ok(());
+        }
+        let reason = if path.is_dir() { "another folder is in its place" } else { "it was removed" };
+        Err(StoreError::Lost { path: path.clone(), reason: reason.to_owned() })
     }
 
-    /// Units that were ever given a calibration or a command.
-    pub fn units(&self) -> impl Iterator<Item = &UnitId> {
-        self.index.units()
-    }
-
-    /// The calibration that was accepted last for a unit and not withdrawn: what a restart begins with. It may not have come
-    /// in force yet, see [`GoodSet::in_force`].
-    #[must_use]
-    pub fn last_good(&self, unit: &UnitId) -> Option<&GoodSet> {
-        self.index.sets(unit).next_back()
-    }
-
-    /// Good sets of a unit, the newest first: at most 1000, and the last eight at least.
-    pub fn good_sets(&self, unit: &UnitId) -> impl Iterator<Item = &GoodSet> {
-        self.index.sets(unit).rev()
-    }
-
-    /// The set that a rollback goes to: the newest before the last good one that corrects otherwise. After a rollback it is
-    /// the one before that which was gone back to, so that a second rollback goes further back.
-    #[must_use]
-    pub fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
-        self.index.previous(unit)
-    }
-
-    /// The good set of a revision.
-    #[must_use]
-    pub fn by_revision(&self, unit: &UnitId, revision: u64) -> Option<&GoodSet> {
-        self.index.sets(unit).rfind(|set| set.revision == revision)
-    }
-
-    /// Highest revision counter that a unit was ever given, withdrawn ones included; 0 where none. The next one is one more.
-    #[must_use]
-    pub fn highest_revision(&self, unit: &UnitId) -> u64 {
-        self.index.highest_revision(unit)
-    }
-
-    /// Digest of what was last seen in a file of the watched folder, accepted or refused.
-    #[must_use]
-    pub fn seen_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.seen(path)
-    }
-
-    /// Digest of what was last refused in a file of the watched folder, where nothing else was seen in it since.
-    #[must_use]
-    pub fn refused_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.refused(path)
-    }
-
-    /// Digest of what was last refused in a file of the watched folder because of another one that names its unit.
-    #[must_use]
-    pub fn rival_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.rival(path)
-    }
-
-    /// Digest of what the watched folder said for a unit last and was taken, under whatever name: the same again, under
-    /// whatever name, is no swap.
-    #[must_use]
-    pub fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
-        self.index.said_by_folder(unit)
-    }
-
-    /// The file that a document is kept in; `None` where there is no state folder.
-    #[must_use]
-    pub fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
-        self.documents.file(digest)
-    }
-
-    /// The newest entries of a unit, or of all, the oldest of them first: at most `limit`, and no more than 10 000. They are
-    /// read from the audit file and the full one before it; carried-over entries are left out where that one is there.
+    /// Sees to it that what is written down is found again: where the state folder was removed and another one stands in its
+    /// place, that one is taken, locked, and given all that holds: these documents and overlays, and an audit file that
+    /// begins with what was carried over. Files that it holds already stay, its audit file is put aside. `true` where that
+    /// was done.
+    ///
+    /// No folder is made: where a disk was unmounted it would be made in its place.
     ///
     /// # Errors
-    /// [`StoreError::Read`].
-    pub fn history(&self, unit: Option<&UnitId>, limit: usize) -> Result<Vec<AuditEntry>, StoreError> {
-        let limit = limit.min(history::MAX_ENTRIES);
-        match &self.journal {
-            Journal::Folder { log, .. } => {
-                let (before, current) = log.files()?;
-                let mut newest = history::newest(current, unit, limit, before.is_none())?;
-                if let Some(before) = before.filter(|_| newest.len() < limit) {
-                    let mut older = history::newest(&before, unit, limit - newest.len(), false)?;
-                    older.append(&mut newest);
-                    newest = older;
+    /// [`StoreError::Lost`] while there is none; [`StoreError::Held`] where another instance has it; else as
+    /// [`Store::open`]. Nothing can be written down then, and a later call may go well.
+    pub(crate) fn keep(
+        &mut self,
+        time: SystemTime,
+        documents: impl IntoIterator<Item: AsRef<[u8]>>,
+        overlays: impl IntoIterator<Item: AsRef<[u8]>>,
+    ) -> Result<bool, StoreError> {
+        let lost = match self.check_held() {
+            Ok(()) => {
+                self.prune_if_due(time);
+                return Ok(false);
+            }
+            Err(lost) => lost,
+        };
+        let Journal::Folder { path, mark, .. } = &self.journal else { return Ok(false) };
+        let (path, mark) = (path.clone(), *mark);
+        if !path.is_dir() {
+            return Err(lost);
+        }
+        let lock = Lock::take(&path)?;
+        folder::sweep(&path).map_err(StoreError::write(&path))?;
+        let mut shelves = [BlobStore::open(path.join("documents"))?, BlobStore::open(path.join("overlays"))?];
+        let [of_documents, of_overlays] = &mut shelves;
+        documents.into_iter().try_for_each(|bytes| of_documents.put(bytes.as_ref()).map(drop))?;
+        overlays.into_iter().try_for_each(|bytes| of_overlays.put(bytes.as_ref()).map(drop))?;
+        mark.write(&path).map_err(StoreError::write(&path))?;
+        let mut log = Log::open(&path, &mut Opened::default(), &mut Index::default())?;
+        let (lines, next_number, chain) = self.carried_lines(time)?;
+        log.begin_anew(self.index.next_number.saturating_sub(1), &lines, chain)?;
+        self.index.next_number = next_number;
+        [self.documents, self.overlays] = shelves;
+        self.journal = Journal::Folder { path, log, lock, mark };
+        Ok(true)
+    }
+
+    /// What a new audit file begins with, the number behind it, and the chain there.
+    fn carried_lines(&self, time: SystemTime) -> Result<(String, u64, Chain), StoreError> {
+        let mut number = self.index.next_number;
+        let mut lines = String::new();
+        let mut chain = match &self.journal {
+            Journal::Folder { log, .. } => log.chain,
+            Journal::Memory(_) => Chain::default(),
+        };
+        chain.begin_file();
+        for (unit, event) in self.index.carried() {
+            lines.push_str(&chain.line(&entry(number, time, unit, "", event))?);
+            number = number.saturating_add(1);
+        }
+        Ok((lines, number, chain))
+    }
+
+    /// Begins a new audit file where this one is full, empty behind a full one, or no longer ours.
+    fn begin_anew_if_due(&mut self, time: SystemTime) -> Result<(), StoreError> {
+        let Journal::Folder { log, path, .. } = &self.journal else { return Ok(()) };
+        let taken_away = log.changed_by_others()?;
+        if taken_away {
+            tracing::warn!(
+                "the audit file in {} was changed by someone else: a new one is begun",
+                path.display()
+            );
+        }
+        let full = log.grown() >= self.full_bytes;
+        let lacks_carried = log.is_empty() && !self.index.is_empty();
+        if !(taken_away || full || lacks_carried) {
+            return Ok(());
+        }
+        let (lines, number, chain) = self.carried_lines(time)?;
+        let Journal::Folder { log, .. } = &mut self.journal else { return Ok(()) };
+        match log.begin_anew(self.index.next_number.saturating_sub(1), &lines, chain) {
+            Ok(()) => {
+                self.index.next_number = number;
+                (self.stuck, self.prune_due) = (false, true);
+                Ok(())
+            }
+            // A full file goes on being written to, rather than refuse what it still has room for.
+            Err(error) if full && !taken_away => {
+                if !self.stuck {
+                    tracing::warn!("the audit file is full and no new one can be begun: {error}");
                 }
-                Ok(newest)
+                self.stuck = true;
+                Ok(())
             }
-            Journal::Memory(recent) => {
-                let of_unit = |entry: &&AuditEntry| {
-                    unit.is_none_or(|unit| entry.unit.as_deref() == Some(unit.as_str()))
-                };
-                let mut newest: Vec<_> = recent.iter().rev().filter(of_unit).take(limit).cloned().collect();
-                newest.reverse();
-                Ok(newest)
-            }
+            Err(error) => Err(error),
         }
     }
 }

@@ -16,7 +16,7 @@ use zenoh::Session;
 use zenoh::query::Query;
 
 use crate::config::Settings;
-use crate::control::swap_manager::ControlStatus;
+use crate::control::ControlStatus;
 use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;

@@ -18,7 +18,7 @@ use zenoh::Session;
 use zenoh::sample::Sample;
 
 use super::Pair;
-use crate::control::swap_manager::{Carried, Inbox};
+use crate::control::{Carried, Inbox};
 use crate::receive::intake::Intake;
 
 /// How long an answer is waited for.

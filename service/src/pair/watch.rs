@@ -10,7 +10,7 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent, JournalPart
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::pair::Member;
 use zenoh::pubsub::Subscriber;
-use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 use super::{Pair, Questions};
@@ -18,6 +18,7 @@ use crate::ServiceError;
 use crate::receive::fault::FaultKind;
 use crate::receive::intake::Intake;
 use crate::receive::unit::{Alarm, UnitActor, Wants};
+use crate::service::declare::subscribe;
 
 /// How often the units are looked at where no other instance is there.
 const ALONE: Duration = Duration::from_millis(100);
@@ -54,28 +55,18 @@ impl Watch {
         questions: Questions,
     ) -> Result<Self, ServiceError> {
         let (events, receiver) = channel();
-        let declare = |key: &'static str| move |source| ServiceError::Declare { key, source };
         let hears = Arc::clone(intake);
-        let corrected = session
-            .declare_subscriber(key::ALL_CORRECTED)
-            .allowed_origin(Locality::Remote)
-            .callback(move |sample| {
-                let key = sample.key_expr();
-                if let Some(serial) = key::parse_corrected(key.as_str()) {
-                    hears.hear(serial, &sample.payload().to_bytes(), Instant::now());
-                }
-            })
-            .await
-            .map_err(declare(key::ALL_CORRECTED))?;
+        let corrected = subscribe(session, key::ALL_CORRECTED, move |sample| {
+            if let Some(serial) = key::parse_corrected(sample.key_expr().as_str()) {
+                hears.hear(serial, &sample.payload().to_bytes(), Instant::now());
+            }
+        });
+        let corrected = corrected.await?;
         let told = events.clone();
-        let journals = session
-            .declare_subscriber(key::ALL_JOURNALS)
-            .allowed_origin(Locality::Remote)
-            .callback(move |sample| {
-                let _ = told.send(Event::Journal(sample.payload().to_bytes().into_owned()));
-            })
-            .await
-            .map_err(declare(key::ALL_JOURNALS))?;
+        let journals = subscribe(session, key::ALL_JOURNALS, move |sample| {
+            let _ = told.send(Event::Journal(sample.payload().to_bytes().into_owned()));
+        });
+        let journals = journals.await?;
         let told = events.clone();
         let members = session
             .liveliness()
@@ -88,7 +79,7 @@ impl Watch {
                 let _ = told.send(event);
             })
             .await
-            .map_err(declare(key::ALL_MEMBERS))?;
+            .map_err(|source| ServiceError::Declare { key: key::ALL_MEMBERS, source })?;
         let work = Work {
             pair: Arc::clone(pair),
             intake: Arc::clone(intake),

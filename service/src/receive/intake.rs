@@ -15,8 +15,9 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatc
 use isotherm_protocol::status::{Fault, Output, Status};
 
 use crate::config::Settings;
-use crate::control::calibrations::{Calibrations, Change, Plan};
-use crate::control::swap_manager::Inbox;
+use crate::control::Inbox;
+use crate::control::change::Change;
+use crate::control::revision::{Calibrations, Plan};
 use crate::observe::totals::Totals;
 use crate::pair::Pair;
 use crate::receive::fault::{FaultKind, FaultLog};
@@ -177,7 +178,7 @@ impl Intake {
             }
         }
         if let Some(current) = &plan.current {
-            tracing::info!(unit = %id, revision = current.revision.counter, "appeared, calibrated");
+            tracing::info!(unit = %id, revision = current.number.counter, "appeared, calibrated");
         } else {
             tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
         }
@@ -295,13 +296,13 @@ impl Intake {
             actor.change(change)
         }) {
             Some(replaced) => replaced,
-            None => before.map(|change| change.next.revision.counter),
+            None => before.map(|change| change.next.number.counter),
         }
     }
 
     /// Has a unit begin with what it had before the service was restarted.
     pub(crate) fn restore(&self, unit: &UnitId, plan: Plan) {
-        if plan.changes().next().is_none() && plan.intent.is_empty() {
+        if plan.last().is_none() && plan.intent.is_empty() {
             return;
         }
         *self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plan_mut(unit) = plan;

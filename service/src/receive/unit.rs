@@ -20,8 +20,9 @@ use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::status::{self, Counter, Output};
 use isotherm_protocol::stream::UnitStream;
 
-use crate::control::calibrations::{Change, Plan};
-use crate::control::swap_manager::{Inbox, Notice};
+use crate::control::change::Change;
+use crate::control::revision::Plan;
+use crate::control::{Inbox, Notice};
 use crate::receive::fault::{FaultKind, FaultLog};
 use crate::receive::latency::Histogram;
 use arrivals::Arrivals;
@@ -116,7 +117,7 @@ impl UnitActor {
     /// Has a calibration take effect at its tick: the only way by which a unit ever gets one. Gives the revision counter of
     /// a change that was waiting and is replaced. A revision that the unit was given already is passed over.
     pub fn change(&mut self, change: Change) -> Option<u64> {
-        if change.next.revision.counter < self.stream.next_counter() {
+        if change.next.number.counter < self.stream.next_counter() {
             return None;
         }
         let replaced = self.give(&change);
@@ -130,8 +131,8 @@ impl UnitActor {
     /// Hands a change to the stream.
     fn give(&mut self, change: &Change) -> Option<u64> {
         let Change { next, at, slew } = change;
-        let label = next.label.clone();
-        let (calibration, revision) = (Arc::clone(&next.calibration), next.revision);
+        let label = next.label();
+        let (calibration, revision) = (Arc::clone(&next.document.calibration), next.number);
         let replaced = if label.digest.is_none() {
             self.stream.install_as(calibration, revision, label);
             None

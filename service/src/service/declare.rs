@@ -16,7 +16,7 @@ use zenoh::{Session, Wait};
 
 use crate::ServiceError;
 use crate::config::chunk;
-use crate::control::swap_manager::{Inbox, Origin};
+use crate::control::{Asked as Order, Inbox, Origin};
 use crate::observe::status_publisher::{Asked, Bell};
 use crate::pair::Pair;
 use crate::receive::intake::{Intake, OutletMaker};
@@ -51,17 +51,14 @@ impl Declared {
         let alive = key::service_alive(&session.zid().to_string());
         let own = session.liveliness().declare_token(alive).await;
         let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
-        let [history, kept] = [(); 2].map(|()| inbox.clone());
         let ask = |asked| {
             let bell = bell.clone();
             move |query| bell.ask(asked, query)
         };
         let mut queryables = orders(session, inbox).await?;
         queryables.extend([
-            answer(session, key::ALL_HISTORY, move |query| history.history(query)).await?,
             answer(session, key::ALL_CONFIGURATIONS, ask(Asked::Configuration)).await?,
             answer(session, key::ALL_JOURNALS, ask(Asked::Memory)).await?,
-            answer(session, key::ALL_KEPT, move |query| kept.kept(query)).await?,
             answer(session, key::ALL_PAIRS, ask(Asked::Pair)).await?,
             answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
             answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
@@ -183,7 +180,8 @@ fn is_of(chunks: &[OwnedKeyExpr], sample: &Sample) -> bool {
     serial.is_some_and(|serial| chunks.iter().any(|chunk| chunk.intersects(serial)))
 }
 
-async fn subscribe(
+/// Hears what other processes put on a key.
+pub(crate) async fn subscribe(
     session: &Session,
     key: &'static str,
     callback: impl Fn(Sample) + Send + Sync + 'static,
@@ -192,23 +190,24 @@ async fn subscribe(
     subscriber.await.map_err(|source| ServiceError::Declare { key, source })
 }
 
-/// Takes what may change a unit: from other processes, on keys with the name of who asks and without, and from the console in this one.
+/// Takes what the swap manager answers. What may change a unit comes from other processes, on keys with the name of who asks and
+/// without, and from the console in this one.
 async fn orders(session: &Session, inbox: &Inbox) -> Result<Vec<Queryable<()>>, ServiceError> {
     let (bus, own) = ((Locality::Remote, Origin::Bus), (Locality::SessionLocal, Origin::Console));
+    let any = (Locality::Any, Origin::Bus);
     let mut queryables = Vec::new();
-    for (key, (from, origin)) in [
-        (key::ALL_CALIBRATION, bus),
-        (key::ALL_CALIBRATION, own),
-        (key::ALL_CALIBRATION_BY, bus),
-        (key::ALL_COMMAND, bus),
-        (key::ALL_COMMAND, own),
-        (key::ALL_COMMAND_BY, bus),
+    for (key, asked, (from, origin)) in [
+        (key::ALL_CALIBRATION, Order::Calibration, bus),
+        (key::ALL_CALIBRATION, Order::Calibration, own),
+        (key::ALL_CALIBRATION_BY, Order::Calibration, bus),
+        (key::ALL_COMMAND, Order::Command, bus),
+        (key::ALL_COMMAND, Order::Command, own),
+        (key::ALL_COMMAND_BY, Order::Command, bus),
+        (key::ALL_HISTORY, Order::History, any),
+        (key::ALL_KEPT, Order::Kept, any),
     ] {
         let inbox = inbox.clone();
-        let is_command = [key::ALL_COMMAND, key::ALL_COMMAND_BY].contains(&key);
-        let take = move |query| {
-            if is_command { inbox.command(query, origin) } else { inbox.calibration(query, origin) }
-        };
+        let take = move |query| inbox.ask(asked, query, origin);
         queryables.push(answer_from(session, key, from, take).await?);
     }
     Ok(queryables)

@@ -5,7 +5,9 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::document::Problem;
-use isotherm_protocol::signature::{PublicKey, TrustedKeys};
+use isotherm_protocol::signature::{self, PublicKey, TrustedKeys};
+
+use crate::config::SwapSettings;
 
 use isotherm_document::file::{read_bounded, text};
 use isotherm_document::unplaced;
@@ -45,6 +47,38 @@ pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), V
             .map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?,
     );
     if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
+}
+
+/// Verifies the signature as far as the configuration asks for one.
+pub(crate) fn check_signature(
+    settings: &SwapSettings,
+    text: &str,
+    name: &str,
+    problems: &mut Vec<Problem>,
+    warnings: &mut Vec<Problem>,
+) {
+    let Some(folder) = &settings.trusted_keys else { return };
+    let verdict = if settings.require_signature { problems } else { &mut *warnings };
+    // Read at each swap: a key that was added or taken away counts at once.
+    let (keys, doubts) = match read_trusted_keys(folder) {
+        Ok(read) => read,
+        Err(found) => {
+            verdict.extend(found);
+            (TrustedKeys::default(), Vec::new())
+        }
+    };
+    match signature::verify(text, &keys) {
+        Ok(signature::Verdict::Signed { .. }) => {}
+        Ok(signature::Verdict::Unsigned) if !settings.require_signature => {}
+        Ok(signature::Verdict::Unsigned) => verdict.push(unplaced(
+            Some(name),
+            "is not signed, but require_signature is set: sign it (`isotherm sign`) with a key that has its .pub \
+             file in the folder of trusted keys"
+                .to_owned(),
+        )),
+        Err(error) => verdict.push(error.problem(Some(name))),
+    }
+    warnings.extend(doubts);
 }
 
 /// Says so where a private key lies among the public ones, under whatever name: whoever may read the folder can sign. One

@@ -15,8 +15,10 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::stream::Label;
 use isotherm_service::Settings;
-use isotherm_service::control::calibrations::{Calibrations, Change, Installable};
+use isotherm_service::control::change::Change;
 use isotherm_service::control::compressed::CompressedText;
+use isotherm_service::control::document;
+use isotherm_service::control::revision::{Calibrations, Revision};
 use isotherm_service::receive::intake::Intake;
 use isotherm_service::receive::unit::{Journal, Outlet, UnitActor};
 use isotherm_tests::lives::{FULL_CHANNELS, full, place, pre_launch};
@@ -87,14 +89,10 @@ fn act(actor: &mut UnitActor, event: &JournalEvent, now: Instant) -> String {
         JournalEvent::Changed { revision, at, slew_ns, document, overlay, .. } => {
             let text = document.as_deref().unwrap();
             let parsed = Document::parse(text, None).unwrap();
-            let label = Label::of(&parsed.document, Digest(parsed.digest), "");
-            let next = Installable::of_document(
-                revision.counter,
-                Arc::new(parsed.calibration),
-                (label, *overlay),
-                CompressedText::new(text),
-                &Source::Bus,
-            );
+            let label = Label { overlay: *overlay, ..Label::of(&parsed.document, Digest(parsed.digest), "") };
+            let (calibration, text) = (Arc::new(parsed.calibration), CompressedText::new(text));
+            let document = Arc::new(document::Document::new(calibration, label, text));
+            let next = Revision::new(revision.counter, document, &Source::Bus);
             let change = Change { next: Arc::new(next), at: *at, slew: Span::from_ns(*slew_ns) };
             format!(
                 "replaces {:?}, waiting {:?}",

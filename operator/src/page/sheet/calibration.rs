@@ -3,12 +3,11 @@
 use std::time::{Duration, SystemTime};
 
 use isotherm_cli::grouped;
-use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::status::{ActiveCalibration, Output, Status};
 use ratatui::text::Span;
 
 use super::super::figure::{self, signed, since_s};
-use super::super::grid::{Column, Grid};
+use super::super::grid::Column;
 use super::super::remark::schedule;
 use super::super::tone;
 use super::Section;
@@ -79,14 +78,15 @@ fn day(unix_s: i64) -> Option<String> {
 /// What is subtracted at present, by case axis.
 pub(super) fn correction(status: &Status, columns: usize) -> Option<Section> {
     let applied = status.applied?;
-    let rates = applied.angular_rate_rad_per_s.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
-    let forces = applied.specific_force_m_per_s2.map(|force| force / STANDARD_GRAVITY_M_PER_S2 * 1e3);
+    let rates = applied.angular_rate_rad_per_s.map(figure::deg_per_h);
+    let forces = applied.specific_force_m_per_s2.map(figure::milli_g);
     let row = |name: &'static str, values: [f64; 3]| {
         let cells = values.into_iter().map(|value| Span::raw(signed(value)));
         std::iter::once(Span::styled(name, tone::DIM)).chain(cells).collect()
     };
     let [x, y, z] = ["x", "y", "z"].map(|axis| Column::number(axis, 0, 9));
     let layout = [Column::words("", 0, super::NAME - 2), x, y, z];
-    let grid = Grid::set(&layout, &[row("°/h", rates), row("mg", forces)], columns.saturating_sub(2));
-    Some(Section { title: "Correction, subtracted in case axes", lines: grid.indented() })
+    let mut section = Section::new("Correction, subtracted in case axes");
+    section.grid(&layout, &[row("°/h", rates), row("mg", forces)], columns);
+    Some(section)
 }

@@ -1,13 +1,12 @@
 //! Health of the sensors, and what the drift estimator knows.
 
 use isotherm_correction::sample::SensorFlags;
-use isotherm_correction::units::AngularRate;
 use isotherm_protocol::status::{DriftStatus, Rest, SensorStatus, Status};
 use ratatui::style::Style;
 use ratatui::text::Span;
 
-use super::super::figure::{NONE, count, digits, signed};
-use super::super::grid::{Column, Grid};
+use super::super::figure::{NONE, count, deg_per_h, digits, or_none, signed};
+use super::super::grid::Column;
 use super::super::remark::sensor_words;
 use super::super::tone;
 use super::{Section, sensor_name};
@@ -30,8 +29,9 @@ pub(super) fn sensors(status: &Status, columns: usize) -> Option<Section> {
         number("stale", 6),
     ];
     let rows: Vec<_> = status.sensors.iter().map(row).collect();
-    let grid = Grid::set(&layout, &rows, columns.saturating_sub(2));
-    Some(Section { title: "Sensors, in ticks since the start", lines: grid.indented() })
+    let mut section = Section::new("Sensors, in ticks since the start");
+    section.grid(&layout, &rows, columns);
+    Some(section)
 }
 
 fn row(sensor: &SensorStatus) -> Vec<Span<'static>> {
@@ -81,7 +81,7 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
             Column::words("", 1, 10),
         ];
         let rows: Vec<_> = status.drift.iter().map(estimate).collect();
-        section.lines = Grid::set(&layout, &rows, columns.saturating_sub(2)).indented();
+        section.grid(&layout, &rows, columns);
     }
     let rest = match &status.rest {
         None => return Some(section),
@@ -95,7 +95,6 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
 }
 
 fn estimate(drift: &DriftStatus) -> Vec<Span<'static>> {
-    let deg_per_h = |rate_rad_per_s: f64| AngularRate::from_rad_per_s(rate_rad_per_s).as_deg_per_h();
     vec![
         Span::raw(format!(
             "gyro {}",
@@ -106,7 +105,7 @@ fn estimate(drift: &DriftStatus) -> Vec<Span<'static>> {
         Span::raw(signed(deg_per_h(drift.trend_rad_per_s2) * 3600.0)),
         Span::raw(count(drift.updates)),
         Span::raw(count(drift.refused)),
-        Span::raw(drift.mean_nis.map_or_else(|| NONE.to_owned(), digits)),
+        Span::raw(or_none(drift.mean_nis, digits)),
         Span::styled(
             if drift.subtracted { "subtracted" } else { "only told" },
             if drift.subtracted { tone::PLAIN } else { tone::DIM },

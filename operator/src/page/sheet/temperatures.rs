@@ -7,8 +7,8 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::super::chart::spark;
-use super::super::figure::{self, NONE};
-use super::super::grid::{Column, Grid};
+use super::super::figure;
+use super::super::grid::Column;
 use super::super::{Past, Unit, tone};
 use super::Section;
 
@@ -35,18 +35,15 @@ pub(super) fn section(unit: &Unit<'_>, columns: usize) -> Option<Section> {
         Column::words("", 1, 6),
     ];
     let rows: Vec<_> = channels.iter().map(row).collect();
-    let grid = Grid::set(&layout, &rows, columns.saturating_sub(2));
-    let used = usize::from(grid.width);
-    let mut lines = grid.indented();
-    courses(&mut lines, unit, columns.saturating_sub(used + 2));
-    Some(Section { title: "Temperatures", lines })
+    let mut section = Section::new("Temperatures");
+    let used = section.grid(&layout, &rows, columns);
+    courses(&mut section.lines, unit, columns.saturating_sub(used));
+    Some(section)
 }
 
 fn row(channel: &ChannelStatus) -> Vec<Span<'static>> {
     let (place, style) = place(channel);
-    let range = channel
-        .calibrated_range_deg_c
-        .map_or_else(|| NONE.to_owned(), |[low, high]| format!("{low} … {high}"));
+    let range = figure::or_none(channel.calibrated_range_deg_c, |[low, high]| format!("{low} … {high}"));
     vec![
         Span::raw(channel.name.as_str().to_owned()),
         Span::styled(figure::temperature(channel.temperature_deg_c), style),

@@ -1,17 +1,14 @@
 //! Pre-launch calibration and self-test.
 
-use std::time::Duration;
-
 use isotherm_correction::sample::LasingMode as Mode;
-use isotherm_correction::units::AngularRate;
 use isotherm_protocol::status::{
     ConstantsChange, PreLaunchGyro, PreLaunchMode, PreLaunchVerdict, SelfTestItem, Status,
 };
 use ratatui::text::{Line, Span};
 
 use super::super::chart::bar;
-use super::super::figure::{self, NONE, digits, of, signed, since};
-use super::super::grid::{Column, Grid};
+use super::super::figure::{self, deg_per_h, digits, of, or_none, signed};
+use super::super::grid::Column;
 use super::super::tone;
 use super::Section;
 
@@ -22,9 +19,7 @@ const BAR: usize = 30;
 pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
     let mut section = Section::new("Pre-launch calibration");
     if let Some(progress) = &status.pre_launch {
-        let share = (progress.elapsed_s / progress.duration_s).clamp(0.0, 1.0);
-        let left = Duration::try_from_secs_f64((progress.duration_s - progress.elapsed_s).max(0.0));
-        let left = left.map_or_else(|_| NONE.to_owned(), since);
+        let (share, left) = figure::progress(progress);
         let full = bar(share, BAR);
         let empty = "░".repeat(BAR.saturating_sub(full.chars().count()));
         section.lines.push(Line::from(format!("  {full}{empty} {:.0} %, {left} left", share * 100.0)));
@@ -34,7 +29,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
             Column::words("ticks of each mode", 1, 10),
         ];
         let rows: Vec<_> = progress.gyros.iter().map(gyro).collect();
-        section.lines.extend(Grid::set(&layout, &rows, columns.saturating_sub(2)).indented());
+        section.grid(&layout, &rows, columns);
         return Some(section);
     }
     let outcome = status.pre_launch_outcome.as_ref()?;
@@ -53,7 +48,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
                 Column::number("σ", 0, 6),
             ];
             let rows: Vec<_> = changes.iter().map(change).collect();
-            section.lines.extend(Grid::set(&layout, &rows, columns.saturating_sub(2)).indented());
+            section.grid(&layout, &rows, columns);
         }
         PreLaunchVerdict::Refused(reasons) => {
             section.field("last one", "refused; the constants stay", tone::WARNING, columns);
@@ -68,12 +63,8 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
     Some(section)
 }
 
-fn deg_per_h(rate_rad_per_s: f64) -> f64 {
-    AngularRate::from_rad_per_s(rate_rad_per_s).as_deg_per_h()
-}
-
 fn gyro(gyro: &PreLaunchGyro) -> Vec<Span<'static>> {
-    let sigma = gyro.sigma_rad_per_s.map_or_else(|| NONE.to_owned(), |sigma| digits(deg_per_h(sigma)));
+    let sigma = or_none(gyro.sigma_rad_per_s, |sigma| digits(deg_per_h(sigma)));
     let modes: Vec<_> = gyro.modes.iter().map(mode).collect();
     vec![Span::raw(gyro.name.clone()), Span::raw(sigma), Span::raw(modes.join(", "))]
 }
@@ -89,7 +80,7 @@ fn mode(mode: &PreLaunchMode) -> String {
 
 fn change(change: &ConstantsChange) -> Vec<Span<'static>> {
     let maybe = |value: Option<f64>, words: fn(f64) -> String| {
-        Span::raw(value.map_or_else(|| NONE.to_owned(), |value| words(deg_per_h(value))))
+        Span::raw(or_none(value, |value| words(deg_per_h(value))))
     };
     vec![
         Span::raw(change.gyro.clone()),

@@ -8,8 +8,7 @@ use std::time::{Duration, SystemTime};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
-use super::retention::is_older;
-use super::{StoreError, durable};
+use super::{StoreError, folder};
 use crate::control::compressed::CompressedBytes;
 use isotherm_document::file::{check_regular, read_bounded};
 
@@ -40,7 +39,7 @@ impl BlobStore {
     /// # Errors
     /// [`StoreError::Folder`] where it cannot be made or written to.
     pub(super) fn open(folder: PathBuf) -> Result<Self, StoreError> {
-        match durable::make_folder(&folder).and_then(|()| durable::sweep(&folder)) {
+        match folder::make_folder(&folder).and_then(|()| folder::sweep(&folder)) {
             Ok(()) => Ok(Self::Folder(folder)),
             Err(source) => Err(StoreError::Folder { path: folder, source }),
         }
@@ -75,7 +74,7 @@ impl BlobStore {
         match self {
             Self::Folder(folder) => {
                 let files = new.into_iter().map(|(digest, kept)| (name(digest), kept));
-                durable::write_all(folder, files, CompressedBytes::read)
+                folder::write_all(folder, files, CompressedBytes::read)
                     .map_err(|(name, source)| StoreError::Write { path: folder.join(name), source })
             }
             Self::Memory(memory) => {
@@ -165,4 +164,10 @@ fn read(path: &Path, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
         found if found == *digest => Ok(Some(bytes)),
         found => Err(StoreError::Corrupt { path: path.to_owned(), found }),
     }
+}
+
+/// Whether a file was written longer ago than this.
+fn is_older(file: &Path, now: SystemTime, age: Duration) -> bool {
+    let written = file.metadata().and_then(|metadata| metadata.modified());
+    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|since| since > age))
 }

@@ -15,7 +15,7 @@ const MAX_SETS: usize = 1000;
 const MAX_FILES: usize = 4096;
 
 /// What holds, by the entries so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Index {
     units: BTreeMap<UnitId, OfUnit>,
     /// What was last seen in each file of the watched folder.
@@ -24,6 +24,8 @@ pub(super) struct Index {
     rivals: BTreeMap<String, Digest>,
     /// Revisions up to this one were given by an audit file that is lost.
     pub(super) floor: u64,
+    /// Number of the next entry.
+    pub(super) next_number: u64,
 }
 
 /// What was last seen in a file of the watched folder.
@@ -50,9 +52,22 @@ struct OfUnit {
     lost: Option<u64>,
 }
 
+impl Default for Index {
+    fn default() -> Self {
+        Self {
+            units: BTreeMap::new(),
+            files: BTreeMap::new(),
+            rivals: BTreeMap::new(),
+            floor: 0,
+            next_number: 1,
+        }
+    }
+}
+
 impl Index {
     /// Takes an entry in; entries come in the order of their numbers.
     pub(super) fn apply(&mut self, entry: &AuditEntry) {
+        self.next_number = self.next_number.max(entry.number.saturating_add(1));
         let unit = entry.unit.as_deref().and_then(|unit| UnitId::new(unit).ok());
         match &entry.event {
             AuditEvent::Accepted(accepted) => {
@@ -125,9 +140,13 @@ impl Index {
         }
     }
 
-    /// The line of a revision's acceptance cannot be read.
-    pub(super) fn lose(&mut self, unit: &UnitId, revision: u64) {
-        let of_unit = self.units.entry(unit.clone()).or_default();
+    /// A line cannot be read: its number, where that much can be, and the unit and the revision where it looks like an
+    /// acceptance.
+    pub(super) fn skip(&mut self, number: Option<u64>, acceptance: Option<(UnitId, u64)>) {
+        // Whatever stood there had a number.
+        self.next_number = self.next_number.max(number.unwrap_or(self.next_number).saturating_add(1));
+        let Some((unit, revision)) = acceptance else { return };
+        let of_unit = self.units.entry(unit).or_default();
         of_unit.highest_revision = of_unit.highest_revision.max(revision);
         of_unit.lose(revision);
     }

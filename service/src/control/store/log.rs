@@ -9,26 +9,14 @@ use isotherm_protocol::history::chain::Chain;
 use isotherm_protocol::history::{AuditEntry, LineError};
 use isotherm_protocol::key::UnitId;
 
+use super::index::Index;
 use super::opened::{Damage, Gap, Opened, Torn};
-use super::{StoreError, durable, scan};
+use super::read::{self, Extent, Line};
+use super::{StoreError, folder as files};
 use isotherm_document::file::check_regular;
 
 /// Name of the file that is written to.
 pub(super) const NAME: &str = "audit.jsonl";
-
-/// What was found on a line.
-#[derive(Debug)]
-pub(super) enum Found {
-    /// An entry.
-    Entry(Box<AuditEntry>),
-    /// Nothing that can be used.
-    Skipped {
-        /// The number that the entry has, where that much can be read.
-        number: Option<u64>,
-        /// The unit and the revision, where it looks like an acceptance.
-        acceptance: Option<(UnitId, u64)>,
-    },
-}
 
 /// What is written to: a file, or in tests one that fails.
 pub(super) trait Sink: fmt::Debug + Send {
@@ -72,22 +60,18 @@ pub(super) struct Log {
 
 impl Log {
     /// Opens the audit file of a folder, or makes an empty one. What is found in the last full file and in this one goes to
-    /// `visit`, the oldest first; a last line that was not written to its end is put aside.
+    /// the index, the oldest first; a last line that was not written to its end is put aside.
     ///
     /// # Errors
     /// [`StoreError::Read`], or [`StoreError::Write`].
-    pub(super) fn open(
-        folder: &Path,
-        opened: &mut Opened,
-        visit: &mut dyn FnMut(Found),
-    ) -> Result<Self, StoreError> {
+    pub(super) fn open(folder: &Path, opened: &mut Opened, index: &mut Index) -> Result<Self, StoreError> {
         let mut chain = Chain::default();
         if let Some(before) = last_full_file(folder)? {
-            read(&before, false, opened, &mut chain, visit)?;
+            take_in(&before, false, opened, &mut chain, index)?;
         }
         let path = folder.join(NAME);
         let mut file = append_to(&path)?;
-        let (extent, rest_is_whole) = read(&path, true, opened, &mut chain, visit)?;
+        let (extent, rest_is_whole) = take_in(&path, true, opened, &mut chain, index)?;
         let mut length = extent.lines;
         if extent.rest > 0 {
             let torn = if rest_is_whole { complete(&mut file) } else { move_rest(folder, &mut file, extent) };
@@ -97,7 +81,7 @@ impl Log {
             }
             opened.torn = Some(torn);
         }
-        durable::sync_folder(folder).map_err(StoreError::write(folder))?;
+        files::sync_folder(folder).map_err(StoreError::write(folder))?;
         if length == 0 {
             chain.begin_file();
         }
@@ -176,17 +160,17 @@ impl Log {
         chain: Chain,
     ) -> Result<(), StoreError> {
         let write = |source| StoreError::Write { path: self.path.clone(), source };
-        let new = durable::prepare(&self.folder, NAME, lines.as_bytes()).map_err(write)?;
+        let new = files::prepare(&self.folder, NAME, lines.as_bytes()).map_err(write)?;
         if std::fs::metadata(&self.path).is_ok_and(|found| found.len() > 0) {
             // The number is taken already where somebody has put an old file back.
             let names = (last_number..).map(|number| self.folder.join(format!("audit-{number}.jsonl")));
             if let Some(aside) = free(names) {
                 std::fs::rename(&self.path, aside).map_err(write)?;
-                durable::sync_folder(&self.folder).map_err(write)?;
+                files::sync_folder(&self.folder).map_err(write)?;
             }
         }
         std::fs::rename(new, &self.path).map_err(write)?;
-        durable::sync_folder(&self.folder).map_err(write)?;
+        files::sync_folder(&self.folder).map_err(write)?;
         self.sink = Box::new(append_to(&self.path)?);
         self.length = lines.len() as u64;
         self.carried = self.length;
@@ -237,17 +221,17 @@ pub(super) fn full_files(folder: &Path) -> Result<Vec<PathBuf>, StoreError> {
 
 /// Reads a file: where its lines end, and whether what stands behind the last line feed is a whole entry. Where that
 /// `may_be_torn`, it is no damage.
-fn read(
+fn take_in(
     path: &Path,
     may_be_torn: bool,
     opened: &mut Opened,
     chain: &mut Chain,
-    visit: &mut dyn FnMut(Found),
-) -> Result<(scan::Extent, bool), StoreError> {
+    index: &mut Index,
+) -> Result<(Extent, bool), StoreError> {
     let mut rest_is_whole = false;
     // Entries are numbered without a gap: a line that somebody took out is missed by its number.
     let mut next = None;
-    let extent = scan::lines(path, |scan::Line { number: line, bytes, ended }| {
+    let extent = read::lines(path, |Line { number: line, bytes, ended }| {
         rest_is_whole = !ended && AuditEntry::is_whole(bytes);
         chain.pass(bytes);
         match AuditEntry::from_line(bytes) {
@@ -257,14 +241,14 @@ fn read(
                     opened.gaps.push(Gap { file: path.to_owned(), line, first, last: entry.number - 1 });
                 }
                 next = Some(entry.number.saturating_add(1));
-                visit(Found::Entry(Box::new(entry)));
+                index.apply(&entry);
             }
             Err(_) if may_be_torn && !ended && !rest_is_whole => {}
             Err(error) => {
                 opened.damage(Damage { file: path.to_owned(), line, words: error.to_string() });
                 let number = if let LineError::Entry { number, .. } = error { number } else { None };
                 next = number.or(next).map(|number| number.saturating_add(1));
-                visit(Found::Skipped { number, acceptance: acceptance_in(bytes) });
+                index.skip(number, acceptance_in(bytes));
             }
         }
     });
@@ -285,7 +269,7 @@ fn acceptance_in(line: &[u8]) -> Option<(UnitId, u64)> {
 /// Whether a crash came between putting a full file aside and beginning a new one: then there is no file to write to, and
 /// nothing is lost. To be asked before half-written files are swept away.
 pub(super) fn was_being_begun_anew(folder: &Path) -> bool {
-    durable::is_half_written(folder, NAME)
+    files::is_half_written(folder, NAME)
 }
 
 /// Adds the line feed that is missing.
@@ -296,7 +280,7 @@ fn complete(file: &mut File) -> io::Result<Torn> {
 }
 
 /// Moves what stands behind the last line feed to a file of its own: first there, then away from here.
-fn move_rest(folder: &Path, file: &mut File, extent: scan::Extent) -> io::Result<Torn> {
+fn move_rest(folder: &Path, file: &mut File, extent: Extent) -> io::Result<Torn> {
     let names = (1_u64..).map(|number| folder.join(format!("audit.torn-{number}")));
     let to = free(names).ok_or(ErrorKind::AlreadyExists)?;
     file.seek(SeekFrom::Start(extent.lines))?;

@@ -1,7 +1,6 @@
 //! What of the state folder may go: old audit files, and documents that nothing can go back to.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use isotherm_protocol::digest::Digest;
@@ -48,10 +47,4 @@ impl Store {
         let text = String::from_utf8(self.overlays.get(overlay).ok()??).ok()?;
         Overlay::parse(&text, None).ok()?.overlay.overlay_of.parse().ok()
     }
-}
-
-/// Whether a file was written longer ago than this.
-pub(super) fn is_older(file: &Path, now: SystemTime, age: Duration) -> bool {
-    let written = file.metadata().and_then(|metadata| metadata.modified());
-    written.is_ok_and(|written| now.duration_since(written).is_ok_and(|since| since > age))
 }

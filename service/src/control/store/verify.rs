@@ -8,9 +8,9 @@ use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::history::chain::{Broken, Head, Verifier};
 use serde::Serialize;
 
+use super::folder::Mark;
 use super::log::{NAME, full_files};
-use super::mark::Mark;
-use super::{StoreError, scan};
+use super::{StoreError, read};
 
 /// Most breaks that are kept in words.
 const MAX_BREAKS: usize = 100;
@@ -85,7 +85,7 @@ fn once(folder: &Path, full: &[PathBuf], noted: Option<Digest>) -> Result<Verifi
     let mut last_line = 0;
     for file in full.iter().chain([&current]) {
         last_line = 0;
-        let read = scan::lines(file, |scan::Line { number: line, bytes, ended }| {
+        let read = read::lines(file, |read::Line { number: line, bytes, ended }| {
             // What is being written, or was when the power went, is no entry yet.
             if file == &current && !ended && !AuditEntry::is_whole(bytes) {
                 return;

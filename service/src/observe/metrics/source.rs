@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
-use crate::control::swap_manager::{ControlStatus, Posted, UNWRITTEN};
+use crate::control::{ControlStatus, Posted, UNWRITTEN};
 use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
@@ -221,10 +221,7 @@ impl Source {
     /// Judges the service's health.
     pub(super) fn judge(&self, watch: &mut Watch, stopping: bool) -> Verdict {
         self.watch_units(watch);
-        let units = self.intake.each_unit(|actor| {
-            let (state, output) = actor.doing();
-            UnitSummary { unit: actor.id().to_string(), state, output }
-        });
+        let units = self.intake.each_unit(|actor| actor.summary());
         let reasons = self.reasons(Instant::now(), watch, stopping);
         Verdict { instance: self.instance.clone(), units, ..Verdict::new(self.started.elapsed(), reasons) }
     }

@@ -13,8 +13,8 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use super::*;
 use crate::config::Settings;
-use crate::control::calibrations::Calibrations;
-use crate::control::swap_manager::ControlStatus;
+use crate::control::ControlStatus;
+use crate::control::revision::Calibrations;
 use crate::pair::Pair;
 use crate::receive::intake::{Intake, OutletMaker};
 use checker::Page;

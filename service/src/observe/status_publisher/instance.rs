@@ -1,14 +1,15 @@
 //! What the service says of itself.
 
 use std::sync::Arc;
-use std::time::{Instant, SystemTime};
+use std::time::Instant;
 
+use isotherm_operator::status::unix_ms;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::service_status::{MAX_UNITS, ServiceStatus, UnitSummary};
+use isotherm_protocol::service_status::{MAX_UNITS, ServiceStatus};
 use isotherm_protocol::status::MAX_FAULTS;
 use zenoh::Session;
 
-use crate::control::swap_manager::{ControlStatus, Posted};
+use crate::control::{ControlStatus, Posted};
 use crate::observe::subscribers::Subscribers;
 use crate::receive::fault::standing;
 use crate::receive::intake::Intake;
@@ -45,11 +46,9 @@ impl Instance {
         control_status: Arc<ControlStatus>,
         subscribers: Arc<Subscribers>,
     ) -> Self {
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let started_unix_ms = i64::try_from(since.as_millis()).unwrap_or(i64::MAX);
         Self {
             name: session.zid().to_string(),
-            started: (Instant::now(), started_unix_ms),
+            started: (Instant::now(), unix_ms()),
             settings_digest,
             control_status,
             subscribers,
@@ -69,10 +68,7 @@ impl Instance {
         if look == Look::IfPosted && self.posted.as_ref().is_some_and(|before| Arc::ptr_eq(before, &posted)) {
             return None;
         }
-        let mut units = intake.each_unit(|actor| {
-            let (state, output) = actor.doing();
-            UnitSummary { unit: actor.id().to_string(), state, output }
-        });
+        let mut units = intake.each_unit(|actor| actor.summary());
         units.truncate(MAX_UNITS);
         let news = ServiceStatus {
             instance: self.name.clone(),

@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use isotherm_correction::operation;
-use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{PairReport, UnitRole};
 use isotherm_protocol::service_status::ServiceStatus;
@@ -12,8 +11,7 @@ use serde::{Serialize, Serializer};
 
 use super::Web;
 use isotherm_operator::page::{
-    Level, Unit, channel_in_view, duplicates, is_running, knows_rates, late, length, range, said_of_pairs,
-    state_word,
+    Lately, Level, Unit, applied, channel_in_view, is_running, knows_rates, range, said_of_pairs, state_word,
 };
 use isotherm_operator::status::unix_ms;
 use isotherm_operator::{Fleet, worst_first};
@@ -74,7 +72,8 @@ struct Row {
 impl Row {
     fn of(unit: &Unit<'_>) -> Self {
         let status = unit.status;
-        let channel = channel_in_view(status);
+        let (channel, applied) = (channel_in_view(status), applied(status));
+        let counted = Lately::counted(status);
         Self {
             unit: status.unit.clone(),
             instance: status.instance.clone(),
@@ -88,18 +87,14 @@ impl Row {
             temperature_rate_deg_c_per_s: channel.and_then(|channel| channel.rate_deg_c_per_s),
             calibrated_range_deg_c: channel.and_then(|channel| channel.calibrated_range_deg_c),
             range: range(status).0,
-            correction_deg_per_h: status.applied.map(|applied| {
-                AngularRate::from_rad_per_s(length(applied.angular_rate_rad_per_s)).as_deg_per_h()
-            }),
-            correction_mg: status
-                .applied
-                .map(|applied| length(applied.specific_force_m_per_s2) / STANDARD_GRAVITY_M_PER_S2 * 1e3),
+            correction_deg_per_h: applied.map(|[rate, _]| rate),
+            correction_mg: applied.map(|[_, force]| force),
             raw_ticks_per_s: knows_rates(status).then_some(status.input_rates.gyro_ticks_per_s),
             p99_ns: status.latency.p99_ns,
-            gaps: status.counter("gaps"),
-            duplicates: duplicates(status),
-            late: late(status),
-            bad: status.counter("bad_frames"),
+            gaps: counted.gaps,
+            duplicates: counted.duplicates,
+            late: counted.late,
+            bad: counted.bad,
         }
     }
 }

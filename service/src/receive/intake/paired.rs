@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use isotherm_protocol::key::UnitId;
 
 use super::{Intake, guarded, lock};
-use crate::control::calibrations::Plan;
+use crate::control::revision::Plan;
 use crate::pair::Pair;
 use crate::receive::fault::FaultKind;
 

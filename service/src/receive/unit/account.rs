@@ -3,6 +3,7 @@
 use std::time::{Instant, SystemTime};
 
 use isotherm_protocol::digest::Digest;
+use isotherm_protocol::service_status::UnitSummary;
 use isotherm_protocol::status::{Counter, Latency, MAX_FAULTS, PreLaunchVerdict, Status, Swaps};
 use isotherm_protocol::stream::Edge;
 
@@ -79,6 +80,12 @@ impl UnitActor {
             outcome.verdict = PreLaunchVerdict::Refused(vec![format!("given up: {reason}")]);
         }
         status
+    }
+
+    /// What the unit is doing, and what becomes of its ticks.
+    pub(crate) fn summary(&self) -> UnitSummary {
+        let (state, output) = self.doing();
+        UnitSummary { unit: self.id().to_string(), state, output }
     }
 
     /// Sum of the latencies that the status counts (ns).

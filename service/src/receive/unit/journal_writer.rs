@@ -9,8 +9,9 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 
 use super::UnitActor;
-use crate::control::calibrations::{Change, Installable};
+use crate::control::change::Change;
 use crate::control::compressed::CompressedText;
+use crate::control::revision::Revision;
 use crate::receive::fault::FaultKind;
 
 /// Where the frames of journals go; `Err` is one that could not be published.
@@ -55,7 +56,7 @@ impl UnitActor {
     /// itself.
     #[must_use]
     pub(crate) fn memory(&self, instance: &str) -> JournalEntry {
-        let text = |next: &Arc<Installable>| next.text.as_ref().map(CompressedText::read);
+        let text = |next: &Arc<Revision>| next.document.text.as_ref().map(CompressedText::read);
         JournalEntry {
             unit: self.id().to_string(),
             instance: instance.to_owned(),
@@ -135,12 +136,12 @@ pub(super) fn began(stream: &UnitStream) -> JournalEvent {
 pub(super) fn changed(change: &Change) -> JournalEvent {
     let Change { next, at, slew } = change;
     JournalEvent::Changed {
-        revision: next.revision,
+        revision: next.number,
         at: *at,
         slew_ns: slew.as_ns(),
-        document: next.text.as_ref().map(CompressedText::read),
-        overlay: next.label.overlay,
-        source: next.label.source.clone(),
+        document: next.document.text.as_ref().map(CompressedText::read),
+        overlay: next.document.label.overlay,
+        source: next.source.clone(),
     }
 }
 

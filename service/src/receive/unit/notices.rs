@@ -7,7 +7,7 @@ use isotherm_correction::prelaunch::Outcome;
 use isotherm_correction::unit::PreLaunchView;
 use isotherm_protocol::stream::UnitStream;
 
-use crate::control::swap_manager::{Inbox, Notice, PreLaunchEnd};
+use crate::control::{Inbox, Notice, PreLaunchEnd};
 
 /// Watches a stream for what the swap manager and the readers of the status should hear of.
 #[derive(Debug, Default)]

@@ -17,7 +17,7 @@ use isotherm_protocol::replay::Follower;
 use isotherm_protocol::stream::UnitStream;
 
 use super::{Plan, UnitActor};
-use crate::control::swap_manager::Notice;
+use crate::control::Notice;
 use kept::Kept;
 
 /// How often the memory is asked for while none comes.

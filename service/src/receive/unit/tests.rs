@@ -13,7 +13,9 @@ use isotherm_protocol::stream::Label;
 
 use super::*;
 use crate::UnitTotals;
-use crate::control::calibrations::Installable;
+use crate::control::compressed::CompressedText;
+use crate::control::document::Document as Compiled;
+use crate::control::revision::Revision as Given;
 
 mod journal;
 mod speech;
@@ -66,7 +68,7 @@ fn example() -> (Arc<Calibration>, [u8; 8]) {
 /// Gives a unit a calibration from the next tick on, as the next revision.
 fn install(actor: &mut UnitActor, calibration: Arc<Calibration>, digest: [u8; 8]) -> Revision {
     let revision = Revision { counter: actor.stream.next_counter(), digest };
-    let next = Arc::new(Installable::plain(revision, calibration));
+    let next = Arc::new(Given::plain(revision, calibration));
     actor.change(Change { next, at: Schedule::NextTick, slew: Span::ZERO });
     revision
 }
@@ -201,7 +203,8 @@ fn a_reset_keeps_a_change_that_waits_and_the_state() {
     actor.command(&Command::Standby).unwrap();
     let revision = Revision { counter: 2, digest: [9; 8] };
     let label = Label { digest: Some(Digest([9; 32])), ..Label::default() };
-    let next = Arc::new(Installable { label, ..Installable::plain(revision, calibration) });
+    let document = Arc::new(Compiled::new(calibration, label, CompressedText::new("")));
+    let next = Arc::new(Given { number: revision, document, source: String::new() });
     actor.change(Change { next, at: Schedule::Sequence(70), slew: Span::ZERO });
     actor.reset("a test says so");
     assert_eq!(actor.waiting(), Some((2, Schedule::Sequence(70))));
@@ -215,7 +218,7 @@ fn a_revision_that_was_given_already_is_passed_over() {
     let mut actor = actor(sink.outlet());
     let (calibration, digest) = example();
     let revision = Revision { counter: 4, digest };
-    let next = Arc::new(Installable::plain(revision, calibration));
+    let next = Arc::new(Given::plain(revision, calibration));
     let change = Change { next, at: Schedule::NextTick, slew: Span::ZERO };
     actor.change(change.clone());
     actor.take_status_due();

@@ -9,7 +9,7 @@ use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::raw::GyroBatch;
 
 use super::{Alarm, Footing, Standing};
-use crate::control::swap_manager::Notice;
+use crate::control::Notice;
 use crate::receive::unit::UnitActor;
 
 /// How long after the other instance is lost what the producer sent before may still come.

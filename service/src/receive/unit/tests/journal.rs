@@ -7,7 +7,6 @@ use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::Input;
 
 use super::*;
-use crate::control::compressed::CompressedText;
 
 const EXAMPLE: &str = include_str!("../../../../../config/calibration/example-full.toml");
 
@@ -91,11 +90,11 @@ impl Bench {
     fn change(&mut self, at: Schedule, slew: Span) {
         let parsed = Document::parse(EXAMPLE, None).unwrap();
         let digest = Digest(parsed.digest);
-        let next = Installable::of_document(
+        let label = Label { overlay: Some(Digest([3; 32])), ..Label::of(&parsed.document, digest, "") };
+        let text = CompressedText::new(EXAMPLE);
+        let next = Given::new(
             self.actor.stream.next_counter(),
-            Arc::new(parsed.calibration),
-            (Label::of(&parsed.document, digest, ""), Some(Digest([3; 32]))),
-            CompressedText::new(EXAMPLE),
+            Arc::new(Compiled::new(Arc::new(parsed.calibration), label, text)),
             &isotherm_protocol::history::Source::Rollback { to: 1 },
         );
         self.actor.change(Change { next: Arc::new(next), at, slew });

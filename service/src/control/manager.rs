@@ -1,8 +1,13 @@
-//! The swap manager's thread: one request after the other.
+//! The swap manager: the thread that does what is asked for, one message after the other.
+//!
+//! It owns the state folder, what each unit was given and what the folder of documents holds. It reads, decides, writes to disk
+//! and only then touches a unit, for as long as a pointer takes. Receive threads ask and go on: where too much is waiting the
+//! asker is told so.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_correction::prelaunch::PreLaunchSettings;
@@ -10,16 +15,64 @@ use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::{AuditEvent, FirstTick};
 use isotherm_protocol::key::UnitId;
 
+use super::compressed::CompressedText;
 use super::control_status::ControlStatus;
+use super::decision::Decision;
 use super::folder::Folder;
-use super::inbox::Request;
-use super::queue::{Queue, Stopped};
-use super::record::Record;
+use super::queue::{Inbox, Message, Notice, Queue, Stopped};
 use super::refusals::Refusals;
-use super::swap::Judged;
+use super::request::Request;
+use super::revision::Record;
+use super::store::{Opened, Store, StoreError};
 use crate::config::{Settings, SwapSettings};
-use crate::control::store::{Opened, Store, StoreError};
 use crate::receive::intake::Intake;
+
+/// The running swap manager. Dropped without [`SwapManager::stop`] it ends by itself after what waits.
+#[derive(Debug)]
+pub(crate) struct SwapManager {
+    queue: Arc<Queue>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SwapManager {
+    /// Starts it, for what is asked for in `inbox`.
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub(crate) fn start(inbox: &Inbox, work: Worker) -> std::io::Result<Self> {
+        let (queue, requests) = (inbox.queue(), inbox.queue());
+        let thread = std::thread::Builder::new().name("isotherm-control".to_owned()).spawn(move || {
+            yield_to_ticks();
+            work.run(&requests);
+        })?;
+        Ok(Self { queue, thread: Some(thread) })
+    }
+
+    /// Has it finish what waits and ends it; whether it ended in order.
+    pub(crate) fn stop(mut self) -> bool {
+        self.queue.stop();
+        self.thread.take().is_some_and(|thread| thread.join().is_ok())
+    }
+}
+
+/// How much less this thread is worth than those that receive: a swap takes milliseconds, and ticks must not wait for a core meanwhile.
+#[cfg(target_os = "linux")]
+const NICENESS: i32 = 10;
+
+/// Has the thread give way to the others where there are too few cores. Only Linux knows priorities of single threads.
+fn yield_to_ticks() {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::setpriority_process(None, NICENESS) {
+        tracing::debug!("the swap manager keeps its priority: {error}");
+    }
+}
+
+impl Drop for SwapManager {
+    fn drop(&mut self) {
+        // Units hold a way to it for as long as it holds them: nothing else would ever end it.
+        self.queue.stop();
+    }
+}
 
 /// What the swap manager works with.
 #[derive(Debug)]
@@ -42,7 +95,7 @@ pub(crate) struct Worker {
     /// What the state folder had lost when it was opened, with the unit that it concerns.
     pub(super) losses: Vec<(Option<UnitId>, String)>,
     /// Documents that were found good and are to be written down together; `None` where each goes by itself.
-    pub(super) group: Option<Vec<Judged>>,
+    pub(super) group: Option<Vec<(Request, Decision)>>,
     /// First ticks that another instance is to write down, and has not yet.
     pub(super) unclaimed: Vec<(UnitId, FirstTick)>,
     /// Files whose documents could not be written down, and why.
@@ -94,15 +147,15 @@ impl Worker {
         self.show();
         loop {
             queue.know(self.records.keys());
-            let request = match queue.take(LOOK_INTERVAL) {
-                Ok(request) => request,
+            let message = match queue.take(LOOK_INTERVAL) {
+                Ok(message) => message,
                 Err(Stopped) => break,
             };
             // Unwind safety: what is kept is changed only after everything that could go wrong has gone well.
             let work = AssertUnwindSafe(|| {
                 self.keep_store();
-                if let Some(request) = request {
-                    self.take(request);
+                if let Some(message) = message {
+                    self.take(message);
                 }
                 self.retry_unwritten(Instant::now());
             });
@@ -118,19 +171,19 @@ impl Worker {
         let untold = self.intake.each_unit(|actor| (actor.id().clone(), actor.take_untold()));
         for (unit, notices) in untold {
             for notice in notices {
-                self.note(&unit, notice);
+                self.take_notice(&unit, notice);
             }
         }
     }
 
     /// Sees to it that what is written down is found again, and tells where it is not.
     fn keep_store(&mut self) {
-        let actives =
-            self.records.values().flat_map(|record| record.active.iter().chain(record.before.as_deref()));
-        let written = actives.filter_map(|active| active.written.as_ref());
-        let layers = written.clone().filter_map(|written| written.layers.as_ref());
-        let bases = layers.clone().map(|layers| layers.base.read());
-        let documents = written.map(|written| written.text.read()).chain(bases);
+        let revisions = self.records.values().flat_map(|record| record.plan.revisions());
+        let kept = revisions.map(|revision| &revision.document);
+        let layers = kept.clone().filter_map(|document| document.layers.as_ref());
+        let bases = layers.clone().map(|layers| &layers.base);
+        let documents = kept.filter_map(|document| document.text.as_ref()).chain(bases);
+        let documents = documents.map(CompressedText::read);
         let overlays = layers.map(|layers| layers.text.read());
         match self.store.keep(SystemTime::now(), documents, overlays) {
             Ok(false) => {
@@ -156,18 +209,43 @@ impl Worker {
     }
 
     /// Does what is asked for.
-    fn take(&mut self, request: Request) {
-        match request {
-            Request::Folder(event) => self.folder_event(event),
-            Request::Calibration(query, origin) => self.answer_calibration(&query, origin),
-            Request::Put(sample) => self.take_put(&sample),
-            Request::Command(query, origin) => self.answer_command(&query, origin),
-            Request::History(query) => self.answer_history(&query),
-            Request::Notice(unit, notice) => self.note(&unit, notice),
-            Request::JudgeAgain => self.judge_bad_again(),
-            Request::Kept(query) => self.answer_kept(&query),
-            Request::Lacks(carried, answer) => drop(answer.send(self.lacking(&carried))),
-            Request::Carry(carried) => self.carry(&carried),
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Query(asked, query, origin) => self.answer(asked, &query, origin),
+            Message::Put(sample) => self.take_put(&sample),
+            Message::Folder(event) => self.folder_event(event),
+            Message::JudgeAgain => self.judge_bad_again(),
+            Message::Notice(unit, notice) => self.take_notice(&unit, notice),
+            Message::Lacks(carried, answer) => drop(answer.send(self.lacking(&carried))),
+            Message::Carry(carried) => self.carry(&carried),
+        }
+    }
+
+    /// Takes what a unit has to tell.
+    fn take_notice(&mut self, unit: &UnitId, notice: Notice) {
+        match notice {
+            Notice::InForce(first) => {
+                let revision = first.revision.counter;
+                let tick = FirstTick {
+                    revision,
+                    series: first.series,
+                    first_sequence: first.sequence,
+                    first_end_time_ns: first.end_time_ns,
+                };
+                if !self.intake.speaks_for(unit) {
+                    self.leave_unclaimed(unit, tick);
+                    return;
+                }
+                tracing::info!(%unit, revision, sequence = first.sequence, "calibration in force");
+                self.note(Some(unit), "", AuditEvent::InForce(tick), "the first tick");
+                // It may have appeared only now: what was accepted for it before, it does not know of.
+                self.tell_account(unit);
+            }
+            // Where another instance speaks, that one stores the result.
+            Notice::PreLaunch(end) if self.intake.speaks_for(unit) => self.pre_launch_ended(unit, &end),
+            Notice::PreLaunch(_) => {}
+            Notice::Followed(entry) => self.note_followed(unit, &entry),
+            Notice::Speaks => self.claim(unit),
         }
     }
 
@@ -185,6 +263,19 @@ impl Worker {
         self.write_group();
         self.entries = self.store.append(SystemTime::now(), unit, by, event)?;
         Ok(())
+    }
+
+    /// Writes down what happens whether or not it can be written down.
+    pub(super) fn note(&mut self, unit: Option<&UnitId>, by: &str, event: AuditEvent, what: &str) {
+        let revision = match &event {
+            AuditEvent::InForce(first) => Some(first.revision),
+            AuditEvent::Withdrawn(withdrawal) => Some(withdrawal.revision),
+            _ => None,
+        };
+        if let Err(error) = self.append(unit, by, event) {
+            let unit = unit.map(tracing::field::display);
+            tracing::error!(unit, revision, "{what} is not in the audit file: {error}");
+        }
     }
 }
 

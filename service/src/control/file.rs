@@ -10,8 +10,8 @@ use isotherm_protocol::document::Problem;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::Candidate;
 
-use super::admit::unit_of;
-use super::reading::Reading;
+use super::decision::unit_of;
+use super::document::Document;
 use crate::control::compressed::CompressedBytes;
 use crate::control::watch::read_document;
 use isotherm_document::file;
@@ -30,7 +30,7 @@ pub(super) struct Read {
     /// Unit that it names, whatever else is wrong with it.
     pub(super) hint: Option<UnitId>,
     /// What it says, or everything that is wrong with it; `None` where it is no text.
-    pub(super) found: Option<Result<Reading, Vec<Problem>>>,
+    pub(super) found: Option<Result<Document, Vec<Problem>>>,
 }
 
 impl Read {
@@ -39,16 +39,16 @@ impl Read {
         let name = path.display().to_string();
         let digest = Digest::of(bytes);
         let text = file::text(bytes, &name).ok();
-        let found = text.map(|text| Candidate::parse(text, Some(&name), None).map(Reading::from));
+        let read =
+            |text: &str| Candidate::parse(text, Some(&name), None).map(|it| Document::of(it, None, bytes));
+        let found = text.map(read);
         let hint = match &found {
-            Some(Ok(reading)) => UnitId::new(&reading.unit).ok(),
+            Some(Ok(document)) => UnitId::new(&document.unit).ok(),
             _ => std::str::from_utf8(bytes).ok().and_then(unit_of),
         };
-        let content = match &found {
-            Some(Ok(reading)) => reading.text.bytes().clone(),
-            _ => CompressedBytes::new(bytes),
-        };
-        Self { content, digest, hint, found: found.map(|found| found.map(Reading::small)) }
+        let text = found.as_ref().and_then(|found| found.as_ref().ok()?.text.as_ref());
+        let content = text.map_or_else(|| CompressedBytes::new(bytes), |text| text.bytes().clone());
+        Self { content, digest, hint, found }
     }
 
     /// The content.
@@ -58,7 +58,7 @@ impl Read {
 
     /// Unit that a valid document in it names.
     pub(super) fn unit(&self) -> Option<UnitId> {
-        self.found.as_ref()?.as_ref().ok().and_then(|reading| UnitId::new(&reading.unit).ok())
+        self.found.as_ref()?.as_ref().ok().and_then(|document| UnitId::new(&document.unit).ok())
     }
 }
 

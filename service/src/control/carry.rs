@@ -13,9 +13,10 @@ use isotherm_protocol::overlay::{Overlay, is_overlay};
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 
-use super::answer::answer;
 use super::command::PreLaunchRun;
-use super::worker::Worker;
+use super::manager::Worker;
+use super::request::reply;
+use super::revision::Record;
 use crate::control::store::StoreError;
 
 /// Entries of a unit that are looked through for those that are there already.
@@ -79,11 +80,16 @@ impl Worker {
                 return;
             }
         }
-        let (record, plan) = self.restored(unit);
         let before = self.records.get(unit).map(|record| (record.accepted, record.refused));
         let (accepted, refused) = before.unwrap_or_default();
-        self.records.insert(unit.clone(), super::record::Record { accepted, refused, ..record });
-        self.note_run(unit, entries);
+        let pre_launch = running(entries);
+        self.plan_again(unit, Record { accepted, refused, pre_launch, ..self.restored(unit) });
+    }
+
+    /// Has a unit begin anew with what is written down of it.
+    fn plan_again(&mut self, unit: &UnitId, record: Record) {
+        let plan = record.plan.clone();
+        self.records.insert(unit.clone(), record);
         self.intake.plan_again(unit, plan);
     }
 
@@ -114,23 +120,6 @@ impl Worker {
         Ok(fresh.len())
     }
 
-    /// A pre-launch calibration that goes on: its result is to be stored as it was asked for, whoever stores it.
-    fn note_run(&mut self, unit: &UnitId, entries: &[AuditEntry]) {
-        let commands = entries.iter().filter_map(|entry| match &entry.event {
-            AuditEvent::Command(record) if record.accepted || record.order.is_none() => Some((entry, record)),
-            _ => None,
-        });
-        let run = commands.fold(None, |run, (entry, record)| match &record.order {
-            Some(Order::PreLaunch(order)) => Some(PreLaunchRun { order: *order, by: entry.by.clone() }),
-            Some(Order::Abort) => None,
-            None if record.command == "pre-launch ended" => None,
-            _ => run,
-        });
-        if let Some(record) = self.records.get_mut(unit) {
-            record.pre_launch = run;
-        }
-    }
-
     /// The first tick of a revision, while another instance speaks: that one writes it down, and where it does not any more, this one
     /// does when it speaks.
     pub(super) fn leave_unclaimed(&mut self, unit: &UnitId, first: FirstTick) {
@@ -144,9 +133,7 @@ impl Worker {
         self.unclaimed = others;
         let mine: Vec<(UnitId, FirstTick)> = mine;
         for (_, first) in mine {
-            if let Err(error) = self.append(Some(unit), "", AuditEvent::InForce(first)) {
-                tracing::error!(%unit, "the first tick is not in the audit file: {error}");
-            }
+            self.note(Some(unit), "", AuditEvent::InForce(first), "the first tick");
         }
     }
 
@@ -161,8 +148,7 @@ impl Worker {
         if revision.counter <= self.store.highest_revision(unit) {
             return;
         }
-        let base =
-            self.in_force(unit).and_then(|active| active.written.as_ref()).map(|written| written.digest);
+        let base = self.in_force(unit).and_then(|active| active.document.digest());
         let stored = self.store.put_document(document.as_bytes()).and_then(|digest| {
             let accepted = Acceptance {
                 revision: revision.counter,
@@ -186,9 +172,7 @@ impl Worker {
                 {error}");
             return;
         }
-        let (record, plan) = self.restored(unit);
-        self.records.insert(unit.clone(), record);
-        self.intake.plan_again(unit, plan);
+        self.plan_again(unit, self.restored(unit));
     }
 
     /// A query on `isotherm/*/kept/*`: a document or an overlay by its digest; none is no answer.
@@ -196,9 +180,23 @@ impl Worker {
         let Some(digest) = key::parse_kept(query.key_expr().as_str()) else { return };
         let found = [self.store.document(&digest), self.store.overlay(&digest)];
         if let Some(bytes) = found.into_iter().find_map(|found| found.ok().flatten()) {
-            answer(query, &key::kept(self.intake.instance(), &digest), bytes, Encoding::TEXT_PLAIN);
+            reply(query, &key::kept(self.intake.instance(), &digest), bytes, Encoding::TEXT_PLAIN);
         }
     }
+}
+
+/// A pre-launch calibration that goes on: its result is to be stored as it was asked for, whoever stores it.
+fn running(entries: &[AuditEntry]) -> Option<PreLaunchRun> {
+    let commands = entries.iter().filter_map(|entry| match &entry.event {
+        AuditEvent::Command(record) if record.accepted || record.order.is_none() => Some((entry, record)),
+        _ => None,
+    });
+    commands.fold(None, |run, (entry, record)| match &record.order {
+        Some(Order::PreLaunch(order)) => Some(PreLaunchRun { order: *order, by: entry.by.clone() }),
+        Some(Order::Abort) => None,
+        None if record.command == "pre-launch ended" => None,
+        _ => run,
+    })
 }
 
 /// The overlay that a text is, if it is one.

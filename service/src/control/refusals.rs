@@ -9,9 +9,9 @@ use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::{AuditEvent, MAX_PROBLEMS, Refusal, Source};
 use isotherm_protocol::key::UnitId;
 
-use super::admit::Verdict;
-use super::order::Order;
-use super::worker::Worker;
+use super::decision::Decision;
+use super::manager::Worker;
+use super::request::Request;
 
 /// Refusals that are remembered, so that the same one again is only counted.
 const REMEMBERED: usize = 64;
@@ -61,67 +61,66 @@ impl Refusals {
 
 impl Worker {
     /// Counts, tells and writes down that a document was refused.
-    pub(super) fn note_refusal(&mut self, order: &Order<'_>, verdict: &Verdict) {
-        self.count_refusal(verdict);
-        if order.options.dry_run {
+    pub(super) fn note_refusal(&mut self, request: &Request, bytes: &[u8], decision: &Decision) {
+        let Decision { unit, problems, .. } = decision;
+        let unit = unit.as_ref();
+        self.count_refusal(unit, problems.first());
+        if request.options.dry_run {
             return;
         }
-        let digest = Digest::of(order.bytes);
-        let same = (verdict.unit.clone(), order.source.clone(), digest);
+        let digest = Digest::of(bytes);
+        let same = (unit.cloned(), request.source.clone(), digest);
         if !self.refusals.is_news(Instant::now(), same) {
             return;
         }
-        let unit = verdict.unit.as_ref();
         let shown = unit.map(ToString::to_string).unwrap_or_default();
-        for problem in &verdict.problems {
-            tracing::error!(unit = shown, source = %order.source, "refused: {problem}");
+        for problem in problems {
+            tracing::error!(unit = shown, source = %request.source, "refused: {problem}");
         }
         // Told at every start, written down once.
-        let at_start = matches!(order.source, Source::Start { .. });
-        let before = order.source.file().and_then(|path| self.store.refused_in_folder(path));
+        let at_start = matches!(request.source, Source::Start { .. });
+        let before = request.source.file().and_then(|path| self.store.refused_in_folder(path));
         if at_start && before == Some(digest) {
             return;
         }
-        let event = AuditEvent::Refused(Refusal {
-            source: order.source.clone(),
-            digest,
-            problems: verdict.problems.iter().take(MAX_PROBLEMS).map(ToString::to_string).collect(),
-            count: verdict.problems.len() as u64,
-            rival: false,
-        });
-        let by: String = order.options.by.chars().take(MAX_BY).collect();
-        if let Err(error) = self.append(unit, &by, event) {
-            tracing::error!(unit = shown, "the refusal is not in the audit file: {error}");
-        }
+        let by: String = request.options.by.chars().take(MAX_BY).collect();
+        self.note_refused(unit, &by, (request.source.clone(), digest, false), problems);
     }
 
     /// Writes down, once, that a file is refused because another one names its unit too.
     pub(super) fn note_rival(&mut self, unit: &UnitId, source: Source, digest: Digest, problem: &Problem) {
         let before = source.file().and_then(|path| self.store.rival_in_folder(path));
         let told = matches!(source, Source::Start { .. }) && before == Some(digest);
-        if told || !self.refusals.is_news(Instant::now(), (Some(unit.clone()), source.clone(), digest)) {
-            return;
-        }
-        let problems = vec![problem.to_string()];
-        let event = AuditEvent::Refused(Refusal { source, digest, problems, count: 1, rival: true });
-        if let Err(error) = self.append(Some(unit), "", event) {
-            tracing::error!(%unit, "the refusal is not in the audit file: {error}");
+        if !told && self.refusals.is_news(Instant::now(), (Some(unit.clone()), source.clone(), digest)) {
+            self.note_refused(Some(unit), "", (source, digest, true), std::slice::from_ref(problem));
         }
     }
 
+    fn note_refused(
+        &mut self,
+        unit: Option<&UnitId>,
+        by: &str,
+        (source, digest, rival): (Source, Digest, bool),
+        problems: &[Problem],
+    ) {
+        let count = problems.len() as u64;
+        let problems = problems.iter().take(MAX_PROBLEMS).map(ToString::to_string).collect();
+        let event = AuditEvent::Refused(Refusal { source, digest, problems, count, rival });
+        self.note(unit, by, event, "the refusal");
+    }
+
     /// Counts a refusal, for the status.
-    pub(super) fn count_refusal(&mut self, verdict: &Verdict) {
+    pub(super) fn count_refusal(&mut self, unit: Option<&UnitId>, problem: Option<&Problem>) {
         self.refusals.count += 1;
-        let Some(unit) = &verdict.unit else { return };
+        let Some(unit) = unit else { return };
         // A flood of strange serials must not fill the memory.
         if !self.records.contains_key(unit) && self.intake.present(unit).is_none() {
             return;
         }
         let record = self.records.entry(unit.clone()).or_default();
         record.refused += 1;
-        record.last_refusal = verdict.problems.first().map(ToString::to_string);
-        let account = record.account();
-        self.intake.with(unit, |actor| actor.tell_swaps(account));
+        record.last_refusal = problem.map(ToString::to_string);
+        self.tell_account(unit);
     }
 }
 

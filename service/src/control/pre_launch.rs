@@ -1,23 +1,24 @@
 //! The result of a pre-launch calibration: an overlay document, kept, and put in force where that was asked for.
 
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use isotherm_correction::operation::State;
 use isotherm_correction::prelaunch::{GyroConstants, Outcome};
 use isotherm_correction::units::AngularRate;
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
-use isotherm_protocol::document::{Created, Document};
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::{self, Created};
 use isotherm_protocol::history::{AuditEvent, CommandRecord, Source, WallTime};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::{GyroOverlay, OVERLAY_SCHEMA, Overlay, PreLaunchRecord};
 
 use super::command::PreLaunchRun;
-use super::inbox::PreLaunchEnd;
-use super::order::Order;
-use super::reading::document_in;
-use super::record::Written;
-use super::start;
-use super::worker::Worker;
+use super::document::Document;
+use super::manager::Worker;
+use super::queue::PreLaunchEnd;
+use super::request::Request;
+use super::revision::Record;
 
 impl Worker {
     /// Takes the end of a pre-launch calibration, whatever it came to.
@@ -33,7 +34,7 @@ impl Worker {
         let Some(run) = record.pre_launch.take() else { return };
         let came_to = match outcome {
             Outcome::Refused(reasons) => {
-                let document = record.written().and_then(|written| document_in(&written.text));
+                let document = record.document().and_then(|document| document.content());
                 let gyros: Vec<_> = document.as_ref().map(|it| names(it).collect()).unwrap_or_default();
                 let reasons: Vec<_> =
                     reasons.iter().map(|reason| named(&reason.to_string(), &gyros)).collect();
@@ -71,9 +72,7 @@ impl Worker {
             last_sequence: self.intake.with(unit, |actor| actor.last_sequence()).flatten(),
             order: None,
         };
-        if let Err(error) = self.append(Some(unit), by, AuditEvent::Command(record)) {
-            tracing::error!(%unit, "the pre-launch calibration is not in the audit file: {error}");
-        }
+        self.note(Some(unit), by, AuditEvent::Command(record), "the pre-launch calibration");
     }
 
     /// Makes the overlay, keeps it, puts it in force where that was asked for; in words what became of it.
@@ -84,31 +83,32 @@ impl Worker {
         constants: &[GyroConstants],
         run: &PreLaunchRun,
     ) -> Result<String, String> {
-        let active = self.records.get(unit).and_then(|record| record.active.as_ref());
-        let is_last = active.is_some_and(|active| active.revision == end.revision);
-        let written = if let Some(active) = active.filter(|_| is_last) {
-            active.written.clone()
+        let record = self.records.get(unit);
+        let last = record.and_then(Record::last);
+        let is_last = last.is_some_and(|last| last.number.counter == end.revision);
+        let base = if is_last {
+            record.and_then(Record::document).cloned()
         } else {
             let set = self.store.by_revision(unit, end.revision);
-            set.and_then(|set| start::written(&self.store, set).ok()).map(|(written, ..)| written)
+            set.and_then(|set| Document::stored(&self.store, set).ok()).map(Arc::new)
         };
-        let Some(written) = written else {
+        let Some((base, digest)) = base.and_then(|base| base.digest().map(|digest| (base, digest))) else {
             return Err(format!(
                 "revision {} never was a document, so there is no base for an overlay",
                 end.revision
             ));
         };
-        let Some(document) = document_in(&written.text) else {
+        let Some(content) = base.content() else {
             return Err(format!("the document of revision {} can no longer be read", end.revision));
         };
-        let overlay = overlay((&written, &document), end, constants, run);
+        let found = overlay((digest, &content), end, constants, run);
+        let overlay = base.layers.as_ref().map_or(found.clone(), |layers| found.after(&layers.overlay));
         let text =
             overlay.to_toml().map_err(|error| format!("the overlay cannot be written out: {error}"))?;
         let digest = self.store.put_overlay(text.as_bytes()).map_err(|error| error.to_string())?;
         if let Some(record) = self.records.get_mut(unit) {
             record.overlay = Some(digest);
-            let account = record.account();
-            self.intake.with(unit, |actor| actor.tell_swaps(account));
+            self.tell_account(unit);
         }
         if !run.order.install {
             return Ok(format!("stored as overlay {digest}, not put in force, as requested"));
@@ -120,16 +120,14 @@ impl Worker {
                 end.revision
             ));
         }
-        let options = SwapOptions { by: run.by.clone(), any_serial: true, ..SwapOptions::default() };
-        let reply = self.swap(&Order {
+        let request = Request {
             unit: Some(unit.clone()),
-            bytes: text.as_bytes(),
-            name: "pre-launch calibration",
+            name: "pre-launch calibration".to_owned(),
             source: Source::PreLaunch,
             overlay: None,
-            read: None,
-            options,
-        });
+            options: SwapOptions { by: run.by.clone(), any_serial: true, ..SwapOptions::default() },
+        };
+        let reply = self.swap(&request, text.as_bytes(), None);
         if reply.outcome == SwapOutcome::Refused {
             let problems: Vec<_> = reply.problems.iter().map(|problem| problem.message.clone()).collect();
             return Err(format!("stored as overlay {digest}, not put in force: {}", problems.join("; ")));
@@ -140,7 +138,7 @@ impl Worker {
 
 /// The overlay on the document itself, whether or not an overlay was in force.
 fn overlay(
-    (written, document): (&Written, &Document),
+    (digest, document): (Digest, &document::Document),
     end: &PreLaunchEnd,
     constants: &[GyroConstants],
     run: &PreLaunchRun,
@@ -156,9 +154,9 @@ fn overlay(
     let place = run.order.place;
     #[expect(clippy::cast_precision_loss, reason = "a pre-launch calibration is shorter than 2⁵³ ns")]
     let duration_s = end.end_ns.saturating_sub(end.start_ns) as f64 * 1e-9;
-    let found = Overlay {
+    Overlay {
         schema: OVERLAY_SCHEMA,
-        overlay_of: written.digest.to_string(),
+        overlay_of: digest.to_string(),
         unit: document.unit.clone(),
         created: now(),
         note: None,
@@ -172,8 +170,7 @@ fn overlay(
             end_ns: end.end_ns,
             mean_temperature_deg_c: constants.iter().map(mean_temperature_deg_c).collect(),
         }),
-    };
-    written.layers.as_ref().map_or(found.clone(), |layers| found.after(&layers.overlay))
+    }
 }
 
 /// A reason with the name of its gyro: the core knows gyros by their index only.
@@ -185,7 +182,7 @@ fn named(reason: &str, gyros: &[&str]) -> String {
     found.unwrap_or_else(|| reason.to_owned())
 }
 
-fn names(document: &Document) -> impl Iterator<Item = &str> {
+fn names(document: &document::Document) -> impl Iterator<Item = &str> {
     document.gyro.sensor.iter().map(|sensor| sensor.name.as_str())
 }
 

@@ -7,8 +7,8 @@ use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, StoreStatus,
 };
 
+use super::manager::Worker;
 use super::start::first_of;
-use super::worker::Worker;
 
 /// Kind of the standing problem of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";

@@ -23,8 +23,8 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay;
 
 use super::file::Read;
-use super::order::Order;
-use super::worker::Worker;
+use super::manager::Worker;
+use super::request::Request;
 use crate::control::watch::{FolderEvent, read_document};
 use isotherm_document::unplaced;
 
@@ -112,10 +112,12 @@ impl Folder {
         self.naming.get(unit)?.first().map(PathBuf::as_path)
     }
 
-    /// Enters a file that cannot be read.
-    pub(super) fn unreadable(&mut self, path: &Path, problem: Problem) {
+    /// Enters a file that cannot be read; the problem.
+    pub(super) fn unreadable(&mut self, path: &Path, reason: &str) -> Problem {
+        let problem = unplaced(Some(&path.display().to_string()), format!("cannot be read: {reason}"));
         let file = self.files.entry(path.to_owned()).or_default();
-        (file.problems, file.digest, file.unwritten) = (vec![problem], None, false);
+        (file.problems, file.digest, file.unwritten) = (vec![problem.clone()], None, false);
+        problem
     }
 
     /// The folder cannot be read.
@@ -172,10 +174,8 @@ impl Worker {
                 self.look_for_survivor(before.as_ref());
             }
             FolderEvent::Unreadable { file, reason } => {
-                let problem =
-                    unplaced(Some(&file.display().to_string()), format!("cannot be read: {reason}"));
+                let problem = self.folder.unreadable(&file, &reason);
                 tracing::error!("{problem}; the calibration in force stays");
-                self.folder.unreadable(&file, problem);
             }
             FolderEvent::Removed { file } => {
                 let before = self.folder.remove(&file);
@@ -240,7 +240,7 @@ impl Worker {
         let valid = file.and_then(|file| file.unit.clone());
         let known = valid.clone().or_else(|| file.and_then(|file| file.hint.clone()));
         let digest = read.digest;
-        let active = |unit: &UnitId| self.records.get(unit).and_then(|record| record.active.as_ref());
+        let active = |unit: &UnitId| self.records.get(unit).and_then(|record| record.last());
         let said = valid.as_ref().filter(|unit| active(unit).is_some());
         if let Some(unit) = said.filter(|unit| self.store.said_by_folder(unit) == Some(digest)) {
             if !at_start {
@@ -250,19 +250,17 @@ impl Worker {
         }
         let source = known_source(path, at_start);
         let refused = source.file().and_then(|path| self.store.refused_in_folder(path)) == Some(digest);
-        let other_in_force = known
-            .as_ref()
-            .and_then(active)
-            .is_some_and(|active| active.written.as_ref().is_none_or(|written| written.digest != digest));
+        let other_in_force =
+            known.as_ref().and_then(active).is_some_and(|active| active.document.digest() != Some(digest));
         let options = SwapOptions::default();
+        let request = Request { unit: known.clone(), name, source, overlay: None, options };
         let found = read.found.as_ref();
-        let order =
-            Order { unit: known.clone(), bytes, name: &name, source, overlay: None, read: found, options };
         if at_start && refused && other_in_force {
-            return self.judge_again(&order);
+            return self.judge_again(&request, self.decide(&request, bytes, found).problems);
         }
-        let reply = self.swap(&order);
-        if let (SwapOutcome::Unchanged, Some(path)) = (reply.outcome, order.source.file()) {
+        let reply = self.swap(&request, bytes, found);
+        let Request { name, source, .. } = request;
+        if let (SwapOutcome::Unchanged, Some(path)) = (reply.outcome, source.file()) {
             // Not to be taken for a change later, when something else may be in force.
             let event =
                 AuditEvent::CarriedFile(CarriedFile { path: path.to_owned(), digest, refused: false });
@@ -274,14 +272,13 @@ impl Worker {
     }
 
     /// Says again what is wrong with a document that was refused before the service was restarted, and written down then.
-    fn judge_again(&self, order: &Order<'_>) -> Vec<Problem> {
-        let mut problems = self.admit(order).problems;
+    fn judge_again(&self, request: &Request, mut problems: Vec<Problem>) -> Vec<Problem> {
         if problems.is_empty() {
             let message = "was refused when it was put there, and a restart does not change that: put it in force \
                            with `isotherm swap`, or replace the file";
-            problems.push(unplaced(Some(order.name), message.to_owned()));
+            problems.push(unplaced(Some(&request.name), message.to_owned()));
         }
-        let unit = order.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+        let unit = request.unit.as_ref().map(ToString::to_string).unwrap_or_default();
         for problem in &problems {
             tracing::error!(unit, "refused: {problem}; the calibration in force stays");
         }

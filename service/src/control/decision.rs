@@ -1,0 +1,369 @@
+//! A decision: everything that is wrong with a document, everything that is doubtful, and what it changes, at once.
+
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use isotherm_correction::operation::State;
+use isotherm_correction::units::{AngularRate, SpecificForce};
+use isotherm_document::{file, parse_toml, unplaced};
+use isotherm_protocol::control::Difference;
+use isotherm_protocol::document::{self, CURRENT_SCHEMA, Problem, Side};
+use isotherm_protocol::history::WallTime;
+use isotherm_protocol::key::UnitId;
+use isotherm_protocol::overlay::{Candidate, Overlay, is_overlay};
+
+use super::document::{Document, Layers};
+use super::manager::Worker;
+use super::request::Request;
+use super::revision::{Record, Revision};
+use crate::config::{Severity, SwapSettings};
+use crate::receive::unit::Present;
+use crate::signing::check_signature;
+
+/// Names of the case axes.
+const AXES: [char; 3] = ['x', 'y', 'z'];
+/// Seconds of a day.
+const DAY_S: i64 = 86_400;
+
+/// What was found out about a request. Nothing has changed yet.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Decision {
+    /// Whom it is for: as asked, else as the document says; `None` where it says nothing that can be used.
+    pub(super) unit: Option<UnitId>,
+    /// What would be put in force; `None` where the text is no valid document.
+    pub(super) document: Option<Arc<Document>>,
+    /// Everything that speaks against it.
+    pub(super) problems: Vec<Problem>,
+    /// What is doubtful.
+    pub(super) warnings: Vec<Problem>,
+    /// What it changes; `None` where one of the two documents is missing.
+    pub(super) difference: Option<Difference>,
+}
+
+impl Worker {
+    /// Decides on a request with this document; `read` is what was found in it, where it was read before.
+    pub(super) fn decide(
+        &self,
+        request: &Request,
+        bytes: &[u8],
+        read: Option<&Result<Document, Vec<Problem>>>,
+    ) -> Decision {
+        let asked = Decision { unit: request.unit.clone(), ..Decision::default() };
+        let text = match file::text(bytes, &request.name) {
+            Ok(text) => text,
+            Err(problems) => return Decision { problems, ..asked },
+        };
+        let (mut problems, mut warnings) = (Vec::new(), Vec::new());
+        if request.needs_signature() {
+            check_signature(&self.swap, text, &request.name, &mut problems, &mut warnings);
+        }
+        let unit = request.unit.clone().or_else(|| unit_of(text));
+        let record = unit.as_ref().and_then(|unit| self.records.get(unit));
+        let found = read.cloned().unwrap_or_else(|| read_document(bytes, text, &request.name, record));
+        let document = match found {
+            Ok(document) => document,
+            Err(found) => {
+                problems.extend(self.other_serial(request, unit_of(text), text));
+                problems.extend(found);
+                return Decision { unit, problems, warnings, ..asked };
+            }
+        };
+        warnings.extend(document.warnings.iter().cloned());
+        let unit = match (request.unit.clone(), UnitId::new(&document.unit)) {
+            (Some(unit), _) | (None, Ok(unit)) => unit,
+            // Not to be reached: a document's unit has been checked.
+            (None, Err(error)) => {
+                problems.push(unplaced(Some(&request.name), format!("unit: {error}")));
+                return Decision { problems, warnings, ..asked };
+            }
+        };
+        if document.unit != unit.as_str() && self.takes_any_serial(request) {
+            let other = &document.unit;
+            let message = format!("is \"{other}\": accepted for unit {unit}, as requested (any_serial)");
+            warnings.push(at_key(text, &request.name, "unit", message));
+        }
+        // That of an overlay's text may be another than that of the document below it.
+        let named = if document.layers.is_some() { unit_of(text) } else { UnitId::new(&document.unit).ok() };
+        problems.extend(self.other_serial(request, named, text));
+        let document = match request.overlay {
+            Some(overlay) => document.over(Layers::stored(&self.store, overlay)),
+            None => document,
+        };
+        let present = self.intake.present(&unit);
+        warnings.extend(present.as_ref().and_then(|present| interrupts(request, present.state)));
+        let active: Option<&Revision> = self.in_force(&unit).map(|active| &**active);
+        let compared = active.and_then(|active| compare(active, &document, present.as_ref()));
+        let (difference, lost) = compared.map_or((None, Vec::new()), |(found, lost)| (Some(found), lost));
+        let found = doubts(&self.swap, &document, active, present.as_ref(), SystemTime::now());
+        for doubt in found.into_iter().chain(loss(&lost)) {
+            let lenient = request.is_own() || request.options.force;
+            let problem = at_key(text, &request.name, doubt.key, doubt.message(lenient));
+            if doubt.refuses && !lenient { problems.push(problem) } else { warnings.push(problem) }
+        }
+        Decision { unit: Some(unit), document: Some(Arc::new(document)), problems, warnings, difference }
+    }
+
+    /// Whether a document for another unit is taken. What was signed was signed for one.
+    fn takes_any_serial(&self, request: &Request) -> bool {
+        request.options.any_serial && (request.is_own() || !self.swap.require_signature)
+    }
+
+    /// That a document names another unit than it is meant for, whatever else is wrong with it.
+    fn other_serial(&self, request: &Request, named: Option<UnitId>, text: &str) -> Option<Problem> {
+        let (unit, other) = (request.unit.as_ref()?, named?);
+        let next = if self.swap.require_signature {
+            format!("or sign one for {unit} (require_signature is set, so any_serial does not count)")
+        } else {
+            "correct the serial, or add any_serial".to_owned()
+        };
+        let message =
+            format!("is \"{other}\", but the document was sent to unit {unit}: send it to {other}, {next}");
+        let wrong = other != *unit && !self.takes_any_serial(request);
+        wrong.then(|| at_key(text, &request.name, "unit", message))
+    }
+}
+
+/// Reads a document, or an overlay on what a unit has.
+fn read_document(
+    bytes: &[u8],
+    text: &str,
+    name: &str,
+    record: Option<&Record>,
+) -> Result<Document, Vec<Problem>> {
+    let base = is_overlay(text).then(|| {
+        let named = Overlay::parse(text, None).map(|parsed| parsed.overlay.overlay_of).unwrap_or_default();
+        Some(record?.document()?.base(&named)?.read())
+    });
+    let base = base.flatten();
+    let candidate = Candidate::parse(text, Some(name), base.as_deref())?;
+    Ok(Document::of(candidate, base.as_deref(), bytes))
+}
+
+/// The difference between what is in force and a document, in the document and in the correction, and the sections that the
+/// document does not have any more; `None` where the former never was a document.
+///
+/// Temperatures and mode are those of the unit; of one that has not appeared the correction is not compared.
+fn compare(
+    active: &Revision,
+    found: &Document,
+    present: Option<&Present>,
+) -> Option<(Difference, Vec<String>)> {
+    let (old, new) = (active.document.content()?, found.content()?);
+    let document = document::difference(&old, &new);
+    let before = Side { document: &old, calibration: &active.document.calibration };
+    let after = Side { document: &new, calibration: &found.calibration };
+    let (correction, temperatures) = present.map_or_else(Default::default, |present| {
+        let thermal = |name: &_| present.thermal(name);
+        (document::correction_change(before, after, thermal, present.mode), present.words())
+    });
+    Some((Difference { document, correction, temperatures }, document::lost_sections(&old, &new)))
+}
+
+/// What a change of the calibration does to what the unit is at.
+fn interrupts(request: &Request, state: State) -> Option<Problem> {
+    let words = match state {
+        State::PreLaunchCalibration => "the unit is in pre-launch calibration, which this ends",
+        State::SelfTest => "the unit is in self-test, which starts again",
+        State::Standby | State::RunningWithReversal | State::RunningWithoutReversal => return None,
+    };
+    Some(unplaced(Some(&request.name), words.to_owned()))
+}
+
+/// The unit that a text names, whatever else is wrong with it.
+pub(super) fn unit_of(text: &str) -> Option<UnitId> {
+    let (root, _) = parse_toml(text);
+    UnitId::new(root.get_ref().get("unit")?.get_ref().as_str()?).ok()
+}
+
+/// One thing that speaks against a document.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Doubt {
+    /// Key of the document that it is about; empty for the document as a whole.
+    key: &'static str,
+    /// Whether the configuration has it refused.
+    refuses: bool,
+    /// Key of the configuration that says so; empty where none does.
+    policy: &'static str,
+    words: String,
+}
+
+impl Doubt {
+    fn new(key: &'static str, severity: Severity, policy: &'static str, words: String) -> Self {
+        Self { key, refuses: severity == Severity::Refuse, policy, words }
+    }
+
+    /// What is wrong, and what to do where it refuses.
+    fn message(&self, forced: bool) -> String {
+        match (self.refuses, forced) {
+            (true, false) if self.policy.is_empty() => {
+                format!("{}: force the swap (--force) if this is intended", self.words)
+            }
+            (true, true) if self.policy.is_empty() => format!("{} (forced)", self.words),
+            (true, false) => {
+                format!(
+                    "{} ([swap] {} = \"refuse\"): force the swap (--force) if this is intended",
+                    self.words, self.policy
+                )
+            }
+            (true, true) => format!("{} ([swap] {} = \"refuse\", forced)", self.words, self.policy),
+            (false, _) => self.words.clone(),
+        }
+    }
+}
+
+/// Everything that speaks against a valid document for a unit as it is now.
+fn doubts(
+    settings: &SwapSettings,
+    candidate: &Document,
+    active: Option<&Revision>,
+    present: Option<&Present>,
+    now: SystemTime,
+) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    doubts.extend(age(settings, candidate, now));
+    if candidate.schema < CURRENT_SCHEMA {
+        let words = format!(
+            "is version {}, this release writes {CURRENT_SCHEMA}: have the document made again",
+            candidate.schema
+        );
+        doubts.push(Doubt::new("schema", settings.old_schema, "old_schema", words));
+    }
+    doubts.extend(active.and_then(|active| stream(candidate, active)));
+    doubts.extend(active.and_then(|active| downgrade(settings, candidate, active)));
+    if let Some(present) = present {
+        doubts.extend(range(settings, candidate, present));
+        doubts.extend(active.into_iter().flat_map(|active| jump(settings, candidate, active, present)));
+    }
+    doubts
+}
+
+/// Ticks of another kind or number of sensors than the calibration has are refused, every one of them.
+fn stream(candidate: &Document, active: &Revision) -> Option<Doubt> {
+    let (old, new) = (&active.document.calibration, &candidate.calibration);
+    let same = (old.gyro_output(), old.gyro_count()) == (new.gyro_output(), new.gyro_count())
+        && (old.accel_count() == 0 || new.accel_count() == 0 || {
+            (old.accel_output(), old.accel_count()) == (new.accel_output(), new.accel_count())
+        });
+    let words = "has another kind of output or number of sensors than the document in force: every tick would be \
+                 refused unless the producer changes too";
+    (!same).then(|| Doubt::new("", Severity::Refuse, "", words.to_owned()))
+}
+
+/// A document that has lost a section against the one in force may be the beginning of one that is still being written.
+fn loss(lost: &[String]) -> Option<Doubt> {
+    let words =
+        || format!("lacks {}, which the document in force has; is the file complete?", lost.join(", "));
+    (!lost.is_empty()).then(|| Doubt::new("", Severity::Refuse, "", words()))
+}
+
+fn age(settings: &SwapSettings, candidate: &Document, now: SystemTime) -> Option<Doubt> {
+    let limit_s = i64::try_from(settings.max_age?.as_secs()).unwrap_or(i64::MAX);
+    let limit_days = limit_s / DAY_S;
+    let doubt = |words| Some(Doubt::new("created", settings.age, "age", words));
+    let (Some(created), Some(created_unix_s)) = (&candidate.created, candidate.label.created_unix_s) else {
+        return doubt(format!("is missing: the document may be older than {limit_days} days"));
+    };
+    let now_s = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let age_s = i64::try_from(now_s).unwrap_or(i64::MAX).saturating_sub(created_unix_s);
+    if age_s < -DAY_S {
+        return doubt(format!("is {created}, {} days in the future", -age_s / DAY_S));
+    }
+    (age_s > limit_s).then_some(())?;
+    doubt(format!("is {created}: {} days old, more than {limit_days}", age_s / DAY_S))
+}
+
+/// A document that was replaced, with a signature or not, must not come back unseen.
+fn downgrade(settings: &SwapSettings, candidate: &Document, active: &Revision) -> Option<Doubt> {
+    let in_force = active.document.label.created_unix_s?;
+    let shown = WallTime::from_unix_ms(in_force.saturating_mul(1000));
+    let words = match (&candidate.created, candidate.label.created_unix_s) {
+        (Some(created), Some(own)) if own < in_force => {
+            format!("is {created}: older than the document in force, of {shown}")
+        }
+        (Some(_), Some(_)) => return None,
+        _ => format!("is missing: the document may be older than the one in force, of {shown}"),
+    };
+    Some(Doubt::new("created", settings.downgrade, "downgrade", words))
+}
+
+fn range<'a>(
+    settings: &'a SwapSettings,
+    candidate: &'a Document,
+    present: &'a Present,
+) -> impl Iterator<Item = Doubt> + 'a {
+    let channels = candidate.calibration.channels().iter().enumerate();
+    channels.filter_map(|(index, channel)| {
+        let [low, high] = candidate.calibration.range_of(index)?;
+        let temperature_deg_c = present.thermal(channel.name())?.temperature;
+        (!(low..=high).contains(&temperature_deg_c)).then(|| {
+            let words = format!(
+                "channel {} is at {temperature_deg_c:.2} °C now, outside the fitted range {low} to {high} °C: the terms \
+                 would be clamped",
+                channel.name()
+            );
+            Doubt::new("", settings.outside_range, "outside_range", words)
+        })
+    })
+}
+
+fn jump(settings: &SwapSettings, candidate: &Document, active: &Revision, present: &Present) -> Vec<Doubt> {
+    if settings.max_jump_rad_per_s.is_none() && settings.max_jump_m_per_s2.is_none() {
+        return Vec::new();
+    }
+    let doubt = |words| Doubt::new("", settings.jump, "jump", words);
+    let thermal = |name: &_| present.thermal(name);
+    let before = active.document.calibration.steady(thermal, present.mode);
+    let Some(jump) = before.jump(&candidate.calibration.steady(thermal, present.mode)) else {
+        return vec![doubt(
+            "has other sensors or another kind of output than the document in force: the jump of the output is \
+             unknown"
+                .to_owned(),
+        )];
+    };
+    let deg_per_h = |rate: f64| AngularRate::from_rad_per_s(rate).as_deg_per_h();
+    let milli_g = |force: f64| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
+    let mut doubts = Vec::new();
+    let mut check =
+        |steps: [f64; 3], limit: Option<f64>, what: &str, shown: &dyn Fn(f64) -> f64, unit: &str| {
+            let Some(limit) = limit else { return };
+            for (axis, step) in AXES.iter().zip(steps).filter(|(_, step)| step.abs() > limit) {
+                let (step, limit) = (shown(step), shown(limit));
+                doubts.push(doubt(format!(
+                    "{what} {axis} would jump by {step:+.4} {unit}, more than {limit} {unit}"
+                )));
+            }
+        };
+    check(jump.angular_rate, settings.max_jump_rad_per_s, "the angular rate about", &deg_per_h, "°/h");
+    check(jump.specific_force, settings.max_jump_m_per_s2, "the specific force along", &milli_g, "mg");
+    doubts
+}
+
+/// A problem at a key of the top level, where the text has it; otherwise at its start.
+fn at_key(text: &str, file: &str, key: &str, message: String) -> Problem {
+    let value_of = |line: &str| {
+        let rest = line.trim_start().strip_prefix(key)?.trim_start().strip_prefix('=')?.trim_start();
+        let before = line.strip_suffix(rest).unwrap_or_default();
+        Some(before.chars().count() + 1)
+    };
+    let mut lines = text.lines().take_while(|line| !line.trim_start().starts_with('[')).enumerate();
+    let found = lines.find_map(|(index, line)| Some((index + 1, value_of(line)?)));
+    let (line, column) = found.filter(|_| !key.is_empty()).unwrap_or((1, 1));
+    Problem { file: Some(file.to_owned()), line, column, key: key.to_owned(), message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_problem_stands_at_the_value_of_its_key() {
+        let text = "# unit = \"no\"\nschema = 1\n  unit   = \"A\"\n[gyro]\ncreated = 1\n";
+        let place = |key| {
+            let problem = at_key(text, "f", key, String::new());
+            (problem.line, problem.column)
+        };
+        assert_eq!(place("unit"), (3, 12));
+        assert_eq!(place("created"), (1, 1), "that of a table is another key");
+        assert_eq!(place(""), (1, 1));
+    }
+}

@@ -1,0 +1,230 @@
+//! A request: a swap as somebody asks for it; and queries and puts from the bus, with their replies.
+
+use isotherm_protocol::control::{CommandOrder, SwapOptions, SwapReply};
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::history::Source;
+use isotherm_protocol::key::{self, UnitId};
+use serde::Serialize;
+use zenoh::Wait;
+use zenoh::bytes::Encoding;
+use zenoh::key_expr::keyexpr;
+use zenoh::query::Query;
+use zenoh::sample::{Sample, SampleKind};
+
+use super::manager::Worker;
+use super::queue::{Asked, Origin};
+
+/// What stands before the name of a certificate in the audit file.
+const CERTIFIED: &str = "CN=";
+/// Entries of a history where nothing else is asked for.
+const HISTORY_ENTRIES: usize = 20;
+
+/// What is asked for beside a document: whoever asks, by whatever way.
+#[derive(Debug, Clone)]
+pub(super) struct Request {
+    /// Whom the document is for; `None` for whom it names.
+    pub(super) unit: Option<UnitId>,
+    /// What its problems are to call it.
+    pub(super) name: String,
+    /// Where it came from.
+    pub(super) source: Source,
+    /// Overlay that it was once made with; for a rollback to it.
+    pub(super) overlay: Option<Digest>,
+    /// What else was asked for.
+    pub(super) options: SwapOptions,
+}
+
+impl Request {
+    /// Whether a signature can be asked for: what the service has made itself has none, an overlaid document lost its own.
+    pub(super) fn needs_signature(&self) -> bool {
+        !matches!(self.source, Source::PreLaunch) && self.overlay.is_none()
+    }
+
+    /// Whether the text was judged when it was first accepted, or made by the service itself.
+    pub(super) fn is_own(&self) -> bool {
+        matches!(self.source, Source::Rollback { .. } | Source::PreLaunch)
+    }
+}
+
+impl Worker {
+    /// A query.
+    pub(super) fn answer(&mut self, asked: Asked, query: &Query, origin: Origin) {
+        let answered = match asked {
+            Asked::Calibration if query.payload().is_none() => self.tell_documents(query),
+            Asked::Calibration => self.answer_swap(query, origin),
+            Asked::Command => self.answer_command(query, origin),
+            Asked::History => self.answer_history(query),
+            Asked::Kept => {
+                self.answer_kept(query);
+                Ok(())
+            }
+        };
+        if let Err(words) = answered {
+            refuse(query, &words);
+        }
+    }
+
+    /// A query with a document on `imu/*/calibration`: a swap.
+    fn answer_swap(&mut self, query: &Query, origin: Origin) -> Result<(), String> {
+        let key = query.key_expr().as_str();
+        let unit = one_unit(key, Asked::Calibration)?;
+        let options = SwapOptions::parse(query.parameters().as_str()).map_err(|error| error.to_string())?;
+        let by = self.by(key, origin, options.by.clone())?;
+        // The instance that speaks answers.
+        if self.intake.answers_for(&unit) {
+            let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+            let reply = self.bus_swap(unit, &bytes, SwapOptions { by, ..options });
+            reply_json(query, key, &reply)?;
+        }
+        Ok(())
+    }
+
+    /// A put on `imu/*/calibration`: a swap whose options stand in the attachment.
+    pub(super) fn take_put(&mut self, sample: &Sample) {
+        let key = sample.key_expr().as_str();
+        if sample.kind() != SampleKind::Put {
+            tracing::warn!("{key}: a deletion has no effect");
+            return;
+        }
+        let Ok(unit) = one_unit(key, Asked::Calibration) else {
+            tracing::warn!("{key} names no unit: the document is ignored");
+            return;
+        };
+        if !self.intake.answers_for(&unit) {
+            return;
+        }
+        let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
+        let options = String::from_utf8(attachment).map_err(|error| error.to_string());
+        let options = options.and_then(|text| SwapOptions::parse(&text).map_err(|error| error.to_string()));
+        let options = options.map_err(|words| format!("attachment: {words}"));
+        let asked = options.and_then(|options| {
+            Ok(SwapOptions { by: self.by(key, Origin::Bus, options.by.clone())?, ..options })
+        });
+        match asked {
+            Ok(options) => drop(self.bus_swap(unit, &sample.payload().to_bytes(), options)),
+            Err(words) => tracing::warn!(%unit, "a document is ignored: {words}"),
+        }
+    }
+
+    fn bus_swap(&mut self, unit: UnitId, bytes: &[u8], options: SwapOptions) -> SwapReply {
+        let name = key::calibration(&unit);
+        let request = Request { unit: Some(unit), name, source: Source::Bus, overlay: None, options };
+        self.swap(&request, bytes, None)
+    }
+
+    /// Replies with the text of what was accepted last for every unit that the query takes in.
+    fn tell_documents(&self, query: &Query) -> Result<(), String> {
+        let mut told = false;
+        let asked = query.key_expr().as_str();
+        for (unit, record) in &self.records {
+            let key = key::calibration(unit);
+            let is_named = key::asker(asked).0 == key;
+            if !(is_named || is_asked(query, &key)) || !self.intake.speaks_for(unit) {
+                continue;
+            }
+            if let Some(text) = record.document().and_then(|document| document.text.as_ref()) {
+                let key = if is_named { asked } else { &*key };
+                reply(query, key, text.read().into_bytes(), Encoding::TEXT_PLAIN);
+                told = true;
+            }
+        }
+        match one_unit(asked, Asked::Calibration) {
+            Ok(unit) if !told && self.intake.speaks_for(&unit) => {
+                Err(format!("unit {unit} has no calibration document"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Who asks, for the audit file: `CN=` and the common name of the certificate where access control gives each one keys of its own,
+    /// else as stated.
+    fn by(&self, key: &str, origin: Origin, stated: String) -> Result<String, String> {
+        match key::asker(key).1 {
+            Some(name) if self.certified_names => Ok(format!("{CERTIFIED}{name}")),
+            _ if stated.starts_with(CERTIFIED) => {
+                Err(format!("by is {stated:?}: {CERTIFIED} is reserved for names of certificates"))
+            }
+            None if self.certified_names && origin == Origin::Bus => Err(format!(
+                "the key must end with the name of your certificate, {key}/NAME (certified_names is set)"
+            )),
+            Some(name) => Ok(name.to_owned()),
+            None => Ok(stated),
+        }
+    }
+
+    /// A query on `imu/*/command`.
+    fn answer_command(&mut self, query: &Query, origin: Origin) -> Result<(), String> {
+        let key = query.key_expr().as_str();
+        let unit = one_unit(key, Asked::Command)?;
+        let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
+        let order = CommandOrder::read(&payload)?;
+        let order = CommandOrder { by: self.by(key, origin, order.by)?, ..order };
+        if self.intake.answers_for(&unit) {
+            let reply = self.command(&unit, &order);
+            let reply =
+                reply.ok_or_else(|| format!("unit {unit} has not appeared: nothing was received from it"))?;
+            reply_json(query, key, &reply)?;
+        }
+        Ok(())
+    }
+
+    /// A query on `imu/*/history`.
+    fn answer_history(&self, query: &Query) -> Result<(), String> {
+        let limit = limit(query.parameters().as_str())?;
+        let one = one_unit(query.key_expr().as_str(), Asked::History).ok();
+        let units = one.map_or_else(|| self.records.keys().cloned().collect(), |unit| vec![unit]);
+        for unit in units {
+            let key = key::history(&unit);
+            if is_asked(query, &key) && self.intake.speaks_for(&unit) {
+                let read = self.store.history(Some(&unit), limit);
+                let told = read.map_err(|error| format!("the history cannot be read: {error}"));
+                if let Err(words) = told.and_then(|entries| reply_json(query, &key, &entries)) {
+                    refuse(query, &words);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The unit that a key is for.
+fn one_unit(key: &str, asked: Asked) -> Result<UnitId, String> {
+    let (key, _) = key::asker(key);
+    let serial = asked.serial(key).ok_or_else(|| format!("{key} is not the key of a unit"))?;
+    UnitId::new(serial).map_err(|error| format!("serial {serial:?} {error}: name one unit"))
+}
+
+/// Whether a query takes a key in.
+fn is_asked(query: &Query, key: &str) -> bool {
+    keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key))
+}
+
+fn reply_json(query: &Query, key: &str, words: &impl Serialize) -> Result<(), String> {
+    let json = serde_json::to_vec(words).map_err(|error| format!("the reply cannot be written: {error}"))?;
+    reply(query, key, json, Encoding::APPLICATION_JSON);
+    Ok(())
+}
+
+pub(super) fn reply(query: &Query, key: &str, bytes: Vec<u8>, encoding: Encoding) {
+    if let Err(error) = query.reply(key, bytes).encoding(encoding).wait() {
+        tracing::warn!("cannot answer on {key}: {}", isotherm_bus::words(&error));
+    }
+}
+
+fn refuse(query: &Query, words: &str) {
+    tracing::warn!("{}: {words}", query.key_expr());
+    if let Err(error) = query.reply_err(words).encoding(Encoding::TEXT_PLAIN).wait() {
+        tracing::warn!("cannot answer on {}: {}", query.key_expr(), isotherm_bus::words(&error));
+    }
+}
+
+/// Reads `limit=20`.
+fn limit(parameters: &str) -> Result<usize, String> {
+    let mut limit = HISTORY_ENTRIES;
+    for parameter in parameters.split(';').filter(|parameter| !parameter.is_empty()) {
+        let value = parameter.strip_prefix("limit=").and_then(|value| value.parse().ok()).filter(|n| *n > 0);
+        limit = value
+            .ok_or_else(|| format!("parameter {parameter:?} must be limit=N, N a whole number from 1"))?;
+    }
+    Ok(limit)
+}
