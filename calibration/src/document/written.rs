@@ -103,7 +103,7 @@ pub fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> Value {
 
 /// The rows of a matrix as documents state them.
 pub fn matrix(matrix: &DMatrix<f64>) -> Value {
-    Value::Array(matrix.row_iter().map(|row| numbers(&row)).collect())
+    Value::Array(matrix.row_iter().map(numbers).collect())
 }
 
 /// Writes a file; one that is there only where that is allowed.

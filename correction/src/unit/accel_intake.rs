@@ -134,7 +134,9 @@ impl AccelIntake {
     #[inline]
     pub(super) fn gyros_released(&mut self, end_time: Timestamp, met: usize) {
         self.released = Some(end_time);
-        (0..met).for_each(|_| drop(self.pending.pop_front()));
+        for _ in 0..met {
+            self.pending.pop_front();
+        }
     }
 
     /// Notes that gyro ticks came which start no new series.

@@ -12,6 +12,7 @@ use crate::units::{Span, Timestamp};
 
 /// Memory of one kind of sensor's orientation.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each holds, or not, without the others")]
 pub(super) struct Axes {
     /// Temperature that the orientation follows (°C); `share` of its way is the share between the inverses.
     temperature: Ramp,

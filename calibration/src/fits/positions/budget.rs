@@ -264,7 +264,7 @@ mod tests {
         for (hysteresis, axis_rate, total) in
             [(5.0, 1.5, 12.0), (15.4, 1.5, 19.0), (15.4, 6.0, 19.0), (60.0, 6.0, 61.0)]
         {
-            let of = Budget { hysteresis, axis_rate, ..budget.clone() };
+            let of = Budget { axis_rate, hysteresis, ..budget.clone() };
             assert!((of.thermal_arcsec() - total).abs() < 0.5, "{}", of.thermal_arcsec());
         }
         let text = budget.to_text(&Plan::twelve(), 3e-4);

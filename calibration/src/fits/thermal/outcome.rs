@@ -248,11 +248,11 @@ impl Outcome {
 
     /// Whether a sensor of the document at hand has terms of the kind that is fitted.
     fn had_terms(&self, sensor: &Sensor) -> bool {
-        let (base, bare, index) = (&self.base, &self.bare, sensor.index);
+        let (document, without, index) = (&self.base, &self.bare, sensor.index);
         if sensor.gyro {
-            base.gyro.sensor.get(index) != bare.gyro.sensor.get(index)
+            document.gyro.sensor.get(index) != without.gyro.sensor.get(index)
         } else {
-            accelerometers(base).get(index) != accelerometers(bare).get(index)
+            accelerometers(document).get(index) != accelerometers(without).get(index)
         }
     }
 

@@ -53,9 +53,8 @@ impl Corrector {
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let raw = tick.gyro;
+        let (raw, count) = (tick.gyro, calibration.gyros.len());
         let (time, duration_s) = (raw.end_time, raw.duration.as_s());
-        let count = calibration.gyros.len();
         let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick)));
         let lost = reversal.is_some_and(|(reversal, input)| self.substitution.is_lost(reversal, &input));
 
@@ -114,12 +113,12 @@ impl Corrector {
             let (found, numbers) = self.thermal.gyro_footing.patch(time, patch, &mut counted, counters);
             (usable, flags) = (counted, found);
             let scaled = scale.angles(patched);
-            let last: [f64; N] = *narrow(&self.last_rates);
+            let before: [f64; N] = *narrow(&self.last_rates);
             increments = array::from_fn(|i| {
                 if numbers.contains(i) {
                     scaled[i] - subtrahend[i] * duration_s
                 } else {
-                    last[i] * duration_s
+                    before[i] * duration_s
                 }
             });
         }
@@ -128,15 +127,7 @@ impl Corrector {
         }
         // Before the substitution: the angle that it restores is a lump, not a rate.
         let mut rates: [f64; N] = increments.map(|increment| increment / duration_s);
-        if sound {
-            put(&mut self.last_rates, rates);
-            self.gyro_health.note_sound();
-        } else {
-            let is_valid = |lane: usize| flags[lane].contains(SensorFlags::VALID);
-            let last: [f64; N] = *narrow(&self.last_rates);
-            put::<N>(&mut self.last_rates, array::from_fn(|i| if is_valid(i) { rates[i] } else { last[i] }));
-            self.gyro_health.note(flags);
-        }
+        self.note_rates(sound, flags, rates);
 
         let seen = &mut self.seen.gyros;
         seen.count = count;
@@ -161,6 +152,26 @@ impl Corrector {
         }
         self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(UNSETTLED);
         self.resolve_angle(calibration, usable, (increments, rates), counters, out);
+    }
+
+    /// Remembers the rates (rad/s) of those readings that were good.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    fn note_rates<const N: usize>(
+        &mut self,
+        sound: bool,
+        flags: [SensorFlags; MAX_SENSORS],
+        rates: [f64; N],
+    ) {
+        if sound {
+            put(&mut self.last_rates, rates);
+            self.gyro_health.note_sound();
+            return;
+        }
+        let before: [f64; N] = *narrow(&self.last_rates);
+        let is_valid = |lane: usize| flags[lane].contains(SensorFlags::VALID);
+        put::<N>(&mut self.last_rates, array::from_fn(|i| if is_valid(i) { rates[i] } else { before[i] }));
+        self.gyro_health.note(flags);
     }
 
     /// Adds what the gyros' servos show in a good tick to their biases (rad/s); `weight` in rad per count.
@@ -229,8 +240,8 @@ impl Corrector {
         }
         let (angle, trusted) = axes.resolve(orientation, usable, &increments, out.end_time);
         out.delta_angle = self.slewing().map_or(angle, |slewing| {
-            let increments = increments;
-            slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &increments[..orientation.sensors()])
+            let copied = increments;
+            slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &copied[..orientation.sensors()])
         });
         if !trusted {
             out.flags |= TickFlags::ANGLE_INVALID;
