@@ -106,7 +106,7 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
     let [revision, digest, from, changes] = match event {
         AuditEvent::Accepted(accepted) => [
             accepted.revision.to_string(),
-            short(accepted.digest),
+            short(&accepted.digest),
             source(&accepted.source),
             effect(accepted.schedule, accepted.slew_ms, &accepted.changed),
         ],
@@ -121,7 +121,7 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
         }
         AuditEvent::Refused(refused) => [
             String::new(),
-            short(refused.digest),
+            short(&refused.digest),
             source(&refused.source),
             format!(
                 "{}: {}",

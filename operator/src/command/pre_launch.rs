@@ -95,7 +95,7 @@ fn words(unit: &UnitId, outcome: &PreLaunchOutcome) -> String {
     let next = super::in_standby(unit);
     match &outcome.verdict {
         PreLaunchVerdict::Accepted(changes) => {
-            let overlay = outcome.overlay.map(|digest| format!(", overlay {}", short(digest)));
+            let overlay = outcome.overlay.map(|digest| format!(", overlay {}", short(&digest)));
             let overlay = overlay.unwrap_or_default();
             let header = ["gyro", "C0 change °/h", "± °/h", "B0 change °/h", "± °/h", "Earth rate °/h"];
             let table = show::table(header, changes.iter().map(row).collect(), 1);

@@ -136,11 +136,11 @@ pub(super) fn ago(unix_ms: i64, now_unix_ms: i64) -> Duration {
 pub(super) fn digest(digest: Option<Digest>, head: [u8; 8]) -> String {
     let mut bytes = [0; 32];
     bytes.iter_mut().zip(head).for_each(|(byte, of_head)| *byte = of_head);
-    short(digest.unwrap_or(Digest(bytes)))
+    short(&digest.unwrap_or(Digest(bytes)))
 }
 
 /// The first twelve hexadecimal digits of a digest.
-pub(crate) fn short(digest: impl ToString) -> String {
+pub(crate) fn short(digest: &impl ToString) -> String {
     digest.to_string().chars().take(12).collect()
 }
 
