@@ -41,12 +41,11 @@ impl Output {
     /// # Errors
     /// [`Error::Log`] where it cannot be created, or is there already and may not be replaced.
     pub fn create(path: &Path, overwrite: bool) -> Result<Self, Error> {
-        let writer: Box<dyn Write> = match path.to_str() {
-            Some("-") => Box::new(io::stdout()),
-            _ => {
-                refuse_replacing(path, overwrite)?;
-                Box::new(File::create(path).map_err(|source| Error::file(path, "create", source))?)
-            }
+        let writer: Box<dyn Write> = if path == Path::new("-") {
+            Box::new(io::stdout())
+        } else {
+            refuse_replacing(path, overwrite)?;
+            Box::new(File::create(path).map_err(|source| Error::file(path, "create", source))?)
         };
         Ok(Self { writer: BufWriter::with_capacity(1 << 16, writer), name: path.display().to_string() })
     }
