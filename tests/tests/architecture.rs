@@ -49,9 +49,9 @@ fn stated(section: &str, word: &str) -> usize {
 fn types<'a>(row: &Row<'a>) -> Vec<(&'a str, &'a str)> {
     let parts = row.text.split("type `").skip(1);
     let types = parts.map(|part| {
-        let name = part.split('`').next().unwrap_or_default();
+        let name = part.split('`').next().unwrap_or(part);
         let file = part.split_once("` (`").filter(|(before, _)| *before == name);
-        (name, file.map_or(row.file, |(_, file)| file.split('`').next().unwrap_or_default()))
+        (name, file.map_or(row.file, |(_, file)| file.split('`').next().unwrap_or(file)))
     });
     types.collect()
 }
@@ -65,7 +65,7 @@ fn check(heading: &str, stated_counts: &[&str]) {
     };
     let page = read("ARCHITECTURE.md");
     let (_, section) = page.split_once(heading).unwrap_or_else(|| panic!("there is no {heading:?}"));
-    let section = section.split("\n## ").next().unwrap_or_default();
+    let section = section.split("\n## ").next().unwrap_or(section);
     let rows = rows(section);
     let (mut seen, mut named) = (Vec::new(), 0);
     for row in &rows {

@@ -43,7 +43,7 @@ pub fn units(units: &[Unit<'_>], columns: usize) -> Grid {
 }
 
 fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
-    let (status, lately, seen) = (unit.status, unit.lately, Lately::counted(unit.status));
+    let (status, lately, sums) = (unit.status, unit.lately, Lately::counted(unit.status));
     let remarks = unit.remarks();
     let level = unit.level();
     let (mark, mark_style) = level.mark(status.state);
@@ -80,10 +80,10 @@ fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
         cell(figure::or_none(deg_per_h, figure::digits)),
         cell(figure::or_none(mg, figure::digits)),
         cell(rate),
-        counter(seen.gaps, lately.gaps),
-        counter(seen.duplicates, lately.duplicates),
-        counter(seen.late, lately.late),
-        counter(seen.bad, lately.bad),
+        counter(sums.gaps, lately.gaps),
+        counter(sums.duplicates, lately.duplicates),
+        counter(sums.late, lately.late),
+        counter(sums.bad, lately.bad),
         cell(figure::or_none(p99_ns, figure::latency)),
         cell(figure::or_none(age_s, figure::since_s)),
         Span::styled(

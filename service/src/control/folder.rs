@@ -256,7 +256,7 @@ impl Worker {
         let request = Request { unit: known.clone(), name, source, overlay: None, options };
         let found = read.found.as_ref();
         if at_start && refused && other_in_force {
-            return refuse_again(&request, self.decide(&request, bytes, found).problems);
+            return told_again(&request, self.decide(&request, bytes, found).problems);
         }
         let reply = self.swap(&request, bytes, found);
         let Request { name, source, .. } = request;
@@ -336,6 +336,20 @@ impl Worker {
         }
         self.retrying = false;
     }
+}
+
+/// Says again what is wrong with a document that was refused before the service was restarted, and written down then.
+fn told_again(request: &Request, mut problems: Vec<Problem>) -> Vec<Problem> {
+    if problems.is_empty() {
+        let message = "was refused when it was put there, and a restart does not change that: put it in force \
+                       with `isotherm swap`, or replace the file";
+        problems.push(unplaced(Some(&request.name), message.to_owned()));
+    }
+    let unit = request.unit.as_ref().map(ToString::to_string).unwrap_or_default();
+    for problem in &problems {
+        tracing::error!(unit, "refused: {problem}; the calibration in force stays");
+    }
+    problems
 }
 
 /// A file as a source: by its absolute path, so that it is the same one after a start from another folder, and as the audit

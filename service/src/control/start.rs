@@ -95,7 +95,8 @@ impl Worker {
                     contents.push((file, read));
                 }
                 Err(error) => {
-                    tracing::error!("{}", self.folder.unreadable(&file, &error.to_string()));
+                    let problem = self.folder.unreadable(&file, &error.to_string());
+                    tracing::error!("{problem}");
                     found.insert(file, Known::Unreadable);
                     bad += 1;
                 }
