@@ -358,17 +358,3 @@ fn known_source(path: &Path, at_start: bool) -> Source {
     let path = shown(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display());
     if at_start { Source::Start { path } } else { Source::Folder { path } }
 }
-
-/// Says again what is wrong with a document that was refused before the service was restarted, and written down then.
-fn refuse_again(request: &Request, mut problems: Vec<Problem>) -> Vec<Problem> {
-    if problems.is_empty() {
-        let message = "was refused when it was put there, and a restart does not change that: put it in force \
-                       with `isotherm swap`, or replace the file";
-        problems.push(unplaced(Some(&request.name), message.to_owned()));
-    }
-    let unit = request.unit.as_ref().map(ToString::to_string).unwrap_or_default();
-    for problem in &problems {
-        tracing::error!(unit, "refused: {problem}; the calibration in force stays");
-    }
-    problems
-}
