@@ -143,6 +143,16 @@ async fn a_second_producer_of_a_unit_is_an_alarm() {
     close(session, LIMIT).await.unwrap();
 }
 
+/// Waits until an overlay lies in the state folders of these instances.
+async fn until_kept(stand: &Stand, instances: &[usize], overlay: &str) {
+    let name = format!("overlays/{}.toml", Digest::of(overlay.as_bytes()));
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    while !instances.iter().all(|index| stand.pair.state(*index).join(&name).exists()) {
+        assert!(tokio::time::Instant::now() < deadline, "{name}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn an_overlay_holds_when_the_instance_that_took_it_is_gone() {
     let mut stand = Stand::start(1, &configuration("")).await;
@@ -160,7 +170,7 @@ async fn an_overlay_holds_when_the_instance_that_took_it_is_gone() {
         (active.revision.counter == 2).then_some(active.overlay)?
     };
     assert_eq!(stand.operator.until(UNIT, holds).await, Digest::of(overlay.as_bytes()));
-    until_paired(&stand.session, 1).await;
+    until_kept(&stand, &[1 - speaking], &overlay).await;
     stand.pair.kill(speaking);
     until_speaks(&stand.session, 1 - speaking, 1).await;
     assert_eq!(stand.operator.until(UNIT, holds).await, Digest::of(overlay.as_bytes()));
@@ -171,14 +181,8 @@ async fn an_overlay_holds_when_the_instance_that_took_it_is_gone() {
     // The one that comes back has them too, text and all.
     stand.restart(speaking);
     until_paired(&stand.session, 1).await;
-    let kept = |text: &String| {
-        let name = format!("overlays/{}.toml", Digest::of(text.as_bytes()));
-        [0, 1].map(|index| std::fs::read_to_string(stand.pair.state(index).join(&name)).ok())
-    };
-    let deadline = tokio::time::Instant::now() + LIMIT;
-    while [&overlay, &second].map(kept).iter().flatten().any(Option::is_none) {
-        assert!(tokio::time::Instant::now() < deadline, "{:?}", [&overlay, &second].map(kept));
-        tokio::time::sleep(Duration::from_millis(20)).await;
+    for text in [&overlay, &second] {
+        until_kept(&stand, &[0, 1], text).await;
     }
     stand.judged = 0;
     stand.end().await;
