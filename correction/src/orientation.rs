@@ -299,7 +299,7 @@ fn masked(mut rows: Rows, mask: SensorMask) -> Rows {
     rows
 }
 
-/// A compiled C(T)⁺, aligned as [lanes](crate::lanes) are; by default of no sensor.
+/// A compiled C(T)⁺, aligned as [`crate::lanes`] are; by default of no sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[repr(align(16))]
 pub struct Inverse {

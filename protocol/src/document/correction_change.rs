@@ -26,8 +26,8 @@ pub struct Side<'a> {
 ///
 /// Per sensor: bias (°/h, mg), weight (″/count or rad/rad) or scale factor with its board, and by how much the input axis
 /// turns (″, `before` being zero). Then, in case axes, the rate and the specific force that the biases take away. Sensors
-/// are matched by name; one that only one document has is left out: [`super::difference`] tells it. See [`Steady`] for
-/// what the state leaves out.
+/// are matched by name; one that only one document has is left out: [`super::difference`] tells it. See
+/// [`isotherm_correction::calibration::Steady`] for what the state leaves out.
 #[must_use]
 pub fn correction_change(
     before: Side<'_>,
