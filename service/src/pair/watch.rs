@@ -181,8 +181,10 @@ impl Work {
         let still = self.pair.look(now);
         let standing = self.pair.standing();
         let looked = self.intake.each_unit(|actor| {
-            if let Some(short) = still.filter(|_| actor.speaks()) {
-                actor.follow(now, Pair::footing(short));
+            match still {
+                Some(short) if actor.speaks() => actor.follow(now, Pair::footing(short)),
+                Some(_) => actor.may_lack(),
+                None => {}
             }
             let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
             (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))

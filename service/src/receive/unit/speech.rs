@@ -177,6 +177,13 @@ impl UnitActor {
         self.status_due = true;
     }
 
+    /// The process stood still: what another instance did meanwhile is known by its memory alone.
+    pub(crate) fn may_lack(&mut self) {
+        if let Some(following) = &mut self.speech.following {
+            following.intact = false;
+        }
+    }
+
     /// Highest revision counter that the unit was given.
     #[must_use]
     pub(crate) fn highest_revision(&self) -> u64 {
