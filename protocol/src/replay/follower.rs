@@ -329,10 +329,12 @@ impl Follower {
         Some(Rebuilt { stream, frames, exact })
     }
 
-    /// The instance that is followed.
+    /// The instance that is followed, or whose memory is to be gone on from.
     #[must_use]
     pub fn instance(&self) -> Option<Arc<str>> {
-        self.anchors.back().map(|anchor| anchor.entry.instance.as_str().into())
+        let memory = self.memory.as_ref().map(|(memory, _)| memory);
+        let entry = memory.or_else(|| self.anchors.back().map(|anchor| &anchor.entry));
+        entry.map(|entry| entry.instance.as_str().into())
     }
 }
 

@@ -17,7 +17,7 @@ use super::{Pair, Questions};
 use crate::ServiceError;
 use crate::receive::fault::FaultKind;
 use crate::receive::intake::Intake;
-use crate::receive::unit::{Alarm, UnitActor, Wants};
+use crate::receive::unit::{Alarm, Wants};
 use crate::service::declare::subscribe;
 
 /// How often the units are looked at where no other instance is there.
@@ -134,10 +134,11 @@ impl Work {
         match event {
             Event::Came(member) => {
                 let (name, mode, priority) = (member.name.clone(), member.mode.name(), member.priority);
+                let instance = member.instance.clone();
                 if self.pair.come(member) {
                     tracing::info!(name, mode, priority, "another service instance is there");
                     self.questions.records(None);
-                    self.intake.each_unit(UnitActor::introduce);
+                    self.intake.each_unit(|actor| actor.introduce(&instance));
                 }
                 self.look(Instant::now());
             }
@@ -183,8 +184,9 @@ impl Work {
         let looked = self.intake.each_unit(|actor| {
             match still {
                 Some(short) if actor.speaks() => actor.follow(now, Pair::footing(short)),
-                Some(_) => actor.may_lack(),
-                None => {}
+                // Connections were lost: what the other did meanwhile is in its memory alone.
+                Some(false) => actor.lose_step(),
+                _ => {}
             }
             let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
             (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))

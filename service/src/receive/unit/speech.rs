@@ -177,13 +177,6 @@ impl UnitActor {
         self.status_due = true;
     }
 
-    /// The process stood still: what another instance did meanwhile is known by its memory alone.
-    pub(crate) fn may_lack(&mut self) {
-        if let Some(following) = &mut self.speech.following {
-            following.intact = false;
-        }
-    }
-
     /// Highest revision counter that the unit was given.
     #[must_use]
     pub(crate) fn highest_revision(&self) -> u64 {
@@ -340,9 +333,17 @@ impl UnitActor {
         self.look();
     }
 
-    /// Has the journal say what the stream knows: instances that speak find out about one another by it.
-    pub(crate) fn introduce(&mut self) {
-        self.speech.memory_due = self.speech.following.is_none() && !self.speech.uncertain;
+    /// An instance has come. What it did while there was no connection to it came here in no journal: its memory is taken anew. Instances
+    /// that speak find out about one another by what the journal says that each knows.
+    pub(crate) fn introduce(&mut self, instance: &str) {
+        let Some(following) = &mut self.speech.following else {
+            self.speech.memory_due = !self.speech.uncertain;
+            return;
+        };
+        self.speech.memory_due = false;
+        if following.follower.instance().is_some_and(|followed| *followed == *instance) {
+            following.lose();
+        }
     }
 
     /// Puts what a unit was last given in the place of what this instance had given it.
@@ -377,8 +378,9 @@ impl UnitActor {
         }
     }
 
-    /// The stream has started anew after an alarm: what it was is not known any more.
-    pub(super) fn lose_step(&mut self) {
+    /// The stream has started anew after an alarm, or the process stood still for long: it is not what the other's is any more, and may lack
+    /// what the other has heard.
+    pub(crate) fn lose_step(&mut self) {
         if let Some(following) = &mut self.speech.following {
             following.lose();
             following.doubt = false;

@@ -264,3 +264,24 @@ fn what_was_ordered_here_is_told_though_another_instance_speaks_by_now() {
     let told: Vec<_> = bench.tape.take().iter().map(|entry| entry.event.name()).collect();
     assert_eq!(told, ["changed", "commanded"]);
 }
+
+#[test]
+fn what_an_instance_did_while_the_connection_was_lost_is_asked_for_when_it_comes_back() {
+    for (comes, asks) in [("b2", true), ("c3", false)] {
+        let (mut bench, other) = (Bench::new(), Bench::new());
+        let standing = Standing {
+            takeover: Duration::from_millis(20),
+            active: false,
+            yields: false,
+            alone_since: None,
+            deserted: false,
+        };
+        let now = Instant::now();
+        bench.actor.follow(now, Footing::Nothing);
+        assert!(bench.actor.watch_speech(now, &standing).memory);
+        bench.actor.hear_journal(other.actor.memory("b2"), now, &standing);
+        assert!(!bench.actor.watch_speech(now, &standing).memory);
+        bench.actor.introduce(comes);
+        assert_eq!(bench.actor.watch_speech(now, &standing).memory, asks, "{comes}");
+    }
+}

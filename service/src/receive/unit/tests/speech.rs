@@ -74,10 +74,14 @@ fn an_isolated_unit_that_lacks_ticks_says_nothing_of_them() {
 
 #[test]
 fn a_unit_that_has_just_yielded_and_lacks_nothing_speaks_again_where_the_other_is_silent() {
-    for (ticks, speaks) in [(30..40, true), (32..42, false)] {
+    for (ticks, stood_still, speaks) in [(30..40, false, true), (32..42, false, false), (30..40, true, false)]
+    {
         let (mut actor, sink, start) = deserted();
         let standing = Standing { alone_since: None, deserted: false, ..lost(start) };
         actor.follow(start + ms(20), Footing::All);
+        if stood_still {
+            actor.lose_step();
+        }
         give(&mut actor, ticks, start + ms(20));
         // By the clock of this machine: frames are kept with the time at which they were computed.
         let late = Instant::now() + TAKEOVER * 2;
