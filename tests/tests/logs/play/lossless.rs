@@ -108,7 +108,7 @@ async fn unlimited_speed_loses_nothing_while_somebody_stalls() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-#[ignore = "minutes: the figures of docs/replay.md"]
+#[ignore = "takes minutes"]
 async fn two_million_ticks_at_unlimited_speed_lose_nothing_in_twenty_runs() {
     nothing_is_lost(10_000, 20, &["10"]).await;
     nothing_is_lost_while_somebody_stalls(10_000, "10").await;
