@@ -17,7 +17,7 @@ mod table;
 use isotherm_cli::Bar;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use case::Case;
+pub(crate) use case::{Beside, Case};
 pub(crate) use profile::Profile;
 pub(crate) use row::Row;
 pub(crate) use subject::Subject;
@@ -36,6 +36,8 @@ pub(crate) enum Measure {
     Saturation,
     /// Latency while every unit is given another calibration each second, beside latency without.
     Swap,
+    /// Latency of a pair to a sink that takes each tick from the service that sends it first, beside latency of one service.
+    Pair,
     /// Latency while pages of the console in the browser are open, beside latency of a service without it.
     Console,
 }
@@ -143,7 +145,11 @@ impl ChainArgs {
             }));
         }
         // What goes on beside the ticks, and how many units it takes to show.
-        for (measure, few) in [(Measure::Swap, 100), (Measure::Console, 200)] {
+        for (measure, few, beside) in [
+            (Measure::Swap, 100, Beside::Swaps),
+            (Measure::Pair, 20, Beside::Standby),
+            (Measure::Console, 200, Beside::Pages),
+        ] {
             if !self.measure.contains(&measure) {
                 continue;
             }
@@ -151,8 +157,7 @@ impl ChainArgs {
             let lasting = if self.quick { 2.0 } else { seconds.max(4.0) };
             cases.extend(usize_of(&self.units, few).into_iter().map(|units| {
                 let without = Case::paced(units, rate, 1, lasting);
-                let (swaps, pages) = (measure == Measure::Swap, measure == Measure::Console);
-                (measure, vec![without.clone(), Case { swaps, pages, ..without }])
+                (measure, vec![without.clone(), Case { beside: Some(beside), ..without }])
             }));
         }
         cases
@@ -201,10 +206,10 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
         let reference = outcomes.first().cloned().unwrap_or_default();
         let before = outcomes.clone();
         rows.extend(runs.iter().zip(outcomes).map(|((case, profile, subject), outcomes)| {
-            // Swaps and pages are compared with the same subject without them, all else with the relay.
-            let without = runs
-                .iter()
-                .position(|(other, _, same)| case.is_disturbed() && !other.is_disturbed() && same == subject);
+            // Swaps, pages and a standby are compared with the same subject without them, all else with the relay.
+            let without = runs.iter().position(|(other, _, same)| {
+                case.beside.is_some() && other.beside.is_none() && same == subject
+            });
             let of = without.and_then(|index| before.get(index)).unwrap_or(&reference);
             Row::new(*measure, case, (*subject, &profile.name), outcomes, of)
         }));
@@ -242,7 +247,7 @@ fn runs(variants: &[Case], profiles: &[Profile], subjects: &[Subject]) -> Vec<Ru
     for profile in profiles {
         for case in variants {
             let able = |subject: &&Subject| {
-                !variants.iter().any(Case::is_disturbed) || **subject == Subject::Service
+                !variants.iter().any(|case| case.beside.is_some()) || **subject == Subject::Service
             };
             let first = runs.is_empty();
             // The relay is the reference of these too, without any.
@@ -258,7 +263,7 @@ fn runs(variants: &[Case], profiles: &[Profile], subjects: &[Subject]) -> Vec<Ru
 
 /// Whether every unit was given another calibration at all; how many there were stands in the table.
 fn check_swaps(case: &Case, subject: Subject, outcome: &round::Outcome) -> Result<(), Error> {
-    if case.swaps && outcome.swaps_per_unit == 0 {
+    if case.beside == Some(Beside::Swaps) && outcome.swaps_per_unit == 0 {
         let what = "a unit was given no other calibration".to_owned();
         return Err(Error::Output { subject: subject.name().to_owned(), what });
     }

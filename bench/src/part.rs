@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use isotherm_bus::{DeclaredKeys, SessionOptions};
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
+use tokio::runtime::Runtime;
 use zenoh::{Session, Wait};
 
 pub(crate) use plan::{Format, Pace, Plan, unit_name};
@@ -62,9 +63,9 @@ pub(crate) fn run(role: Role, plan: &Path) -> Result<(), Error> {
 }
 
 /// Opens a session as the project's programs do, and connects it where the plan says so.
-fn open(plan: &Plan, listen: bool) -> Result<Session, Error> {
-    let connect = plan.connect.iter().filter(|_| !listen).cloned().collect();
-    let options = SessionOptions { config: plan.zenoh_config.clone(), connect, ..SessionOptions::default() };
+pub(crate) fn open(plan: &Plan) -> Result<Session, Error> {
+    let (config, connect) = (plan.zenoh_config.clone(), plan.connect.clone());
+    let options = SessionOptions { config, connect, ..SessionOptions::default() };
     let session = zenoh::open(options.to_config()?).wait();
     session.map_err(|source| Error::Bus(isotherm_bus::BusError::Open(source)))
 }
@@ -83,10 +84,14 @@ fn declare_keys<K: IntoIterator<Item = String>>(
 /// Waits until the one in the middle answers: then it knows every subscription made before.
 fn wait_for_middle(session: &Session) -> Result<(), Error> {
     let limit = std::time::Duration::from_secs(LONGEST_WAIT_S);
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
-    let runtime = runtime.map_err(|source| Error::file(Path::new("runtime"), source))?;
-    runtime.block_on(isotherm_bus::presence::wait_for_service(session, limit))?;
+    runtime()?.block_on(isotherm_bus::presence::wait_for_service(session, limit))?;
     Ok(())
+}
+
+/// For what is asked over the bus.
+pub(crate) fn runtime() -> Result<Runtime, Error> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
+    runtime.map_err(|source| Error::file(Path::new("runtime"), source))
 }
 
 /// Says something to the one who started this process.

@@ -105,15 +105,26 @@ pub trait Watch {
     fn say(&self, words: &str);
 }
 
+/// What playing came to.
+#[derive(Debug)]
+pub struct Played {
+    /// What was sent, and what became of it.
+    pub report: PlayReport,
+    /// What reading the log came to.
+    pub log: LogReport,
+    /// Why it ended before the log did: a signal, a log that cannot be read on, a service that has gone.
+    pub ended: Result<(), Error>,
+}
+
 /// Plays a log.
 ///
 /// # Errors
-/// [`Error::Log`] for a log that cannot be read, [`Error::Bus`] where the service is missing, has gone, or falls silent.
+/// [`Error::Log`] for a log that cannot be opened, [`Error::Bus`] where no session can be, or the service is missing.
 pub async fn play(
     options: &PlayOptions,
     commands: UnboundedReceiver<Command>,
     watch: &impl Watch,
-) -> Result<(PlayReport, LogReport), Error> {
+) -> Result<Played, Error> {
     // From here on a signal ends in order.
     let mut stop = std::pin::pin!(stop_asked()?);
     let way = options.session.way(Role::Peer)?;
@@ -129,16 +140,14 @@ pub async fn play(
             () = &mut stop => Err(Error::Stopped),
             ended = run(&opened, options, &mut player, watch) => ended,
         };
-        match ended {
-            Ok(()) => Ok((player.report(false), player.log_report())),
-            Err(Error::Stopped) => Ok((player.report(true), player.log_report())),
-            Err(error) => Err(error),
-        }
+        Played { report: player.report(ended.is_err()), log: player.log_report(), ended }
     };
     let closed = isotherm_bus::close(opened, CLOSE_LIMIT).await;
-    let report = played?;
-    closed?;
-    Ok(report)
+    // Where playing has failed, that is what counts.
+    if played.ended.is_ok() {
+        closed?;
+    }
+    Ok(played)
 }
 
 /// Plays while the service is there.

@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::part::{Format, Pace, Plan};
 
+/// What goes on beside the ticks: compared with the same without it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Beside {
+    /// Every unit is given another calibration each second.
+    Swaps,
+    /// A second service stands by.
+    Standby,
+    /// Pages of the console in the browser are open.
+    Pages,
+}
+
 /// A load.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
@@ -22,10 +33,8 @@ pub(crate) struct Case {
     pub(crate) seconds: f64,
     /// Ticks of each unit where there is no pace.
     pub(crate) ticks: usize,
-    /// Whether every unit is given another calibration each second.
-    pub(crate) swaps: bool,
-    /// Whether pages of the console in the browser are open.
-    pub(crate) pages: bool,
+    /// What goes on beside the ticks.
+    pub(crate) beside: Option<Beside>,
     /// Whether the service has a state folder, in which it writes down every calibration.
     pub(crate) state: bool,
     /// Sessions of the source.
@@ -52,8 +61,7 @@ impl Case {
             pace: Pace::Burst,
             seconds,
             ticks: 0,
-            swaps: false,
-            pages: false,
+            beside: None,
             state: true,
             sessions: 1,
             timed_swaps: 0,
@@ -74,21 +82,17 @@ impl Case {
             1 => String::new(),
             batch => format!(", batches of {batch}"),
         };
-        let swaps = match (self.swaps, self.pages) {
-            (true, _) => ", a swap each second",
-            (false, true) => ", pages open",
-            (false, false) => "",
+        let beside = match self.beside {
+            Some(Beside::Swaps) => ", a swap each second",
+            Some(Beside::Standby) => ", a standby beside it",
+            Some(Beside::Pages) => ", pages open",
+            None => "",
         };
         match self.pace {
             Pace::Saturated { .. } => format!("{} {units}, saturated, batches of {}", self.units, self.batch),
-            Pace::Spread => format!("{} {units} × {} Hz, spread{batch}{swaps}", self.units, self.rate_hz),
-            Pace::Burst => format!("{} {units} × {} Hz{batch}{swaps}", self.units, self.rate_hz),
+            Pace::Spread => format!("{} {units} × {} Hz, spread{batch}{beside}", self.units, self.rate_hz),
+            Pace::Burst => format!("{} {units} × {} Hz{batch}{beside}", self.units, self.rate_hz),
         }
-    }
-
-    /// Whether something goes on beside the ticks: compared with the same without it.
-    pub(crate) fn is_disturbed(&self) -> bool {
-        self.swaps || self.pages
     }
 
     /// How long it takes at most, once all is ready.
@@ -129,14 +133,15 @@ impl Case {
             pace: self.pace,
             block: saturated,
             sessions: self.sessions,
-            connect: None,
+            connect: Vec::new(),
             zenoh_config: None,
             folder: folder.to_owned(),
             keep: CHECKED.min(KEPT.div_ceil(self.units)),
             format,
             declare_keys: false,
             state: self.state,
-            web: self.pages,
+            web: self.beside == Some(Beside::Pages),
+            pair: self.beside == Some(Beside::Standby),
         }
     }
 }

@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
+use isotherm_bus::inquiry::ask_all;
 use isotherm_correction::sample::TickFlags;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick};
 use isotherm_protocol::document::Document;
-use isotherm_protocol::key::RawStream;
+use isotherm_protocol::key::{self, RawStream};
+use isotherm_protocol::pair::{PairReport, Role, UnitRole};
 use isotherm_protocol::stream::UnitStream;
 
 use super::python::Constants;
@@ -16,8 +19,10 @@ use super::subject::{Subject, document};
 use crate::error::Error;
 use crate::part::frames::{Instrument, Message};
 use crate::part::head::{PLAIN_HEAD, PLAIN_TICK};
-use crate::part::{Kept, Plan, Received, read_kept, unit_name};
+use crate::part::{Kept, Plan, Received, open, read_kept, runtime, unit_name};
 
+/// How long both services may take to say what they are.
+const ANSWER_LIMIT: Duration = Duration::from_secs(5);
 /// Most units of which ticks are compared one by one.
 const MOST_UNITS: usize = 100;
 /// Largest difference of an increment from what the same few lines give here (rad, m/s): the order of sums is free.
@@ -56,6 +61,28 @@ pub(crate) fn check(plan: &Plan, subject: Subject, received: &Received) -> Resul
         })?;
     }
     Ok(())
+}
+
+/// Whether the two services are a pair: one stands by for every unit, and computes the same bits.
+pub(crate) fn is_pair(plan: &Plan) -> Result<(), Error> {
+    let session = open(plan)?;
+    let asked = async {
+        let (replies, _) = ask_all(&session, key::ALL_PAIRS, ANSWER_LIMIT).await?;
+        let samples = replies.into_iter().filter_map(|reply| reply.into_result().ok());
+        let texts = samples.map(|sample| sample.payload().to_bytes().into_owned());
+        Ok::<_, Error>(texts.filter_map(|text| serde_json::from_slice(&text).ok()).collect())
+    };
+    let reports: Vec<PairReport> = runtime()?.block_on(asked)?;
+    let all = reports.iter().flat_map(|report| &report.units);
+    let follows =
+        |unit: &&UnitRole| unit.role == Role::Standby && unit.ticks_compared > 0 && unit.ticks_differing == 0;
+    match all.filter(follows).count() {
+        count if count == plan.units => Ok(()),
+        count => {
+            let what = format!("{count} of {} units are followed by the standby: {reports:?}", plan.units);
+            Err(Error::Output { subject: Subject::Service.name().to_owned(), what })
+        }
+    }
 }
 
 /// Every frame as it was sent.
@@ -150,13 +177,14 @@ mod tests {
             pace: Pace::Burst,
             block: false,
             sessions: 1,
-            connect: None,
+            connect: Vec::new(),
             zenoh_config: None,
             folder: std::path::PathBuf::new(),
             keep: 10,
             format: Format::Raw,
             state: false,
             web: false,
+            pair: false,
             declare_keys: false,
         };
         let instrument = Instrument::simulate(1000).unwrap();

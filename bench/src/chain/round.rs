@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
-use super::case::Case;
+use super::case::{Beside, Case};
 use super::check;
 use super::page::Pages;
 use super::profile::Profile;
@@ -79,7 +79,13 @@ pub(crate) fn run(
     let starting = Instant::now();
     let (middle, locator, http) = subject.start(&plan, &plan_file, profile)?;
     let start_s = starting.elapsed().as_secs_f64();
-    plan.connect = Some(locator);
+    plan.connect.push(locator);
+    let mut middle = vec![middle];
+    if plan.pair {
+        let (standby, locator, _) = subject.start(&plan, &plan_file, profile)?;
+        middle.push(standby);
+        plan.connect.push(locator);
+    }
     if ends.is_none() {
         plan.zenoh_config = None;
     }
@@ -103,20 +109,32 @@ pub(crate) fn run(
         let _: Ready = part.hear(READY_LIMIT)?;
     }
 
-    let before = middle.usage()?;
-    let swapper = if case.swaps { Some(Swapper::start(&plan)?) } else { None };
-    let pages = http.filter(|_| case.pages).map(|address| Pages::open(&address)).transpose()?;
+    let before = usage(&middle)?;
+    let swapper = if case.beside == Some(Beside::Swaps) { Some(Swapper::start(&plan)?) } else { None };
+    let pages = http.filter(|_| plan.web).map(|address| Pages::open(&address)).transpose()?;
     source.tell("go")?;
     let sent: Sent = source.hear(case.limit() + READY_LIMIT)?;
     sink.tell(&sent.messages.to_string())?;
     let received: Received = sink.hear(READY_LIMIT)?;
     swapper.map(Swapper::stop).transpose()?;
     pages.map(Pages::close).transpose()?;
-    let after = middle.usage()?;
+    let after = usage(&middle)?;
     let swap_ms = if subject == Subject::Service { swap::timed(&plan, case.timed_swaps)? } else { 0.0 };
     check::check(&plan, subject, &received)?;
+    if plan.pair {
+        check::is_pair(&plan)?;
+    }
     let used = Usage { cpu_s: after.cpu_s - before.cpu_s, ..after };
     Ok(Outcome { start_s, swap_ms, ..outcome(&plan, case, (&sent, &received), used)? })
+}
+
+/// What the processes of the middle have used together.
+fn usage(middle: &[Process]) -> Result<Usage, Error> {
+    let each: Vec<Usage> = middle.iter().map(Process::usage).collect::<Result<_, _>>()?;
+    Ok(Usage {
+        cpu_s: each.iter().map(|one| one.cpu_s).sum(),
+        resident_kib: each.iter().map(|one| one.resident_kib).sum(),
+    })
 }
 
 /// Puts together what the parts have written down.

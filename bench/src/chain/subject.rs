@@ -67,14 +67,16 @@ impl Subject {
             Self::Service => Self::serve(plan)?,
             Self::Python => python::relay(plan)?,
         };
+        // A second one is started where the first is known.
+        let name = if plan.connect.is_empty() { self.name() } else { "standby" };
         if let Some(runtime) = &profile.runtime {
             command.env("ZENOH_RUNTIME", runtime);
         }
-        let process = Process::start(self.name(), &mut command, &plan.folder)?;
+        let process = Process::start(name, &mut command, &plan.folder)?;
         let Ready { locators, metrics, .. } = process.hear(START_LIMIT)?;
         let locator = locators.into_iter().next();
         let locator =
-            locator.ok_or_else(|| Error::Part { part: self.name(), what: "listens nowhere".to_owned() })?;
+            locator.ok_or_else(|| Error::Part { part: name, what: "listens nowhere".to_owned() })?;
         Ok((process, locator, metrics))
     }
 
@@ -87,9 +89,10 @@ impl Subject {
             let path = documents.join(format!("{unit}.toml"));
             fs::write(&path, document(unit, 0)?).map_err(|source| Error::file(&path, source))?;
         }
-        let settings = plan.folder.join("service.toml");
+        let name = if plan.connect.is_empty() { "first" } else { "second" };
+        let settings = plan.folder.join(format!("{name}.toml"));
         let congestion = if plan.block { "block" } else { "drop" };
-        let state = if plan.state { "state = \"state\"\n" } else { "" };
+        let state = if plan.state { format!("state = \"{name}\"\n") } else { String::new() };
         let units = plan.units.max(1);
         let text =
             format!("calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n");
@@ -98,6 +101,8 @@ impl Subject {
             fs::write(&token, TOKEN).map_err(|source| Error::file(&token, source))?;
             let web = "[web]\nenabled = true\ntoken_file = \"token\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n";
             text + web
+        } else if plan.pair {
+            format!("{text}[pair]\nname = \"{name}\"\n")
         } else {
             text
         };
@@ -106,6 +111,9 @@ impl Subject {
         command
             .args(["serve", "--announce", "--json", "--listen", "tcp/127.0.0.1:0", "--config"])
             .arg(settings);
+        for address in &plan.connect {
+            command.arg("--connect").arg(address);
+        }
         if let Some(config) = &plan.zenoh_config {
             command.arg("--zenoh-config").arg(config);
         }

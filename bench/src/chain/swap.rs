@@ -5,14 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use isotherm_bus::SessionOptions;
 use isotherm_protocol::key;
-use zenoh::{Session, Wait};
+use zenoh::Wait;
 
 use super::subject::document;
 use crate::clock::{now_ns, sleep_until};
 use crate::error::Error;
-use crate::part::{Plan, unit_name};
+use crate::part::{Plan, open, unit_name};
 use crate::rounds::median;
 
 /// Time between two swaps of a unit (ns).
@@ -59,14 +58,6 @@ impl Swapper {
         let gone = |_| Error::Part { part: "swaps", what: "the thread has ended with a panic".to_owned() };
         self.thread.join().map_err(gone)?
     }
-}
-
-/// A session of the operator's.
-fn open(plan: &Plan) -> Result<Session, Error> {
-    let connect = plan.connect.iter().cloned().collect();
-    let options = SessionOptions { config: plan.zenoh_config.clone(), connect, ..SessionOptions::default() };
-    let session = zenoh::open(options.to_config()?).wait();
-    session.map_err(|source| Error::Bus(isotherm_bus::BusError::Open(source)))
 }
 
 /// Gives some units another calibration, one after the other, each when the one before has been answered; the median of the times (ms),

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use comfy_table::Table;
 
+use super::case::Beside;
 use super::{Measure, Report, Row};
 use crate::cli::plain;
 
@@ -66,7 +67,11 @@ fn latency(rows: &[&Row]) -> Table {
             format!("{:.2}", row.median.cpu_us_per_tick),
             format!("{:.2}×", row.cpu_ratio),
             format!("{:.0}", row.median.source_late_us[1]),
-            if row.case.swaps { row.median.swaps_per_unit.to_string() } else { String::new() },
+            if row.case.beside == Some(Beside::Swaps) {
+                row.median.swaps_per_unit.to_string()
+            } else {
+                String::new()
+            },
         ]);
         last = &row.name;
     }

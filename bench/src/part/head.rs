@@ -85,13 +85,14 @@ mod tests {
             pace: Pace::Burst,
             block: false,
             sessions: 1,
-            connect: None,
+            connect: Vec::new(),
             zenoh_config: None,
             folder: std::path::PathBuf::new(),
             keep: 3,
             format: Format::Raw,
             state: false,
             web: false,
+            pair: false,
             declare_keys: false,
         }
     }

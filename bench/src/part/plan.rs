@@ -52,8 +52,8 @@ pub(crate) struct Plan {
     pub(crate) block: bool,
     /// Sessions that the units are shared out to.
     pub(crate) sessions: usize,
-    /// Where the middle listens, once it does.
-    pub(crate) connect: Option<String>,
+    /// Where the middle listens, once it does: two addresses where a standby is beside it.
+    pub(crate) connect: Vec<String>,
     /// Zenoh configuration of all parts; the default where there is none.
     pub(crate) zenoh_config: Option<PathBuf>,
     /// Where results are left.
@@ -66,6 +66,8 @@ pub(crate) struct Plan {
     pub(crate) state: bool,
     /// Whether it serves the console in the browser.
     pub(crate) web: bool,
+    /// Whether it is one of a pair, and the sink takes each tick from the one that sends it first.
+    pub(crate) pair: bool,
     /// Whether the relay declares the keys that it receives, so that Zenoh looks for their subscribers once only.
     pub(crate) declare_keys: bool,
 }

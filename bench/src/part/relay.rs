@@ -10,7 +10,7 @@ use crate::error::Error;
 
 /// Relays until stdin ends.
 pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
-    let session = open(plan, true)?;
+    let session = open(plan)?;
     let outputs = outputs(&session, plan)?;
     let of_unit = |unit: &UnitId| RawStream::ALL.map(|stream| key::raw(unit, stream));
     let _declared = plan.declare_keys.then(|| declare_keys(&session, plan, of_unit)).transpose()?;

@@ -5,6 +5,9 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use isotherm_bus::FirstWins;
+use isotherm_protocol::codec;
+use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key;
 use serde::{Deserialize, Serialize};
 use zenoh::Wait;
@@ -49,6 +52,7 @@ struct Unit {
     revision: u64,
     changes: u64,
     kept: Vec<Vec<u8>>,
+    arbiter: FirstWins,
 }
 
 /// Writes down until everything has come, or nothing comes any more.
@@ -61,7 +65,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         units: vec![Unit::default(); plan.units],
     }));
     lock(&book).came_ns.fill(0);
-    let session = open(plan, false)?;
+    let session = open(plan)?;
     // As a consumer does: the sink has to keep up with thousands of units.
     let _declared = declare_keys(&session, plan, |unit| [key::corrected(unit)])?;
     let writing = Arc::clone(&book);
@@ -69,7 +73,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         .declare_subscriber(key::ALL_CORRECTED)
         .callback(move |sample| {
             let now = now_ns();
-            lock(&writing).enter(&sample, now);
+            lock(&writing).take(&sample, now);
         })
         .wait();
     let _subscriber = subscriber.map_err(|error| Error::zenoh("sink", &error))?;
@@ -126,6 +130,23 @@ impl Book {
     fn begin(&mut self) {
         let Received { duplicates, disordered, strange, .. } = self.account;
         self.account = Received { duplicates, disordered, strange, ..Received::default() };
+    }
+
+    /// Takes a message that came at a time; of a pair, if its ticks are used: the time is when that is known.
+    fn take(&mut self, sample: &Sample, now: u64) {
+        if !self.plan.pair {
+            return self.enter(sample, now);
+        }
+        let batch = codec::decode::<CorrectedBatch>(&sample.payload().to_bytes()).ok();
+        let unit = head::unit_of(sample.key_expr().as_str()).and_then(|number| self.units.get_mut(number));
+        if let (Some(batch), Some(unit)) = (batch, unit) {
+            let won = batch.ticks.iter().filter(|tick| unit.arbiter.wins(tick)).count();
+            // Both services put the same ticks into a message.
+            if won == 0 {
+                return;
+            }
+        }
+        self.enter(sample, now_ns());
     }
 
     /// Enters a message that came at a time.

@@ -35,8 +35,7 @@ struct Outlets {
 
 /// Publishes when it is told to.
 pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
-    let sessions: Vec<Session> =
-        (0..plan.sessions.max(1)).map(|_| open(plan, false)).collect::<Result<_, _>>()?;
+    let sessions: Vec<Session> = (0..plan.sessions.max(1)).map(|_| open(plan)).collect::<Result<_, _>>()?;
     let mut units = Vec::new();
     for (unit, session) in (0..plan.units).zip(sessions.iter().cycle()) {
         units.push(Outlets::declare(session, unit)?);

@@ -25,7 +25,7 @@ use super::{LogArgs, print, seconds, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
-use crate::play::{Acknowledge, PlayOptions, PlayReport, play, wanted};
+use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, play, wanted};
 use screen::Screen;
 
 /// Most copies of a unit.
@@ -255,14 +255,12 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     drop(keyboard);
     // What Zenoh may still do is not waited for.
     runtime.shutdown_background();
-    let (play, log) = played?;
+    let Played { report: play, log, ended } = played?;
     for warning in tables::warnings(&play) {
         show::warn(&warning);
     }
     let report = Report { play: &play, log: &log };
     print(if args.json { show::json(&report) } else { tables::human(&report, &options) }.as_bytes())?;
-    if play.stopped {
-        return Err(Error::Stopped);
-    }
+    ended?;
     Ok(Exit::of_loss(play.lost_data() || log.lost_data()))
 }

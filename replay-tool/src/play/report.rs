@@ -192,7 +192,7 @@ pub struct PlayReport {
     pub actual_speed: f64,
     /// How late messages went out.
     pub lateness: Lateness,
-    /// Playing was stopped by a signal.
+    /// Playing ended before the log did: by a signal, or by an error.
     pub stopped: bool,
     /// The units, in the order in which the log names them.
     pub units: Vec<UnitReport>,

@@ -123,8 +123,9 @@ impl Work {
                 }
                 Err(RecvTimeoutError::Timeout) => {
                     let now = Instant::now();
-                    self.look(now);
+                    let late_at = self.look(now);
                     next = now + if self.pair.has_others() { self.interval } else { ALONE };
+                    next = late_at.map_or(next, |at| next.min(at));
                 }
             }
         }
@@ -177,10 +178,11 @@ impl Work {
         }
     }
 
-    /// Looks at every unit.
-    fn look(&self, now: Instant) {
+    /// Looks at every unit; says when the first of them that waits for the other instance has waited for too long.
+    fn look(&self, now: Instant) -> Option<Instant> {
         let still = self.pair.look(now);
         let standing = self.pair.standing();
+        let mut first_late = None;
         let looked = self.intake.each_unit(|actor| {
             match still {
                 Some(short) if actor.speaks() => actor.follow(now, Pair::footing(short)),
@@ -188,7 +190,9 @@ impl Work {
                 Some(false) => actor.lose_step(),
                 _ => {}
             }
-            let Wants { memory, spoke, alarm } = actor.watch_speech(now, &standing);
+            let Wants { memory, spoke, alarm, late_at } = actor.watch_speech(now, &standing);
+            // Who is late already and does not take over is looked at as often as all.
+            first_late = first_late.into_iter().chain(late_at.filter(|at| *at > now)).min();
             (memory || spoke || alarm.is_some()).then(|| (actor.id().clone(), memory, spoke, alarm))
         });
         if still.is_some() {
@@ -217,5 +221,6 @@ impl Work {
                 "this instance publishes from now on, instead of another"
             );
         }
+        first_late
     }
 }

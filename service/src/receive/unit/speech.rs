@@ -68,6 +68,8 @@ pub(crate) struct Wants {
     pub(crate) spoke: bool,
     /// What is wrong, in words.
     pub(crate) alarm: Option<Alarm>,
+    /// When the other instance's output is late, if nothing is heard until then: the next look is due by that time.
+    pub(crate) late_at: Option<Instant>,
 }
 
 /// What was to be impossible.
@@ -289,7 +291,8 @@ impl UnitActor {
             standing.alone_since.map(|since| now.saturating_duration_since(since.max(following.listens)));
         let mutual = following.intact && !standing.yields && alone.is_none();
         let silence = if mutual { MUTUAL } else { LONELY };
-        let late = following.kept.is_late(now, standing.takeover);
+        wants.late_at = following.kept.late_at(standing.takeover);
+        let late = wants.late_at.is_some_and(|at| at <= now);
         // Nor does a unit that sends nothing wait for ever.
         let still_silent = now.saturating_duration_since(following.listens) > standing.takeover * 2;
         let lonely = alone.is_some_and(|alone| alone >= LONELY) || following.kept.is_silent(now, silence);

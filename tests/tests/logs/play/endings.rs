@@ -20,21 +20,24 @@ const UNIT: &str = "MEMS-0001";
 const AT_ONCE: Duration = Duration::from_secs(4);
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_service_that_goes_ends_playing_at_once() {
+async fn a_service_that_goes_ends_playing_at_once_with_its_summary() {
     let folder = tempfile::tempdir().unwrap();
     let [log, mapping] = simulated(folder.path(), "mems-chamber", 60);
     for killed in [true, false] {
         let service = service();
         let options = SessionOptions { connect: vec![service.locator.clone()], ..SessionOptions::default() };
         let operator = Operator::new(open(&options).await.unwrap());
-        let player = begin(&["-m", &mapping, &log, "-u", UNIT, "--connect", &service.locator]);
+        let player = begin(&["-m", &mapping, &log, "-u", UNIT, "--connect", &service.locator, "--json"]);
         presence::wait_for_service(operator.session(), LIMIT).await.unwrap();
         played(&operator, None).await;
         let begun = Instant::now();
         in_time(LIMIT, move || if killed { service.kill() } else { drop(service.stop()) }).await;
         let output = in_time(LIMIT, move || player.wait_with_output().unwrap()).await;
         let errors = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{errors}");
+        let said = summary(&output, 1);
+        let ticks = |name: &str| said[name].as_u64().unwrap();
+        let became = ["ticks_acknowledged", "ticks_lost", "ticks_late", "ticks_under_way"].map(ticks);
+        assert_eq!((&said["stopped"], ticks("ticks_sent")), (&json!(true), became.iter().sum()), "{said}");
         assert!(errors.contains("the service is gone"), "{errors}");
         assert!(begun.elapsed() < AT_ONCE, "{:?}", begun.elapsed());
     }

@@ -125,10 +125,10 @@ impl Kept {
         }
     }
 
-    /// Whether a frame waits to be heard for longer than that.
-    pub(super) fn is_late(&self, now: Instant, limit: Duration) -> bool {
+    /// When the oldest frame that waits to be heard has waited for that long.
+    pub(super) fn late_at(&self, limit: Duration) -> Option<Instant> {
         let waiting = self.frames.iter().rev().take_while(|frame| !frame.heard).last();
-        waiting.is_some_and(|frame| now.saturating_duration_since(frame.at) > limit)
+        waiting.map(|frame| frame.at + limit)
     }
 
     /// Whether frames were computed and nothing was heard for that long.
