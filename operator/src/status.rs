@@ -35,7 +35,7 @@ Columns:
   rev      revision of the calibration in force; cal. age: time since its document was made
   °C       temperature and its rate, of the first channel that is stale or outside its range, else of the first
   range    all temperatures against the calibrated range
-  °/h, mg  size of the correction subtracted at present
+  °/h, mg  size of the present correction
   Hz       raw gyro ticks received per second
   gaps, dup, late, bad
            gaps announced, duplicates, late ticks and readings, frames refused, since the service started

@@ -17,7 +17,7 @@ pub enum Format {
     /// One row per output.
     #[default]
     Csv,
-    /// The wire's frames, each behind its length.
+    /// Frames as on the bus, each after its length.
     Wire,
 }
 

@@ -121,7 +121,11 @@ fn tell(seen: &Seen, finding: &Finding) {
             "its publisher has another type than the mapping's topic: nothing is received from it"
         ),
         Finding::OnOutput => {
-            tracing::warn!(node, topic, "it publishes where corrected messages go: subscribers get both");
+            tracing::warn!(
+                node,
+                topic,
+                "it publishes on the topic of corrected messages: subscribers receive both"
+            );
         }
     }
 }

@@ -33,7 +33,7 @@ const MOST_HOURS: f64 = 1000.0;
 /// Sizes of the gyros in tables 1 and 2 of 002, for a drift without a document: σ, τ, σ1, τ1, constant part, N.
 const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
 
-/// What a drift means for navigation: heading and position of a platform system over two days on its own
+/// What a drift means for navigation: heading and position of a platform system over two days without a position fix
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate impact --trend 0.00008 --html impact.html\n  \

@@ -19,7 +19,7 @@ use crate::report::{FitReport, Sigmas, residuals};
 /// What a fit writes.
 #[derive(Debug, Clone, Args)]
 pub(super) struct OutputArgs {
-    /// Write the new document; of several units each to NEW-UNIT.toml
+    /// New document to write; several units: NEW-UNIT.toml of each
     #[arg(long, short, value_name = "NEW")]
     out: Option<PathBuf>,
     /// Replace existing documents and reports

@@ -22,7 +22,7 @@ const BATCH_TICKS: usize = 512;
 /// Logs, of one unit or of several.
 #[derive(Debug, Clone, Args)]
 pub(super) struct LogArgs {
-    /// Recordings (.mcap), the files of a text log in the order of its mapping, or a folder that has them
+    /// Recordings (.mcap), or the files of a text log in the mapping's order, or a folder of them
     #[arg(required = true, value_name = "LOG")]
     pub(super) log: Vec<PathBuf>,
     #[command(flatten)]
@@ -32,7 +32,7 @@ pub(super) struct LogArgs {
 /// Logs that a document is judged on.
 #[derive(Debug, Clone, Args)]
 pub(super) struct JudgeArgs {
-    /// Log to judge the new document on, which it is not fitted to; repeatable
+    /// Log to judge the new document by, not used in the fit; repeatable
     #[arg(long, value_name = "LOG")]
     pub(super) judge: Vec<PathBuf>,
 }
@@ -40,15 +40,15 @@ pub(super) struct JudgeArgs {
 /// The document that a fit starts from.
 #[derive(Debug, Clone, Args)]
 pub(super) struct BaseArgs {
-    /// Calibration document (TOML) that the fit starts from and completes; for several units the folder that has UNIT.toml of each
+    /// Calibration document (TOML) that the fit starts from; several units: the folder with UNIT.toml of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     pub(super) document: Option<PathBuf>,
 }
 
 /// How logs are read.
 #[derive(Debug, Clone, Args)]
-/// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
 pub(super) struct Reading {
+    /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(super) mapping: Option<PathBuf>,
     /// Unit serial, if a recording has several; text log: the serial to assign (default: the document's)
@@ -57,7 +57,7 @@ pub(super) struct Reading {
     /// Start this long after each log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(super) start: Span,
-    /// Length to take of each log (s) (default: all)
+    /// Length of each log to read (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) duration: Option<Span>,
     /// Stop this long after each log's beginning (s)

@@ -29,7 +29,7 @@ pub(super) use stands::StandArgs;
     --out unit-new.toml\n  \
     isotherm-calibrate thermal still.mcap turned.mcap --calibration unit.toml --latitude 55.75 --heading 30 --pitch 0 --roll 0 \\\n      \
     --axis z --rate 0 --rate 20 --out unit-new.toml\n\n\
-    A refused sensor keeps the terms that it had; the others are written, and the command ends with 1 unless --accept-partial.")]
+    A refused sensor keeps its old terms; the others are written, and the exit code is 1 unless --accept-partial.")]
 pub(super) struct ThermalArgs {
     #[command(flatten)]
     log: LogArgs,
@@ -44,7 +44,7 @@ pub(super) struct ThermalArgs {
     /// Start this long after each judging log's beginning (s)
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_start: Option<f64>,
-    /// Length to take of each judging log (s) (default: all)
+    /// Length of each judging log to read (s) (default: all)
     #[arg(long, value_name = "SECONDS", requires = "judge")]
     judge_duration: Option<f64>,
     #[command(flatten)]

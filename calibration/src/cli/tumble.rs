@@ -25,7 +25,7 @@ use crate::runs::Run;
 #[command(after_help = "Examples:\n  \
     isotherm-calibrate tumble gyro.txt.gz acc.txt.gz --mapping config/mappings/tumble-mems.toml --unit TUMBLE-0001 --gravity 9.81744 --out tumble.toml --html tumble.html\n  \
     isotherm-calibrate tumble tumbled.mcap --calibration unit.toml --latitude 55.75 --out unit-tumbled.toml\n\n\
-    Leave the unit alone for half a minute, then put it down in thirty or more different ways for two seconds each. The accelerometers define the case axes: z is the third's, y lies in the plane of the second and third.")]
+    Leave the unit still for half a minute, then put it down in thirty or more different ways for two seconds each. The accelerometers define the case axes: z is the third's, y lies in the plane of the second and third.")]
 pub(super) struct TumbleArgs {
     #[command(flatten)]
     log: LogArgs,

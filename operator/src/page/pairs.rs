@@ -33,7 +33,7 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
             said.push((Level::Fine, instance(report)));
             let differences = report.units.iter().filter_map(|unit| unit.last_difference.as_deref());
             said.extend(differences.take(NAMED).map(|difference| {
-                (Level::Fault, vec![format!("{}: other bits: {difference}", report.member.name)])
+                (Level::Fault, vec![format!("{}: bits differ: {difference}", report.member.name)])
             }));
         }
         let twice = named(reports, |report, unit| {
@@ -41,7 +41,7 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
             speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
         });
         if !twice.is_empty() {
-            said.push((Level::Fault, vec![format!("two instances speak for {}", listed(&twice))]));
+            said.push((Level::Fault, vec![format!("two instances publish {}", listed(&twice))]));
         }
     }
     let mut nobody: Vec<String> = reports.iter().flat_map(|report| report.passed_over.clone()).collect();
@@ -49,12 +49,12 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
     nobody.sort_unstable();
     nobody.dedup();
     if !nobody.is_empty() {
-        said.push((Level::Warning, vec![format!("nobody takes {}", listed(&nobody))]));
+        said.push((Level::Warning, vec![format!("no service takes {}", listed(&nobody))]));
     }
     said
 }
 
-/// "north", "speaks for 20 units, standby for 3, joining 1", "standby", "priority 1", "takeovers 2", "40 000 ticks compared, 0 other".
+/// "north", "publishes 20 units, standby for 3, joining for 1", "standby", "priority 1", "takeovers 2", "40 000 ticks compared, 0 differ".
 fn instance(report: &PairReport) -> Vec<String> {
     let count = |role| report.units.iter().filter(|unit| unit.role == role).count();
     let sum = |number: fn(&UnitRole) -> u64| grouped(report.units.iter().map(number).sum());
@@ -63,12 +63,12 @@ fn instance(report: &PairReport) -> Vec<String> {
     let silent: Vec<_> = silent.map(|role| format!(", {} for {}", role.name(), count(role))).collect();
     vec![
         member.name.clone(),
-        format!("speaks for {}{}", of(count(Role::Speaking), "unit"), silent.concat()),
+        format!("publishes {}{}", of(count(Role::Speaking), "unit"), silent.concat()),
         member.mode.name().to_owned(),
         format!("priority {}", member.priority),
         format!("takeovers {}", sum(|unit| unit.takeovers)),
         format!(
-            "{} ticks compared, {} other",
+            "{} ticks compared, {} differ",
             sum(|unit| unit.ticks_compared),
             sum(|unit| unit.ticks_differing)
         ),
@@ -144,11 +144,11 @@ mod tests {
         ];
         let seen = text(&pair);
         assert!(
-            seen.contains("north  speaks for 1 unit, standby for 1  standby  priority 1  takeovers 2"),
+            seen.contains("north  publishes 1 unit, standby for 1  standby  priority 1  takeovers 2"),
             "{seen}"
         );
         assert!(
-            seen.contains("south  speaks for 1 unit, joining for 1") && !seen.contains("two instances"),
+            seen.contains("south  publishes 1 unit, joining for 1") && !seen.contains("two instances"),
             "{seen}"
         );
         assert_eq!(
@@ -165,7 +165,7 @@ mod tests {
         ];
         let seen = text(&pair);
         assert!(
-            seen.contains("! two instances speak for A\n") && seen.contains("▲ nobody takes C"),
+            seen.contains("! two instances publish A\n") && seen.contains("▲ no service takes C"),
             "{seen}"
         );
     }

@@ -100,14 +100,7 @@ fn troubles(service: &ServiceStatus, columns: usize) -> Vec<Line<'static>> {
     }
     let unnamed = service.bad_documents.len().saturating_sub(NAMED);
     if unnamed > 0 {
-        troubles.push((
-            format!(
-                "▲ and {} that {} not taken",
-                of(unnamed, "more document"),
-                if unnamed == 1 { "is" } else { "are" }
-            ),
-            tone::WARNING,
-        ));
+        troubles.push((format!("▲ and {} refused", of(unnamed, "more document")), tone::WARNING));
     }
     let line = |(words, style): (String, Style)| Line::from(Span::styled(fit(&words, columns), style));
     troubles.into_iter().map(line).collect()

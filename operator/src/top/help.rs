@@ -29,7 +29,7 @@ const TEXT: &[(&str, &str)] = &[
     ("rev, age", "revision of the calibration in force, age of its document"),
     ("°C, °C/min", "of the first channel that is stale or outside its range, else of the first"),
     ("range", "all temperatures against the calibrated range"),
-    ("°/h, mg", "size of the correction subtracted at present"),
+    ("°/h, mg", "size of the present correction"),
     ("Hz", "raw gyro ticks received per second"),
     ("gaps dup", "gaps announced and duplicates, since the service started; yellow: growing"),
     ("late bad", "late ticks and readings, frames refused; likewise"),

@@ -24,8 +24,8 @@ use crate::output::Format;
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out corrected.csv\n\n\
     The CSV's column names end with their unit; its numbers read back to the bit.\n\n\
     A recording is corrected by its own journal, all units at once, with the calibrations, swaps and commands of the service at the same ticks: `isotherm-replay correct session.mcap`. Corrected ticks in it are compared to the bit.\n\n\
-    Exit code 3: units without journal were left out, recorder and service did not have the same, corrected and published ticks differ, or a part of the log could \
-    not be read.")]
+    Exit code 3: units without a journal were left out, recorder and service received different messages, corrected and published ticks differ, or part of the log \
+    could not be read.")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct CorrectArgs {
     #[command(flatten)]

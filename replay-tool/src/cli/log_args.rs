@@ -29,7 +29,7 @@ pub(crate) struct LogArgs {
     /// Start this long after the log's beginning (s); recordings are cut between messages
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
     pub(crate) start: Span,
-    /// Length to take (s) (default: all)
+    /// Length to read (s) (default: all)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) duration: Option<Span>,
     /// Stop this long after the log's beginning (s)

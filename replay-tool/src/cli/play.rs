@@ -53,7 +53,7 @@ pub(super) struct PlayArgs {
     /// Clock that sets the pace: ends of ticks, or reception [default: receive; text logs: event]
     #[arg(long, value_enum, hide_short_help = true)]
     clock: Option<ClockArg>,
-    /// Repeat the log for ever, or N times
+    /// Repeat the log forever, or N times
     #[arg(long = "loop", value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "0", hide_short_help = true)]
     passes: Option<u64>,
     /// Play only these keys, e.g. 'imu/*/raw/gyro'; repeatable
@@ -89,7 +89,7 @@ pub(super) struct PlayArgs {
     /// Most unacknowledged gyro ticks per unit; at least 2 × batch + 256 [default: 16384 shared, at most 4096 each]
     #[arg(long, value_name = "TICKS", hide_short_help = true)]
     in_flight: Option<u64>,
-    /// Do not wait for corrected ticks: for other listeners, or a unit in standby
+    /// Do not wait for corrected ticks: for other subscribers, or a unit in standby
     #[arg(long, conflicts_with = "in_flight", hide_short_help = true)]
     no_acknowledge: bool,
     /// Longest wait for service, subscribers and output (s)

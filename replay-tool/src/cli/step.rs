@@ -36,7 +36,7 @@ pub(super) struct StepArgs {
     /// Begin to print at this gyro tick
     #[arg(long, value_name = "SEQ")]
     from: Option<u64>,
-    /// Print so many events
+    /// Stop after N events
     #[arg(long, value_name = "N")]
     count: Option<u64>,
     /// Print each event as one JSON object on a line

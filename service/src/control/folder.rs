@@ -265,7 +265,7 @@ impl Worker {
             let event =
                 AuditEvent::CarriedFile(CarriedFile { path: path.to_owned(), digest, refused: false });
             if let Err(error) = self.append(known.as_ref(), "", event) {
-                tracing::error!("{name} is not in the audit file as seen: {error}");
+                tracing::error!("that {name} was read is not in the audit file: {error}");
             }
         }
         reply.problems

@@ -330,7 +330,7 @@ impl Store {
         let taken_away = log.changed_by_others()?;
         if taken_away {
             tracing::warn!(
-                "the audit file in {} was changed by someone else: a new one is begun",
+                "the audit file in {} was changed by someone else: a new one is started",
                 path.display()
             );
         }
@@ -350,7 +350,7 @@ impl Store {
             // A full file goes on being written to, rather than refuse what it still has room for.
             Err(error) if full && !taken_away => {
                 if !self.stuck {
-                    tracing::warn!("the audit file is full and no new one can be begun: {error}");
+                    tracing::warn!("the audit file is full and no new one can be started: {error}");
                 }
                 self.stuck = true;
                 Ok(())

@@ -137,7 +137,7 @@ impl Work {
                 let (name, mode, priority) = (member.name.clone(), member.mode.name(), member.priority);
                 let instance = member.instance.clone();
                 if self.pair.come(member) {
-                    tracing::info!(name, mode, priority, "another service instance is there");
+                    tracing::info!(name, mode, priority, "another service instance has appeared");
                     self.questions.records(None);
                     self.intake.each_unit(|actor| actor.introduce(&instance));
                 }

@@ -172,9 +172,11 @@ impl Intake {
         for command in &plan.intent {
             match actor.command(command) {
                 Ok(state) => {
-                    tracing::info!(unit = %id, %state, "{} again, as before the restart", command.name());
+                    tracing::info!(unit = %id, %state, "{} restored after the restart", command.name());
                 }
-                Err(refusal) => tracing::warn!(unit = %id, "cannot be as before the restart: {refusal}"),
+                Err(refusal) => {
+                    tracing::warn!(unit = %id, "the state before the restart cannot be restored: {refusal}");
+                }
             }
         }
         if let Some(current) = &plan.current {

@@ -124,7 +124,7 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
 
     // A second service of the pair: which of them speaks is shown for the unit and in the list.
     stage.start_second();
-    page.until(&has("#troubles", "south · speaks for 0 units"));
+    page.until(&has("#troubles", "south · publishes 0 units"));
     page.value(&format!("location.hash = '#/unit/{UNIT}'"));
     page.until(&has(".pairs tbody", "speaking"));
     page.until(&has(".pairs tbody", "standby"));

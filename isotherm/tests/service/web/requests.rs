@@ -514,7 +514,7 @@ async fn a_second_service_is_shown_and_says_nothing_of_the_unit_while_it_stands_
     let told = read(address, "/api/units").json();
     let lines: Vec<_> =
         told["pair"].as_array().unwrap().iter().map(|line| line["columns"].to_string()).collect();
-    assert!(lines.iter().any(|line| line.contains("speaks for 1 unit")), "{lines:?}");
+    assert!(lines.iter().any(|line| line.contains("publishes 1 unit")), "{lines:?}");
     assert!(lines.iter().any(|line| line.contains("standby for 1")), "{lines:?}");
     second.stop().await;
     stand.service.stop().await;

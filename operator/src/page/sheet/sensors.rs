@@ -107,7 +107,7 @@ fn estimate(drift: &DriftStatus) -> Vec<Span<'static>> {
         Span::raw(count(drift.refused)),
         Span::raw(or_none(drift.mean_nis, digits)),
         Span::styled(
-            if drift.subtracted { "subtracted" } else { "only told" },
+            if drift.subtracted { "subtracted" } else { "not subtracted" },
             if drift.subtracted { tone::PLAIN } else { tone::DIM },
         ),
     ]
