@@ -17,10 +17,12 @@ impl Family {
         format!("{}{unit}{total}", self.name)
     }
 
-    /// A line of the table.
-    fn row(&self) -> String {
-        let labels: Vec<_> = self.labels.iter().map(|label| format!("`{label}`")).collect();
-        format!("| `{}` | {} | {} |\n", self.whole_name(), labels.join(", "), self.help)
+    /// An item of the list, with the labels that not every metric of a unit has.
+    fn item(&self) -> String {
+        let labels = self.labels.iter().filter(|label| **label != "unit");
+        let labels: Vec<_> = labels.map(|label| format!("`{label}`")).collect();
+        let labels = if labels.is_empty() { String::new() } else { format!(" ({})", labels.join(", ")) };
+        format!("- `{}`{labels}: {}\n", self.whole_name(), self.help)
     }
 }
 
@@ -30,18 +32,17 @@ fn docs(name: &str) -> PathBuf {
 
 #[test]
 fn the_page_of_the_metrics_has_every_one_and_no_other() {
-    let mut table = "| name | labels | meaning |\n|---|---|---|\n".to_owned();
     // Counters stand in `docs/wire.md`, in the same words.
-    table.extend(service::FAMILIES.iter().chain(unit::FAMILIES).map(Family::row));
+    let list: String = service::FAMILIES.iter().chain(unit::FAMILIES).map(Family::item).collect();
     let file = docs("metrics.md");
     let page = std::fs::read_to_string(&file).unwrap();
     let (begin, end) = ("<!-- metrics -->\n", "<!-- end of metrics -->\n");
     let (before, rest) = page.split_once(begin).unwrap();
     let (present, behind) = rest.split_once(end).unwrap();
     if std::env::var_os("ISOTHERM_BLESS").is_some() {
-        std::fs::write(&file, [before, begin, &table, end, behind].concat()).unwrap();
+        std::fs::write(&file, [before, begin, &list, end, behind].concat()).unwrap();
     } else {
-        assert!(present == table, "docs/metrics.md is not what the code says: run with ISOTHERM_BLESS=1");
+        assert!(present == list, "docs/metrics.md is not what the code says: run with ISOTHERM_BLESS=1");
     }
 }
 
