@@ -179,7 +179,7 @@ fn stream(status: &Status, service: Option<&ServiceStatus>, columns: usize) -> S
         ]
         .map(frequency);
         let words = format!("{gyro} gyro ticks/s, {accel} accelerometer ticks/s,");
-        field("comes in", &format!("{words} {temperature} temperature readings/s, in {messages} messages/s"));
+        field("input", &format!("{words} {temperature} temperature readings/s, in {messages} messages/s"));
     }
     match status.last_tick {
         Some(tick) => {

@@ -114,7 +114,7 @@ impl Worker {
         let next = if self.swap.require_signature {
             format!("or sign one for {unit} (require_signature is set, so any_serial does not count)")
         } else {
-            "correct the serial, or add any_serial".to_owned()
+            "correct the serial, or add any_serial (--any-serial)".to_owned()
         };
         let message =
             format!("is \"{other}\", but the document was sent to unit {unit}: send it to {other}, {next}");

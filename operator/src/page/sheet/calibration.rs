@@ -86,7 +86,7 @@ pub(super) fn correction(status: &Status, columns: usize) -> Option<Section> {
     };
     let [x, y, z] = ["x", "y", "z"].map(|axis| Column::number(axis, 0, 9));
     let layout = [Column::words("", 0, super::NAME - 2), x, y, z];
-    let mut section = Section::new("Correction, subtracted in case axes");
+    let mut section = Section::new("Correction subtracted, in case axes");
     section.grid(&layout, &[row("°/h", rates), row("mg", forces)], columns);
     Some(section)
 }

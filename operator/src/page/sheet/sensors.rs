@@ -75,7 +75,7 @@ pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
             Column::number("°/h", 0, 8),
             Column::number("σ °/h", 0, 7),
             Column::number("°/h per h", 3, 8),
-            Column::number("taken", 2, 5),
+            Column::number("used", 2, 5),
             Column::number("refused", 2, 7),
             Column::number("NIS", 4, 5),
             Column::words("", 1, 10),
@@ -107,7 +107,7 @@ fn estimate(drift: &DriftStatus) -> Vec<Span<'static>> {
         Span::raw(count(drift.refused)),
         Span::raw(or_none(drift.mean_nis, digits)),
         Span::styled(
-            if drift.subtracted { "subtracted" } else { "not subtracted" },
+            if drift.subtracted { "subtracted" } else { "reported" },
             if drift.subtracted { tone::PLAIN } else { tone::DIM },
         ),
     ]
