@@ -205,7 +205,7 @@ pub async fn until(session: &Session, is: impl Fn(&[PairReport]) -> bool) {
 /// Where none does.
 pub async fn speaker(session: &Session) -> usize {
     let reports = reports(session).await;
-    let speaks = |report: &&PairReport| report.units.iter().any(|unit| unit.role == Role::Speaking);
+    let speaks = |report: &&PairReport| report.units.first().is_some_and(|unit| unit.role == Role::Speaking);
     let speaking = reports.iter().find(speaks).unwrap_or_else(|| panic!("{reports:#?}"));
     NAMES.iter().position(|name| *name == speaking.member.name).expect("a name of the pair")
 }

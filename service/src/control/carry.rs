@@ -4,16 +4,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::SystemTime;
 
+use isotherm_correction::operation::Command;
 use isotherm_protocol::control::Order;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, FirstTick, Source};
+use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, CommandRecord, FirstTick, Source};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::overlay::{Overlay, is_overlay};
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 
-use super::command::PreLaunchRun;
+use super::command::{PreLaunchRun, order_of, words};
 use super::manager::Worker;
 use super::request::reply;
 use super::revision::Record;
@@ -137,13 +138,16 @@ impl Worker {
         }
     }
 
-    /// A calibration that the unit was given by the instance whose place this one has taken: written down where that one's history
-    /// did not come in time.
+    /// What another instance was ordered, and this one goes on with: written down where that one's history did not come in time.
     pub(super) fn note_followed(&mut self, unit: &UnitId, entry: &JournalEntry) {
-        let JournalEvent::Changed { revision, at, slew_ns, document: Some(document), source, .. } =
-            &entry.event
-        else {
-            return;
+        let (revision, at, slew_ns, document, source) = match &entry.event {
+            JournalEvent::Changed { revision, at, slew_ns, document: Some(document), source, .. } => {
+                (revision, at, slew_ns, document, source)
+            }
+            JournalEvent::Commanded { command, words, .. } => {
+                return self.note_commanded(unit, command, words, &entry.instance);
+            }
+            _ => return,
         };
         if revision.counter <= self.store.highest_revision(unit) {
             return;
@@ -173,6 +177,31 @@ impl Worker {
             return;
         }
         self.plan_again(unit, self.restored(unit));
+    }
+
+    /// A command that led to a state, unless it is the last that is written down.
+    fn note_commanded(&mut self, unit: &UnitId, command: &Command, state: &str, instance: &str) {
+        let entries = self.store.history(Some(unit), LOOKED_THROUGH).unwrap_or_default();
+        let last = entries.into_iter().rev().find_map(|entry| match entry.event {
+            AuditEvent::Command(record) if record.accepted => Some(record),
+            _ => None,
+        });
+        let same =
+            |last: &CommandRecord| last.state_after == state && last.command.starts_with(command.name());
+        if last.as_ref().is_some_and(same) {
+            return;
+        }
+        let order = order_of(command);
+        let record = CommandRecord {
+            command: order.as_ref().map_or_else(|| command.name().to_owned(), words),
+            accepted: true,
+            reason: Some(format!("from the journal of instance {instance}")),
+            state_before: last.map_or_else(String::new, |last| last.state_after),
+            state_after: state.to_owned(),
+            last_sequence: None,
+            order,
+        };
+        self.note(Some(unit), "", AuditEvent::Command(record), "a command of another instance");
     }
 
     /// A query on `isotherm/*/kept/*`: a document or an overlay by its digest; none is no answer.

@@ -215,8 +215,20 @@ fn place(order: &PlaceOrder) -> Result<Place, String> {
     place.map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
 }
 
+/// The order that led to a command; `None` where it names a place, which the command has in other units.
+pub(super) fn order_of(command: &Command) -> Option<Order> {
+    match command {
+        Command::Standby => Some(Order::Standby),
+        Command::SelfTest => Some(Order::SelfTest),
+        Command::Abort => Some(Order::Abort),
+        Command::Run { reversal } => Some(Order::Run { reversal: *reversal }),
+        Command::EndRest => Some(Order::EndRest),
+        Command::PreLaunch(_) | Command::Rest(_) => None,
+    }
+}
+
 /// A command in words, for audit file and log.
-fn words(order: &Order) -> String {
+pub(super) fn words(order: &Order) -> String {
     let at = |place: &PlaceOrder| {
         let PlaceOrder { latitude_deg, heading_deg, pitch_roll_deg } = place;
         let tilt = pitch_roll_deg.map_or("levelled".to_owned(), |[pitch_deg, roll_deg]| {

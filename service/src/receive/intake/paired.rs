@@ -26,10 +26,16 @@ impl Intake {
         self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
     }
 
-    /// The same; waits where it is being found out.
+    /// The same; waits where it is being found out, and where the instance that spoke is gone and this one is about to.
     pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
         let since = Instant::now();
-        while since.elapsed() < LONGEST_DOUBT && self.with(unit, |actor| actor.doubts()) == Some(true) {
+        let is_alone = || self.pair.as_ref().is_some_and(|pair| pair.standing().alone_since.is_some());
+        let is_open = || {
+            let [doubts, speaks] =
+                self.with(unit, |actor| [actor.doubts(), actor.speaks()]).unwrap_or([false, true]);
+            doubts || (!speaks && is_alone())
+        };
+        while since.elapsed() < LONGEST_DOUBT && is_open() {
             std::thread::sleep(DOUBT_INTERVAL);
         }
         self.speaks_for(unit)

@@ -3,22 +3,19 @@
 //! While another instance speaks, what is computed here is kept for a while: to be compared with what that one publishes, and to be
 //! published in its place from the last tick on that was heard of it.
 
+mod following;
 mod heard;
 mod kept;
 mod output;
 
 use std::time::{Duration, Instant};
 
-use isotherm_protocol::digest::Digest;
-use isotherm_protocol::journal::JournalEntry;
 use isotherm_protocol::key::Input;
 use isotherm_protocol::pair::{Role, UnitRole};
-use isotherm_protocol::replay::Follower;
-use isotherm_protocol::stream::UnitStream;
 
 use super::{Plan, UnitActor};
 use crate::control::Notice;
-use kept::Kept;
+use following::Following;
 
 /// How often the memory is asked for while none comes.
 const ASK_INTERVAL: Duration = Duration::from_millis(250);
@@ -100,82 +97,15 @@ pub(super) struct Speech {
     pub(super) uncertain: bool,
 }
 
-/// While another instance speaks.
-#[derive(Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "each is known, or not, without the others")]
-struct Following {
-    follower: Follower,
-    since: Instant,
-    kept: Kept,
-    asked: Option<Instant>,
-    /// The stream is what it was when the unit still spoke: it need not have joined to speak again.
-    doubt: bool,
-    /// It lacks nothing, as far as is known.
-    intact: bool,
-    /// Neither the other instance nor the producer is heard: swaps and commands are taken, for this may be the only one left.
-    isolated: bool,
-    /// Since when it has listened for others.
-    listens: Instant,
-    /// What is computed goes out all the same: the instance is active, and the stream has joined.
-    also_out: bool,
-    /// Calibrations that came with the journal, the newest last.
-    changes: Vec<JournalEntry>,
-    /// Documents that came with the other's memory.
-    documents: Vec<String>,
-}
-
-impl Following {
-    /// The other's memory must be taken anew.
-    fn lose(&mut self) {
-        self.follower.lose();
-        (self.asked, self.intact) = (None, false);
-    }
-
-    /// What the unit was given before the memory was taken may be in nobody else's audit file any more when the other instance is gone.
-    fn note_given(&mut self, stream: &UnitStream) {
-        let documents = std::mem::take(&mut self.documents);
-        let text =
-            |digest: &Digest| documents.iter().find(|text| Digest::of(text.as_bytes()) == *digest).cloned();
-        let (unit, instance) =
-            (stream.id().to_string(), self.follower.instance().unwrap_or_default().to_string());
-        let entry = |event| JournalEntry {
-            unit: unit.clone(),
-            instance: instance.clone(),
-            number: 0,
-            heard: stream.heard(),
-            event,
-        };
-        self.changes.splice(..0, stream.given(text).map(entry));
-    }
-
-    fn ns(&self, now: Instant) -> u64 {
-        u64::try_from(now.saturating_duration_since(self.since).as_nanos()).unwrap_or(u64::MAX)
-    }
-}
-
 impl UnitActor {
     /// Another instance speaks for the unit, or may do so: nothing goes out from here on.
     pub(crate) fn follow(&mut self, now: Instant, footing: Footing) {
-        let doubt = footing == Footing::Doubt;
         if self.speech.following.is_some() {
             return;
         }
-        let follower = Follower::new(self.stream.id().clone());
         self.speech.doubled = None;
         self.speech.memory_due = false;
-        self.speech.following = Some(Box::new(Following {
-            follower,
-            since: now,
-            kept: Kept::default(),
-            asked: None,
-            doubt,
-            intact: footing != Footing::Nothing,
-            isolated: footing == Footing::Isolated,
-            listens: now,
-            also_out: false,
-            changes: Vec::new(),
-            documents: Vec::new(),
-        }));
+        self.speech.following = Some(Box::new(Following::new(self.stream.id().clone(), now, footing)));
         self.status_due = true;
     }
 
@@ -317,7 +247,7 @@ impl UnitActor {
     /// last `overlap` is published again: of what it sent at its end, some may have come here and nowhere else.
     pub(crate) fn speak(&mut self, now: Instant, overlap: Duration) {
         let Some(following) = self.speech.following.take() else { return };
-        let Following { mut kept, doubt, changes, follower, .. } = *following;
+        let Following { mut kept, doubt, orders, follower, .. } = *following;
         // Of what an operator ordered nothing is lost with the instance that took it.
         if let Some(rebuilt) = follower.finish(&mut self.stream) {
             kept.replace(rebuilt.frames, true, now);
@@ -328,8 +258,8 @@ impl UnitActor {
             self.speech.takeovers += 1;
             self.speech.memory_due = true;
         }
-        for change in changes {
-            self.notices.push(Notice::Followed(Box::new(change)));
+        for order in orders {
+            self.notices.push(Notice::Followed(Box::new(order)));
         }
         self.notices.push(Notice::Speaks);
         self.status_due = true;

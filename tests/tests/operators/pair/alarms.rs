@@ -9,7 +9,7 @@ use isotherm_protocol::control::{SwapOptions, SwapOutcome};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::AuditEvent;
-use isotherm_protocol::key;
+use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{Fault, State, Status};
 use isotherm_tests::bench::LIMIT;
@@ -218,6 +218,29 @@ async fn a_command_holds_when_the_instance_that_took_it_is_gone() {
     stand.restart(speaking);
     until(&stand.session, |reports| reports.len() == 2).await;
     until_paired(&stand.session, 2).await;
+
+    // One that dies before its history is asked for: what the journal said is written down instead.
+    let speaking = stand.speaker().await;
+    let entries = stand.session.declare_subscriber(key::journal(&UnitId::new(commanded).unwrap()));
+    let entries = entries.await.unwrap();
+    assert!(stand.operator.command(commanded, json!({"command": "standby"})).await.unwrap().accepted);
+    entries.recv_async().await.unwrap();
+    stand.pair.kill(speaking);
+    until_speaks(&stand.session, 1 - speaking, 2).await;
+    stand.operator.until(commanded, held).await;
+    let last = || {
+        let entries = audit(&stand.pair.state(1 - speaking)).into_iter().rev();
+        let mut of_unit = entries.filter(|entry| entry.unit.as_deref() == Some(commanded));
+        of_unit.find_map(|entry| match entry.event {
+            AuditEvent::Command(record) => Some(record.state_after),
+            _ => None,
+        })
+    };
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    while last().as_deref() != Some("standby") {
+        assert!(tokio::time::Instant::now() < deadline, "{:?}", last());
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
     stand.judged = 1;
     stand.end().await;
 }

@@ -16,8 +16,6 @@ use crate::receive::unit::UnitActor;
 const LATE: Duration = Duration::from_millis(50);
 /// How long two speak at once before that is an alarm.
 const DOUBLED: Duration = Duration::from_secs(1);
-/// Entries of the journal that are remembered until they are in the audit file.
-const MOST_CHANGES: usize = 8;
 
 impl UnitActor {
     /// The producer is heard after the other instance was lost. Where no tick is missing an isolated unit speaks on, as soon as nobody
@@ -99,7 +97,11 @@ impl UnitActor {
             return;
         };
         let ns = following.ns(now);
-        let change = matches!(entry.event, JournalEvent::Changed { .. }).then(|| entry.clone());
+        let order = matches!(
+            entry.event,
+            JournalEvent::Changed { .. } | JournalEvent::Commanded { accepted: true, .. }
+        );
+        let order = order.then(|| entry.clone());
         let documents = match &entry.event {
             JournalEvent::Memory { document, pending, .. } => Some([document, pending].map(Clone::clone)),
             _ => None,
@@ -108,9 +110,9 @@ impl UnitActor {
             if let Some(documents) = documents {
                 following.documents = documents.into_iter().flatten().collect();
             }
-            following.changes.extend(change);
-            let beyond = following.changes.len().saturating_sub(MOST_CHANGES);
-            following.changes.drain(..beyond);
+            if let Some(order) = order {
+                following.note_order(order);
+            }
         }
         self.catch_up(now);
     }

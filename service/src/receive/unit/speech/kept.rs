@@ -96,10 +96,10 @@ impl Kept {
         }
     }
 
-    /// The stream has been taken back: these are the frames that it has made again. Of a stream that had not joined before, nothing
-    /// that was heard until now is compared.
+    /// The stream has been taken back: these are the frames that it has made again. What it made before the place that it was taken back
+    /// to holds. Of a stream that had not joined, no frame does, and nothing that was heard until now is compared.
     pub(super) fn replace(&mut self, frames: Vec<Vec<u8>>, had_joined: bool, now: Instant) {
-        let before = std::mem::take(&mut self.frames);
+        let mut before = std::mem::take(&mut self.frames);
         let mut marks: BTreeMap<Id, (Instant, bool, bool)> = BTreeMap::new();
         for frame in &before {
             marks.extend(frame.ids.iter().map(|id| (*id, (frame.at, frame.heard, frame.out))));
@@ -107,18 +107,28 @@ impl Kept {
         if !had_joined {
             self.since = Some(now);
         }
+        let oldest = before.front().and_then(|frame| frame.ids.first().copied());
+        let mut again = VecDeque::new();
         for bytes in frames {
             let Ok(batch) = codec::decode::<CorrectedBatch>(&bytes) else { continue };
             let ids: Vec<_> = batch.ticks.iter().map(id).collect();
             let known = ids.iter().rev().find_map(|id| marks.get(id).copied());
             // What is older than all that was kept has been compared.
-            if known.is_none() && self.frames.is_empty() && !before.is_empty() {
+            if known.is_none() && again.is_empty() && oldest.is_some() && ids.last() < oldest.as_ref() {
                 continue;
             }
             let (at, was_heard, out) = known.unwrap_or((now, false, false));
             let heard = was_heard || ids.iter().any(|id| self.was_heard(id));
-            self.frames.push_back(Frame { bytes, ids, at, heard, out });
+            again.push_back(Frame { bytes, ids, at, heard, out });
         }
+        if had_joined {
+            let first = again.front().and_then(|frame| frame.ids.first());
+            let place =
+                first.and_then(|first| before.iter().position(|frame| frame.ids.last() >= Some(first)));
+            before.truncate(place.unwrap_or(before.len()));
+            self.frames = before;
+        }
+        self.frames.append(&mut again);
         let last = self.frames.iter().rposition(|frame| frame.heard);
         for frame in self.frames.iter_mut().take(last.unwrap_or(0)) {
             frame.heard = true;
@@ -280,6 +290,26 @@ mod tests {
         kept.replace((2..7).map(frame).collect(), true, late);
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [6]);
         assert!(kept.due(late, TAKEOVER).is_empty());
+    }
+
+    /// The stream's own memory may be younger than what waits.
+    #[test]
+    fn what_was_made_before_the_stream_was_taken_back_is_kept() {
+        let start = Instant::now();
+        for (heard, again, due) in [(2, 5..7, 3..7), (4, 5..7, 5..7), (2, 7..7, 3..7), (2, 7..9, 3..9)] {
+            let mut kept = Kept { since: Some(start), ..Kept::default() };
+            let late = start + LONGEST_WAIT;
+            for sequence in 0..7 {
+                kept.computed(frame(sequence), late);
+            }
+            (0..=heard).for_each(|sequence| kept.heard(batch(sequence), late));
+            kept.replace(again.map(frame).collect(), true, late);
+            let settled = kept.settle(late + SETTLED, true);
+            assert_eq!((settled.compared, settled.differing), (heard + 1, 0));
+            assert_eq!(sequences(&kept.due(late + SETTLED, Duration::ZERO)), due.collect::<Vec<_>>());
+            kept.computed(frame(9), late + LONGEST_WAIT);
+            assert!(!kept.settle(late + LONGEST_WAIT, true).missed);
+        }
     }
 
     #[test]
