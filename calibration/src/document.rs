@@ -2,19 +2,24 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`written`], [`provenance`] | a document on its way to a file; where its numbers come from |
+//! | `written`, `provenance`, `plain` | a document on its way to a file; where its numbers come from; the first of a unit |
 //! | [`diff`] | what has changed between documents |
 //! | [`merge`] | parts of a calibration in one document |
 //! | [`show`] | a document in words and curves |
 
 pub mod diff;
 pub mod merge;
-pub mod plain;
-pub mod provenance;
+mod plain;
+mod provenance;
 pub mod show;
-pub mod written;
+mod written;
 
 use isotherm_protocol::document::{AccelSensor, Document};
+
+pub(crate) use plain::{follows, plain};
+pub(crate) use provenance::files_of;
+pub use provenance::{TOOL, command_line, origin, recordings_in};
+pub use written::{Written, matrix, name_of, numbers, tidy, write_file};
 
 /// The accelerometers of a document.
 pub fn accelerometers(document: &Document) -> &[AccelSensor] {

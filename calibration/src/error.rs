@@ -54,6 +54,17 @@ impl Error {
         Self::Document(vec![why.to_string()])
     }
 
+    /// The same, each reason with the log that it is of.
+    pub fn of(self, log: &str) -> Self {
+        let named =
+            |reasons: Vec<String>| reasons.into_iter().map(|reason| format!("{log}: {reason}")).collect();
+        match self {
+            Self::Refused(reasons) => Self::Refused(named(reasons)),
+            Self::Found(found) => Self::Refused(named(found.iter().map(ToString::to_string).collect())),
+            other => other,
+        }
+    }
+
     /// The same, with the logs that are cut short where that may be why.
     pub fn beside(self, cuts: &[String]) -> Self {
         match self {

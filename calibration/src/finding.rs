@@ -128,9 +128,11 @@ pub enum Kind {
         /// Its stated rate.
         stated: f64,
     },
-    /// The unit cannot be levelled at the beginning of the log.
+    /// The unit cannot be levelled.
     NotLevel {
-        /// Mean force of the first second (m/s²); `None` without accelerometers.
+        /// Whether it would have to be by the first second of the log; else by all of it.
+        at_beginning: bool,
+        /// Mean force (m/s²); `None` without accelerometers.
         force: Option<[f64; 3]>,
         /// What the correction passed over.
         troubles: Vec<String>,

@@ -8,7 +8,7 @@
 //! | [`runs`] | what a log has of one unit, to be corrected again and again; as columns, raw and corrected |
 //! | [`axes`] | case axes, and what sensors are called |
 //! | [`lsq`] | least squares: coefficients, covariance, cross-validation |
-//! | [`numbers`], [`robust`], [`size`] | counts, ends, lengths; middle and scatter of numbers among which some may be wrong; mean, rms, deviation |
+//! | [`numbers`] | counts, ends, lengths; mean, rms, deviation; middle and scatter of numbers among which some may be wrong |
 //! | [`finding`] | what can be wrong or is worth telling, and its words |
 //! | [`report`] | what a fit says: verdicts, before and after, coefficients; text, JSON and page |
 //! | [`document`] | a document on its way to a file; compared, merged, shown |
@@ -20,6 +20,7 @@
 
 pub mod axes;
 pub mod cli;
+mod csv;
 pub mod document;
 pub mod error;
 pub mod finding;
@@ -29,7 +30,5 @@ mod fixture;
 pub mod lsq;
 pub mod numbers;
 pub mod report;
-pub mod robust;
 pub mod runs;
-pub mod size;
 pub mod validate;

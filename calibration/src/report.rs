@@ -9,14 +9,14 @@
 //! | [`curve`] | before and after over time and temperature, taken from a corrected run |
 //! | [`batch`] | several units at once, and the table that closes them |
 //! | [`sheet`] | a line, tables and charts where nothing was fitted |
-//! | [`figures`] | digits, tables |
+//! | `figures` | digits, tables |
 //! | [`sigma`] | standard errors as documents keep them |
 //! | `words` | the lines of a terminal; one sentence for all gyros, or logs, that it holds of |
 //! | `page`, `json` | the report as a page and as JSON |
 
 pub mod batch;
 pub mod curve;
-pub mod figures;
+mod figures;
 mod json;
 mod page;
 pub mod sheet;
@@ -24,18 +24,20 @@ pub mod sigma;
 #[cfg(test)]
 mod tests;
 pub mod verdict;
-pub(crate) mod words;
+mod words;
 
 use isotherm_pages::{Chart, Table};
 use serde_json::{Value, json};
 
 pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
+pub use figures::{alike, counted, fixed, per_deg_c, short, six, superscript, table, within};
+pub(crate) use page::bars;
 pub use sheet::Sheet;
 pub use sigma::Sigmas;
 pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 
-use figures::{counted, short};
+pub(crate) use words::{dozen, grouped, gyros, of_logs, together};
 
 /// One fitted coefficient.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -136,7 +138,7 @@ impl FitReport {
             self.unit,
             counted(self.coefficients.len(), "coefficient", "coefficients")
         );
-        words::dozen(&verdict::sentences(&self.verdicts), &warnings, &rest)
+        dozen(&verdict::sentences(&self.verdicts), &warnings, &rest)
     }
 
     /// Coefficients as a table; the first column numbers them as the chart does.

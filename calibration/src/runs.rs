@@ -34,8 +34,8 @@ use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use crate::error::Error;
-use crate::report::figures::six;
-use crate::robust::median;
+use crate::numbers::median;
+use crate::report::six;
 use cut::Cut;
 use series::Series;
 

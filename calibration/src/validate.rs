@@ -9,22 +9,19 @@ mod coverage;
 mod runs;
 
 use isotherm_correction::earth::Place;
-use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
+use isotherm_correction::units::AngularRate;
 use isotherm_protocol::document::{Document, Sample};
 
 use crate::axes::AXES;
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::judging;
-use crate::numbers::{norm, real};
-use crate::report::figures::short;
-use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict};
-use crate::robust::is_white;
+use crate::numbers::{Size, is_white, norm, real};
+use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
-use crate::runs::swapped::{Shown, up};
-use crate::runs::table::{Rows, Table, is_one_g, usual_window_s};
-use crate::size::Size;
+use crate::runs::swapped::{Shown, force_at_rest};
+use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
 use coverage::Coverage;
 pub use runs::JudgedLog;
 
@@ -178,10 +175,13 @@ fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place
     let looks = |of: [&'static str; 2], sizes: [Size; 3], stated: Option<[f64; 3]>| {
         Shown::of(of, sizes, stated?).swapped()
     };
-    let force = place.and_then(up).map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
     let words = [
         looks(["gyros", "°/h"], [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
-        looks(["accelerometers", "m/s²"], [0, 1, 2].map(|axis| Size::of(means.force(axis))), force),
+        looks(
+            ["accelerometers", "m/s²"],
+            [0, 1, 2].map(|axis| Size::of(means.force(axis))),
+            place.and_then(force_at_rest),
+        ),
     ];
     words.into_iter().flatten().map(|words| format!("{name}: {words}")).collect()
 }
@@ -223,18 +223,8 @@ fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error>
     let Some(place) = place else { return Ok(Rest::default()) };
     let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
     let known = force.iter().all(|size| size.count > 0);
-    let rate = place.earth_rate_in_case(known.then(|| force.map(|size| size.mean)));
-    let Some(rate) = rate else {
-        return Err(Error::refused(format!(
-            "{name}: the unit cannot be levelled: {}. Give --roll and --pitch, or remove --latitude and --heading: \
-             then each mean is removed",
-            if known {
-                "its mean specific force is not 1 g, or x points up or down"
-            } else {
-                "it has no accelerometers"
-            }
-        )));
-    };
+    let rate =
+        earth_rate(place, known.then(|| force.map(|size| size.mean))).map_err(|error| error.of(name))?;
     let rate = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
     Ok(Rest { rate_deg_per_h: Some(rate), ..Rest::default() })
 }

@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::driver::emit;
 use super::files::PageArgs;
+use crate::document::Written;
 use crate::document::diff::series::Series;
-use crate::document::written::Written;
 use crate::error::Error;
 
 /// Compare calibration documents in order of time, such as those before, between and after shock and vibration

@@ -1,6 +1,6 @@
 //! `isotherm-calibrate drift`.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use isotherm_log::diff::is_csv;
 use serde_json::json;
 
@@ -9,12 +9,11 @@ use super::limits::above_0;
 use super::output::OutputArgs;
 use super::runs::{BaseArgs, LogArgs};
 use super::units::{Logs, Unit, Work};
-use crate::document::provenance::{TOOL, command_line, origin};
-use crate::document::written::Written;
+use crate::document::{TOOL, Written, command_line, origin};
 use crate::error::Error;
 use crate::fits::drift::columns::{Columns, Kind, unnamed};
 use crate::fits::drift::document::{Parameters, put};
-use crate::fits::drift::fit::{Wanted, analyse};
+use crate::fits::drift::fit::analyse;
 use crate::fits::drift::pieces::Grid;
 use crate::fits::drift::report::Report;
 use crate::fits::drift::trend::FIT_H;
@@ -44,23 +43,11 @@ pub(super) struct DriftArgs {
     /// Sigma of the constant part at start (°/h), if known from several starts
     #[arg(long, hide_short_help = true, value_name = "DEG_PER_H")]
     initial_sigma: Option<f64>,
-    /// Spacing of the averaging times
-    #[arg(long, hide_short_help = true, value_enum, default_value_t = Taus::Octave)]
-    taus: Taus,
     /// Length of the trend fit before extrapolation (h)
     #[arg(long, hide_short_help = true, value_name = "HOURS", default_value_t = FIT_H)]
     fit_hours: f64,
     #[command(flatten)]
     output: OutputArgs,
-}
-
-/// Distance of averaging times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Taus {
-    /// 1, 2, 4, 8… ticks
-    Octave,
-    /// 1, 10, 100… ticks
-    Decade,
 }
 
 impl DriftArgs {
@@ -113,8 +100,7 @@ impl DriftArgs {
         let mut grid = Grid::of(columns)?;
         grid.notes.splice(0..0, job.work.told());
         let working = job.at_work("Allan deviations, drift, spectrum");
-        let factor = if self.taus == Taus::Decade { 10 } else { 2 };
-        let sensors = analyse(&grid, Wanted { factor, fit_h: self.fit_hours });
+        let sensors = analyse(&grid, self.fit_hours);
         working.finish();
         let mut parameters = Vec::new();
         for sensor in sensors.iter().filter(|_| kind == Kind::Rate) {
@@ -151,12 +137,7 @@ impl DriftArgs {
         if let Some(document) = &work.base {
             return Columns::corrected_by(run, &document.loaded, kind, job.bar());
         }
-        let series = run.series(job.bar())?;
-        if self.accelerometers {
-            Columns::of_accelerometers(series)
-        } else {
-            Columns::of_gyros(series, self.increment_weight)
-        }
+        Columns::raw(run.series(job.bar())?, kind, self.increment_weight)
     }
 
     /// The unit's document with the parameters in it.

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::bar;
 use super::files::Files;
 use super::units::{Logs, Unit, Work};
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
 

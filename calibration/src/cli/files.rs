@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 
-use crate::document::written::write_file;
+use crate::document::write_file;
 use crate::error::Error;
 use crate::report::of_unit;
 

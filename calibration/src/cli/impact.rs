@@ -10,22 +10,21 @@ use isotherm_cli::Bar;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::read_small_text;
-use isotherm_log::offline::load_calibration;
-use isotherm_protocol::document::Document;
 
 use super::bar;
 use super::driver::emit;
 use super::files::PageArgs;
 use super::limits::within;
 use super::runs::{LogArgs, Reading};
+use super::units::Logs;
+use crate::document::Written;
 use crate::error::Error;
 use crate::fits::drift::HOUR_S;
 use crate::fits::drift::columns::{Columns, Kind};
 use crate::fits::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::fits::impact::over_starts;
 use crate::fits::impact::scenario::Voyage;
-use crate::report::figures::short;
+use crate::report::short;
 use crate::runs::cut::Cut;
 
 /// Most hours of either part.
@@ -111,6 +110,18 @@ enum Gyro {
     All,
 }
 
+impl Gyro {
+    /// What a drift of it is called, and how much of it each gyro has.
+    const fn case(self) -> (&'static str, [f64; 3]) {
+        match self {
+            Self::X => ("level gyro x", [1.0, 0.0, 0.0]),
+            Self::Y => ("level gyro y", [0.0, 1.0, 0.0]),
+            Self::Z => ("azimuth gyro z", [0.0, 0.0, 1.0]),
+            Self::Each | Self::All => ("all gyros", [1.0; 3]),
+        }
+    }
+}
+
 impl ImpactArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
@@ -176,11 +187,7 @@ impl ImpactArgs {
     /// the log.
     fn parts(&self) -> Result<[DriftParts; 3], Error> {
         let Some(path) = &self.document else { return Ok([sizes(); 3]) };
-        let text = read_small_text(path, "read the calibration document")?;
-        let parsed = Document::parse(&text, Some(&path.display().to_string())).map_err(|problems| {
-            isotherm_log::error::Error::Calibration(problems.iter().map(ToString::to_string).collect())
-        })?;
-        let parts = parsed.document.to_parts();
+        let parts = Written::read(path)?.document.to_parts();
         let stated: Vec<DriftParts> = parts.gyros.iter().filter_map(|gyro| gyro.drift).collect();
         if stated.is_empty() && !self.log.is_empty() {
             return Ok([sizes(); 3]);
@@ -239,11 +246,15 @@ impl ImpactArgs {
         let Some(document) = &self.document else {
             return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));
         };
-        let loaded = load_calibration(document)?;
-        let run = args.run(Some(&loaded.unit))?;
-        let columns = Columns::corrected_by(&run, &loaded, Kind::Rate, bar::reading());
+        // A document is of one unit.
+        let (_, work) = Logs { together: true, ..Logs::judging(&args, document) }.units()?.swap_remove(0);
+        let work = work?;
+        let run = work.run()?;
+        let columns = Columns::corrected_by(run, &work.base()?.loaded, Kind::Rate, bar::reading());
         run.hand_on(cut);
-        columns
+        let mut columns = columns?;
+        columns.notes.extend(work.warnings);
+        Ok(columns)
     }
 }
 

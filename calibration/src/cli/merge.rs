@@ -9,7 +9,7 @@ use super::driver::emit;
 use super::files::Files;
 use super::output::{a_date, date};
 use crate::document::merge::{Merged, Take, merge};
-use crate::document::written::{Written, name_of};
+use crate::document::{Written, name_of};
 use crate::error::Error;
 
 /// Put parts of a calibration that different commands have made into one document

@@ -11,8 +11,7 @@ use toml::Table;
 
 use super::driver::{Done, Job};
 use super::files::Files;
-use crate::document::provenance::{command_line, origin};
-use crate::document::written::Written;
+use crate::document::{Written, command_line, origin};
 use crate::error::Error;
 use crate::report::{FitReport, Sigmas, residuals};
 

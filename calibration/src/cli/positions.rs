@@ -11,7 +11,7 @@ use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
 use crate::fits::positions::budget::{ARCSEC_PER_RAD, Budget};

@@ -14,7 +14,7 @@ use super::output::{About, Fitted, OutputArgs};
 use super::place::PlaceArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
-use crate::document::plain::plain;
+use crate::document::plain;
 use crate::error::Error;
 use crate::fits::rates::document::{details, sigmas};
 use crate::fits::rates::fit::{Wanted, make};

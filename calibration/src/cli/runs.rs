@@ -12,7 +12,7 @@ use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
 use super::bar;
-use crate::document::provenance::recordings_in;
+use crate::document::recordings_in;
 use crate::error::Error;
 use crate::runs::{Run, units_of};
 
@@ -40,7 +40,7 @@ pub(super) struct JudgeArgs {
 /// The document that a fit starts from.
 #[derive(Debug, Clone, Args)]
 pub(super) struct BaseArgs {
-    /// Calibration document (TOML) that the fit starts from; several units: the folder with UNIT.toml of each
+    /// Calibration document (TOML) that the fit starts from; several units: the folder with the document of each
     #[arg(long = "calibration", short = 'c', alias = "document", short_alias = 'd', value_name = "FILE")]
     pub(super) document: Option<PathBuf>,
 }
@@ -63,23 +63,6 @@ pub(super) struct Reading {
     /// Stop this long after each log's beginning (s)
     #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "duration")]
     pub(super) end: Option<Span>,
-}
-
-impl LogArgs {
-    /// The one run of one unit that the files are together; a text log that is given no serial is of `fallback`.
-    pub(super) fn run(&self, fallback: Option<&UnitId>) -> Result<Run, Error> {
-        let mut units = self.reading.runs_in(&self.log, fallback)?;
-        match (units.pop_first(), units.keys().next()) {
-            (Some((_, run)), None) => Ok(run),
-            (Some((first, _)), Some(second)) => {
-                let others = units.keys().skip(1).fold(String::new(), |list, unit| format!("{list}, {unit}"));
-                Err(Error::refused(format!(
-                    "the log is of several units ({first}, {second}{others}): choose one with --unit"
-                )))
-            }
-            (None, _) => Err(Error::refused("the log has no raw readings")),
-        }
-    }
 }
 
 impl Reading {

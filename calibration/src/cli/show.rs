@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::driver::emit;
 use super::files::PageArgs;
+use crate::document::Written;
 use crate::document::show::show;
-use crate::document::written::Written;
 use crate::error::Error;
 
 /// Show a calibration document in words, as tables and as curves

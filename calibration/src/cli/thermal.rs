@@ -12,7 +12,7 @@ use super::limits::within;
 use super::output::OutputArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
 use super::units::{Logs, Work};
-use crate::document::provenance::{command_line, origin};
+use crate::document::{command_line, origin};
 use crate::error::Error;
 use crate::fits::thermal::{Fitted, Method, Settings, Terms, fit};
 use crate::report::FitReport;

@@ -10,7 +10,7 @@ use super::output::{About, Fitted, OutputArgs};
 use super::place::GravityArgs;
 use super::runs::{BaseArgs, LogArgs};
 use super::units::Logs;
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
 use crate::fits::positions::still::StillLimits;

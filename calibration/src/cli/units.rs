@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::key::UnitId;
 
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
-use crate::document::written::Written;
+use crate::document::{Written, files_of};
 use crate::error::Error;
 use crate::numbers::once_each;
 use crate::runs::Run;
@@ -39,7 +39,7 @@ pub(super) struct Logs<'a> {
     pub(super) judging: &'a Reading,
     /// Logs to judge on.
     pub(super) judge: &'a [PathBuf],
-    /// A document, or the folder that has UNIT.toml of each unit.
+    /// A document, or the folder that has one of each unit.
     pub(super) document: Option<&'a Path>,
     /// What a text log's unit is called where nothing is written of it and nobody says.
     pub(super) unnamed: Option<UnitId>,
@@ -148,8 +148,8 @@ impl<'a> Logs<'a> {
             let mut work = Work::new(Some(base), runs, judges);
             if !others.is_empty() {
                 work.warnings.push(format!(
-                    "the logs also have unit {}, which is left out: the document is of {unit}. For all units give \
-                     --calibration a folder with UNIT.toml of each",
+                    "the logs also have unit {}, which is left out: the document is of {unit}. For all units give a folder \
+                     with the document of each",
                     others.join(", ")
                 ));
             }
@@ -159,10 +159,18 @@ impl<'a> Logs<'a> {
         if of_units.is_empty() {
             return Err(Error::refused(NOTHING));
         }
+        let mut documents = folder.map(of_folder).transpose()?;
         let mut judging = self.judges(of_units.keys().next())?.unwrap_or_default();
         let several = of_units.len() > 1;
         let mut work = |unit: &UnitId, runs| {
-            let base = folder.map(|folder| of_folder(folder, unit)).transpose()?;
+            let own = documents.as_mut().map(|documents| {
+                documents.remove(unit).ok_or_else(|| {
+                    Error::refused(format!(
+                        "no document of the folder is for unit {unit}: put one there, or leave the unit out with --unit"
+                    ))
+                })
+            });
+            let base = own.transpose()?;
             let judges = judging.remove(unit).unwrap_or_default();
             let unjudged = judges.is_empty() && !self.judge.is_empty();
             if unjudged && !several {
@@ -214,23 +222,22 @@ impl<'a> Logs<'a> {
     }
 }
 
-/// The document of a unit in a folder, which must be of that unit.
-fn of_folder(folder: &Path, unit: &UnitId) -> Result<Written, Error> {
-    let path = folder.join(format!("{unit}.toml"));
-    if !path.exists() {
-        return Err(Error::refused(format!(
-            "{} does not exist: the folder of --calibration needs a document of each unit; leave the unit out with \
-             --unit",
-            path.display()
-        )));
+/// The documents of a folder, by the unit that each is of.
+fn of_folder(folder: &Path) -> Result<BTreeMap<UnitId, Written>, Error> {
+    let mut paths = files_of(folder)?;
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    paths.sort();
+    let mut documents: BTreeMap<UnitId, Written> = BTreeMap::new();
+    for path in &paths {
+        let written = Written::read(path)?;
+        let unit = written.loaded.unit.clone();
+        if let Some(other) = documents.get(&unit) {
+            return Err(Error::refused(format!(
+                "{} and {} are both for unit {unit}: choose the one to take",
+                other.name, written.name
+            )));
+        }
+        documents.insert(unit, written);
     }
-    let written = Written::read(&path)?;
-    if written.loaded.unit != *unit {
-        return Err(Error::refused(format!(
-            "{} is of unit {}: correct its name or its unit",
-            path.display(),
-            written.loaded.unit
-        )));
-    }
-    Ok(written)
+    Ok(documents)
 }

@@ -1,6 +1,5 @@
 //! `isotherm-calibrate validate`.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -10,9 +9,7 @@ use super::files::PageArgs;
 use super::limits::above_0;
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
-use super::units::{Logs, Unit, Work};
-use crate::document::provenance::files_of;
-use crate::document::written::Written;
+use super::units::Logs;
 use crate::error::Error;
 use crate::report::FitReport;
 use crate::validate::{JudgedLog, Wanted, validate};
@@ -46,60 +43,7 @@ impl ValidateArgs {
         let wanted = Wanted { window_s: self.window, place: self.place.known()? };
         let logs = Logs::judging(&self.log, &self.document);
         let task = Task::new("Judgement of several units", self.page.files(), logs);
-        task.run_on(|| self.units(), |job| judged(job, wanted))
-    }
-
-    /// Every unit of the logs with the document of its serial, or the one unit with the document that is given.
-    fn units(&self) -> Result<Vec<Unit>, Error> {
-        let folder = self.document.is_dir();
-        let (mut documents, only) = if folder {
-            (self.folder()?, None)
-        } else {
-            (BTreeMap::new(), Some(Written::read(&self.document)?))
-        };
-        let fallback = only.as_ref().map(|only| &only.loaded.unit);
-        let runs = self.log.reading.runs(&self.log.log, fallback)?;
-        if runs.is_empty() {
-            return Err(Error::refused("the logs have no raw readings"));
-        }
-        if only.is_some() && runs.len() > 1 {
-            let units: Vec<String> = runs.keys().map(ToString::to_string).collect();
-            return Err(Error::refused(format!(
-                "the logs are of several units ({}): choose one with --unit, or give a folder with a document for each",
-                units.join(", ")
-            )));
-        }
-        let mut only = only;
-        let units = runs.into_iter().map(|(unit, runs)| {
-            let document = only.take().or_else(|| documents.remove(unit.as_str())).ok_or_else(|| {
-                Error::refused(format!(
-                    "no document of the folder is for unit {unit}: put one there, or leave the unit out with --unit"
-                ))
-            });
-            let work = document.map(|document| Work::new(Some(document), runs, Vec::new()));
-            (unit, work)
-        });
-        Ok(units.collect())
-    }
-
-    /// The documents of the folder, by serial.
-    fn folder(&self) -> Result<BTreeMap<String, Written>, Error> {
-        let mut paths = files_of(&self.document)?;
-        paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
-        paths.sort();
-        let mut documents: BTreeMap<String, Written> = BTreeMap::new();
-        for path in &paths {
-            let written = Written::read(path)?;
-            let unit = written.document.unit.clone();
-            if let Some(other) = documents.get(&unit) {
-                return Err(Error::refused(format!(
-                    "{} and {} are both for unit {unit}: choose the one to judge",
-                    other.name, written.name
-                )));
-            }
-            documents.insert(unit, written);
-        }
-        Ok(documents)
+        task.run(|job| judged(job, wanted))
     }
 }
 

@@ -16,9 +16,9 @@ use isotherm_protocol::document::difference;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use crate::document::Written;
 use crate::document::show::terms::{terms, tree};
 use crate::document::show::{places, range_of, steady};
-use crate::document::written::Written;
 use crate::error::Error;
 use crate::numbers::norm;
 use crate::report::Sigmas;

@@ -18,8 +18,8 @@ use isotherm_protocol::document::Document;
 use serde_json::{Value as Json, json};
 use toml::Value;
 
+use crate::document::Written;
 use crate::document::show::terms::tree;
-use crate::document::written::Written;
 use crate::error::Error;
 use crate::report::Sheet;
 use check::{check, same_unit};

@@ -8,7 +8,7 @@ use isotherm_protocol::document::{
 use crate::axes::AXES;
 
 /// A document that passes on what a log has: weights and scale factors are one, and each sensor follows the channel of its name.
-pub fn plain(
+pub(crate) fn plain(
     unit: &str,
     output: GyroOutput,
     temperature: Temperature,
@@ -51,7 +51,7 @@ pub fn plain(
 }
 
 /// The channel that a sensor follows by its name: `accel0` for the first accelerometer, or the only one that there is.
-pub fn follows(channels: &[Channel], kind: &str, index: usize) -> Option<String> {
+pub(crate) fn follows(channels: &[Channel], kind: &str, index: usize) -> Option<String> {
     let own = format!("{kind}{index}");
     let named = channels.iter().find(|channel| channel.name == own);
     let only = channels.first().filter(|_| channels.len() == 1);

@@ -9,7 +9,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Log, Origin};
 use sha2::{Digest as _, Sha256};
 
-use crate::document::written::name_of;
+use crate::document::name_of;
 use crate::error::Error;
 
 /// Name and version of this program, as documents state it.

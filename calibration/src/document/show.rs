@@ -11,12 +11,10 @@ use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use serde_json::{Value, json};
 
-use crate::document::accelerometers;
-use crate::document::written::Written;
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::{hull, real};
-use crate::report::Sheet;
-use crate::report::figures::{alike, short};
+use crate::report::{Sheet, alike, short};
 use terms::{Term, terms, tree};
 
 /// Temperatures of the tables.

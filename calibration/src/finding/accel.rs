@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use crate::axes::AXES;
-use crate::report::figures::{fixed, short};
+use crate::report::{fixed, short};
 
 /// What was found of an accelerometer. Temperatures are in °C, forces in m/s², angles in ″.
 #[derive(Debug, Clone, PartialEq)]

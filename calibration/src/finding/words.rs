@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use super::{Finding, Instead, Kind, Place};
 use crate::axes::{AXES, main_axis};
 use crate::fits::rates::plateaus::Plateau;
-use crate::report::figures::{counted, fixed, short};
+use crate::report::{counted, fixed, short};
 
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;
@@ -131,20 +131,23 @@ impl Display for Kind {
                 f,
                 "a gyro is at its input limit in the step of {from:.1}…{to:.1} s ({stated} °/s): leave the step out, or turn slower"
             ),
-            Self::NotLevel { force, troubles } => {
+            Self::NotLevel { at_beginning, force, troubles } => {
+                let beginning = [" at its beginning", "of its first second ", " of that moment"];
+                let all = ["", "", ", or --remove-mean instead of --latitude"];
+                let [when, of, moment] = if *at_beginning { beginning } else { all };
                 let force = force.map_or_else(
                     || "the document or the log has no accelerometers".to_owned(),
                     |force| {
                         format!(
-                            "the mean force of its first second is ({}) m/s²; it must be within 2 % of one g, x not vertical",
+                            "the mean force {of}is ({}) m/s²; it must be within 2 % of one g, x not vertical",
                             force.map(|part| fixed(part, 3)).join(", ")
                         )
                     },
                 );
                 write!(
                     f,
-                    "the unit cannot be levelled at its beginning: {force}. Give --pitch and --roll of that moment, \
-                     or correct the columns of the accelerometers in the mapping"
+                    "the unit cannot be levelled{when}: {force}. Give --pitch and --roll{moment}, or correct the columns \
+                     of the accelerometers in the mapping"
                 )?;
                 troubles.iter().try_for_each(|trouble| write!(f, "; {trouble}"))
             }
@@ -315,9 +318,14 @@ mod tests {
             Kind::Unsteady { window_s, stated: 36.0, range: [0.0, 36.2] }.in_log(0),
             Kind::Lost { window_s, share: [0.12, 0.05] }.in_log(0),
             Kind::AtLimit { window_s, stated: 400.0 }.in_log(0),
-            Kind::NotLevel { force: Some([9.7, 0.1, 0.2]), troubles: vec!["2 ticks refused".into()] }
-                .in_log(0),
-            Kind::NotLevel { force: None, troubles: Vec::new() }.in_log(0),
+            Kind::NotLevel {
+                at_beginning: true,
+                force: Some([9.7, 0.1, 0.2]),
+                troubles: vec!["2 ticks refused".into()],
+            }
+            .in_log(0),
+            Kind::NotLevel { at_beginning: true, force: None, troubles: Vec::new() }.in_log(0),
+            Kind::NotLevel { at_beginning: false, force: None, troubles: Vec::new() }.into(),
             Kind::OneWay { axes: vec![0, 2] }.into(),
             Kind::NoAttitude.into(),
             Kind::ShortSteps { rates: vec![1.0, -1.0, 1.0] }.into(),

@@ -3,8 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::linear::{self, Weak};
-use crate::numbers::real;
-use crate::robust::median_if_any;
+use crate::numbers::{median_if_any, real};
 
 /// Share of a column's own weight that the ridge adds: it only holds what the data leave open.
 const RIDGE: f64 = 1e-9;
@@ -94,6 +93,19 @@ pub fn once(
         rms: (square / rows.weight).sqrt(),
         outliers: 0,
     })
+}
+
+/// What a cubic over a range leaves of values at places in it, each with its weight.
+pub fn beside_cubic(
+    places: &[f64],
+    [low, high]: [f64; 2],
+    values: &[f64],
+    weights: &[f64],
+) -> Option<Vec<f64>> {
+    let (middle, half) = (0.5 * (low + high), (0.5 * (high - low)).max(1e-9));
+    let power = |power| places.iter().map(|place| ((place - middle) / half).powi(power)).collect();
+    let powers: [Vec<f64>; 4] = [0, 1, 2, 3].map(power);
+    Some(once(&powers.each_ref().map(Vec::as_slice), values, weights, None)?.residual)
 }
 
 /// Rows that take part, each multiplied with the root of its weight, and those that hold coefficients.

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::FitReport;
 use super::verdict::Verdict;
-use crate::report::figures::{short, table};
+use crate::report::{short, table};
 
 /// What a report gives to a batch: what is said of one unit by itself, and its rows in the table that closes all of them.
 pub trait UnitReport {

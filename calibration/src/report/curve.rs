@@ -8,10 +8,9 @@ use isotherm_protocol::document::{AccelOutput, Document, Sample};
 use super::verdict::Verdict;
 use crate::axes::output_name;
 use crate::error::Error;
-use crate::numbers::real;
+use crate::numbers::{Size, real};
 use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Troubles, Watch};
-use crate::size::Size;
 
 /// One sensor or axis over one run, before and after. A window that either lacks is a gap in both.
 #[derive(Debug, Clone, PartialEq)]

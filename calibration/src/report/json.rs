@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::verdict::Verdict;
 use super::{Curve, FitReport};
-use crate::size::Size;
+use crate::numbers::Size;
 
 impl FitReport {
     /// Everything but the curves themselves, of which the sizes are there.

@@ -17,8 +17,6 @@ const HEIGHT: u32 = 170;
 const LEAST_DEG_C: f64 = 1.0;
 /// Height of a panel of coefficients.
 const LOW: u32 = 110;
-/// Standard errors that an error bar reaches to either side: 95 %.
-const BAR: f64 = 1.96;
 
 impl FitReport {
     /// The report as a page that needs nothing beside it.
@@ -182,16 +180,15 @@ fn coefficients(all: &[Coefficient]) -> Option<Chart> {
     let of_unit = |unit: &str| {
         let mine = || all.iter().enumerate().filter(move |(_, coefficient)| coefficient.unit == unit);
         let values = mine().map(|(index, coefficient)| (place(index), coefficient.value));
-        let bars = mine().filter_map(|(index, coefficient)| {
-            let half = BAR * coefficient.sigma.filter(|sigma| sigma.is_finite())?;
-            let (low, high) = (coefficient.value - half, coefficient.value + half);
-            Some([(place(index), low), (place(index), high), (place(index), f64::NAN)])
+        let known = mine().filter_map(|(index, coefficient)| {
+            let sigma = coefficient.sigma.filter(|sigma| sigma.is_finite())?;
+            Some((place(index), [coefficient.value, sigma]))
         });
         let zero = [(place(0), 0.0), (place(all.len().saturating_sub(1)), 0.0)];
 
         let content = vec![
             Series::line("zero", Ink::Faint, zero),
-            Series::line("95 %", Ink::Alert, bars.flatten()),
+            bars("95 %", Ink::Alert, known),
             Series::dots("value", Ink::Corrected, values),
         ];
         // The unit of measure says it all.
@@ -215,6 +212,19 @@ fn coefficients(all: &[Coefficient]) -> Option<Chart> {
         marks: all.iter().enumerate().map(mark).collect(),
         ..Chart::of(caption, Axis::of("number of the coefficient", ""), panels)
     })
+}
+
+/// Error bars that hold 95 %, at places with a value and its standard error.
+pub(crate) fn bars(
+    name: &'static str,
+    ink: Ink,
+    values: impl IntoIterator<Item = (f64, [f64; 2])>,
+) -> Series {
+    let bar = |(x, [value, sigma]): (f64, [f64; 2])| {
+        let half = 1.96 * sigma;
+        [(x, value - half), (x, value + half), (x, f64::NAN)]
+    };
+    Series::line(name, ink, values.into_iter().flat_map(bar))
 }
 
 /// Spectra before and after of each sensor: out of sample where there is such a run.

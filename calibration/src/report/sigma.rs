@@ -84,7 +84,7 @@ impl Sigmas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::document::written::Written;
+    use crate::document::Written;
 
     #[test]
     fn what_is_written_is_read_back() {

@@ -3,10 +3,10 @@ use std::path::Path;
 use isotherm_protocol::document::{Document, Sample};
 
 use super::*;
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::fixture::simulated;
+use crate::numbers::Size;
 use crate::runs::table::Rows;
-use crate::size::Size;
 
 fn size(peak_to_peak: f64) -> Size {
     Size { count: 10, rms: 0.25 * peak_to_peak, peak_to_peak, ..Size::default() }

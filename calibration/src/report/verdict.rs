@@ -4,9 +4,8 @@ use isotherm_pages::Table;
 use isotherm_protocol::document::{Measure, Residual, Sample};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::numbers::real;
-use crate::report::figures::short;
-use crate::size::Size;
+use crate::numbers::{Size, real};
+use crate::report::short;
 
 /// Which figure of a [`Size`] the sentence states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

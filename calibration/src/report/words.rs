@@ -1,6 +1,6 @@
 //! The lines of a terminal; one sentence for all gyros, or logs, that it holds of.
 
-use crate::report::figures::counted;
+use crate::report::counted;
 
 /// Lines of a terminal that a unit has at most: what an engineer decides by. The page and the JSON have the rest.
 const LINES: usize = 12;

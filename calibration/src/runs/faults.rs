@@ -2,7 +2,7 @@
 
 use crate::axes::sensor_name;
 use crate::numbers::real;
-use crate::report::figures::six;
+use crate::report::six;
 
 /// Share of readings that may be no number.
 const LARGEST_MISSING: f64 = 0.01;

@@ -3,11 +3,11 @@
 use std::fmt::{self, Display, Formatter};
 
 use isotherm_correction::earth::{Place, Tilt};
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 
 use crate::axes::AXES;
-use crate::numbers::{norm, unit};
-use crate::report::figures::fixed;
-use crate::size::Size;
+use crate::numbers::{Size, norm, unit};
+use crate::report::fixed;
 
 /// Orders of three axes: the swaps of two first, which need the fewest mistakes.
 pub const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
@@ -125,13 +125,13 @@ pub fn moved(order: [usize; 3]) -> String {
     moved.join(" and ")
 }
 
-/// Direction of the specific force at rest in case axes, a unit vector, where pitch and roll were stated.
-pub fn up(place: &Place) -> Option<[f64; 3]> {
+/// Specific force at rest in case axes (m/s²), where pitch and roll were stated.
+pub fn force_at_rest(place: &Place) -> Option<[f64; 3]> {
     let Tilt::Given { pitch_rad, roll_rad } = place.tilt() else { return None };
     // At the pole the Earth turns about the vertical: where that axis is in the case, there gravity is.
     let tilt_deg = [pitch_rad.to_degrees(), roll_rad.to_degrees()];
     let rate = Place::new(90.0, 0.0, Some(tilt_deg)).ok()?.earth_rate_in_case(None)?;
-    Some(unit(rate))
+    Some(unit(rate).map(|part| part * STANDARD_GRAVITY_M_PER_S2))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::slice;
 
-use isotherm_correction::earth::LEVELLING_TOLERANCE;
+use isotherm_correction::earth::{LEVELLING_TOLERANCE, Place};
 use isotherm_correction::sample::{CorrectedTick, GyroTick, SensorFlags, Sensors, TickFlags};
 use isotherm_correction::unit::Unit;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2, Timestamp};
@@ -12,6 +12,7 @@ use isotherm_log::offline::Loaded;
 
 use super::{Run, Troubles, Watch};
 use crate::error::Error;
+use crate::finding::Kind;
 use crate::numbers::seconds;
 
 /// Flags of a tick that carries no reading of its own.
@@ -89,6 +90,15 @@ pub struct Table {
 /// Whether the mean specific force of a unit at rest has the size of gravity (m/s²), within [`LEVELLING_TOLERANCE`].
 pub fn is_one_g(size: f64) -> bool {
     (size / STANDARD_GRAVITY_M_PER_S2 - 1.0).abs() <= LEVELLING_TOLERANCE
+}
+
+/// The Earth's rate in case axes (rad/s); levelled by the mean specific force (m/s²) where the attitude is not stated.
+///
+/// # Errors
+/// [`Error::Found`] where the unit cannot be levelled.
+pub fn earth_rate(place: &Place, force: Option<[f64; 3]>) -> Result<[f64; 3], Error> {
+    let not_level = || Kind::NotLevel { at_beginning: false, force, troubles: Vec::new() };
+    place.earth_rate_in_case(force).ok_or_else(|| Error::Found(vec![not_level().into()]))
 }
 
 /// Length of the windows that what is left is stated over (s), for runs as long as the longest of some: in long runs several of
@@ -272,9 +282,9 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::document::written::Written;
+    use crate::document::Written;
     use crate::fixture::simulated;
-    use crate::size::Size;
+    use crate::numbers::Size;
 
     #[test]
     fn windows_hold_the_mean_of_their_ticks() {

@@ -3,11 +3,10 @@
 use isotherm_correction::sample::SensorFlags;
 use isotherm_pages::Table;
 
-use crate::document::accelerometers;
-use crate::document::written::Written;
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::real;
-use crate::report::figures::short;
+use crate::report::short;
 use crate::runs::{Run, Watch};
 
 /// Share of the fitted range that a judgement should cover.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::document::Document;
 use toml::Value;
 
-use crate::document::provenance::{files_of, origin};
+use crate::document::{files_of, origin};
 use crate::error::Error;
 use crate::runs::Run;
 

@@ -1,6 +1,6 @@
 //! `board`: the ratio of the electronics from cycles of a simulated chamber in two positions.
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::error::Error;
 use isotherm_calibration::finding::{AccelKind, Kind};
 use isotherm_calibration::fits::board::{Wanted, fit};

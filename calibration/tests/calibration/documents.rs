@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Curve, Document, Measure, Origin, Residual, Sample, Shape};
 use serde_json::Value;

@@ -18,7 +18,7 @@ use crate::impact::{VOYAGE, parts};
 
 fn fit(readings: &[f64], tick_s: f64) -> NoiseFit {
     let phase = Phase::new([readings], 0.0);
-    let variances = lengths(readings.len(), 2).into_iter();
+    let variances = lengths(readings.len()).into_iter();
     let variances: Vec<_> = variances.filter_map(|m| phase.variance(Estimator::Overlapping, m)).collect();
     NoiseFit::of(&variances, tick_s).unwrap()
 }
@@ -79,7 +79,7 @@ fn a_log_of_more_than_the_five_terms_is_fitted_in_every_octave_or_not_at_all() {
             let seen = phase.variance(Estimator::Overlapping, m)?.variance;
             Some((found.variances(m as f64 * TICK_S).iter().sum::<f64>() / seen).sqrt())
         };
-        let octaves: Vec<f64> = lengths(readings.len(), 2).into_iter().filter_map(octave).collect();
+        let octaves: Vec<f64> = lengths(readings.len()).into_iter().filter_map(octave).collect();
         println!("{:?} {:.2} {octaves:.2?}", found.coefficients, found.chi_square_per_degree);
         assert_eq!((found.describes(), found.model_error), (described, 0.1));
         if described {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::runs::Run;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::rows::{write_header, write_tick};

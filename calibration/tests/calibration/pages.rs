@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_protocol::document::Document;
 use isotherm_simulator::chamber::Profile;

@@ -1,6 +1,6 @@
 //! `positions`: a simulated stand with its errors, from the log to the document.
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::document::complete;
 use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
 use isotherm_calibration::fits::positions::judged::judge;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Output;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::report::Sigmas;
 use isotherm_protocol::document::Document;

@@ -1,6 +1,6 @@
 //! `positions` on logs that are damaged: what is told, and what is refused.
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
 use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::fits::positions::track::Track;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::document::complete;
 use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_correction::thermal::Feature;

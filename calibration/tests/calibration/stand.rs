@@ -7,7 +7,7 @@ pub(crate) mod judging;
 
 use std::collections::BTreeMap;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::plan::{Attitude, Plan};
 use isotherm_calibration::runs::Run;
 use isotherm_correction::thermal::Feature;

@@ -88,7 +88,7 @@ fn preset() -> [Run; 2] {
 /// Times by which rms and peak to peak fall out of sample, of all gyros together.
 fn together(report: &FitReport) -> [f64; 2] {
     let gyros = || report.verdicts.iter().filter(|verdict| verdict.of.starts_with("gyro"));
-    let size = |of: fn(&isotherm_calibration::size::Size) -> f64, which: usize| {
+    let size = |of: fn(&isotherm_calibration::numbers::Size) -> f64, which: usize| {
         gyros().map(|verdict| of(&verdict.out_of_sample.unwrap()[which]).powi(2)).sum::<f64>().sqrt()
     };
     [size(|s| s.rms, 0) / size(|s| s.rms, 1), size(|s| s.peak_to_peak, 0) / size(|s| s.peak_to_peak, 1)]

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::bare::bare;
 use isotherm_calibration::fits::positions::still::StillLimits;
 use isotherm_calibration::fits::positions::track::Track;
 use isotherm_calibration::fits::tumble::acceleration;
 use isotherm_calibration::fits::tumble::document::complete;
 use isotherm_calibration::fits::tumble::fit::{Settings, Tumble, analyse};
+use isotherm_calibration::numbers::Size;
 use isotherm_calibration::runs::Run;
-use isotherm_calibration::size::Size;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_log::text::LogEvent;
 use serde_json::Value;
 
@@ -64,7 +64,7 @@ fn noise_and_drift_of_both_end_with_one_table() {
     assert_eq!(units(&json(&["drift", &log, "--json"])), UNITS);
     std::fs::remove_file(&one).unwrap();
     let (code, said, errors) = words(&calibrate(&["drift", &log, "--calibration", &documents]));
-    assert!(code == Some(1) && errors.contains("FOG-0002.toml does not exist"), "{errors}");
+    assert!(code == Some(1) && errors.contains("no document of the folder is for unit FOG-0002"), "{errors}");
     assert!(said.contains("2 units: 3 of 3 sensors analysed, 1 of the units failed."), "{said}");
     assert!(fails(&["drift", &log, "--out", &out], 2).contains("give it with --calibration"));
 }
@@ -110,18 +110,19 @@ fn both_on_a_table_are_fitted_and_one_document_takes_one() {
 }
 
 #[test]
-fn both_at_rest_are_judged_by_a_folder_and_refused_by_one_document() {
+fn both_at_rest_are_judged_by_a_folder_and_one_by_its_own_document() {
     let folder = tempfile::tempdir().unwrap();
     let (log, documents) = both(folder.path(), at_rest(1500.0));
     let (code, said, _) = words(&calibrate(&["validate", &documents, &log, "--json"]));
     assert!(matches!(code, Some(0 | 1)));
     assert_eq!(units(&serde_json::from_str(&said).unwrap()), UNITS);
     let one = format!("{documents}/FOG-0001.toml");
-    let refused = fails(&["validate", &one, &log], 1);
-    assert!(
-        refused.contains("several units (FOG-0001, FOG-0002): choose one with --unit, or give a folder"),
-        "{refused}"
-    );
+    let (code, said, _) = words(&calibrate(&["validate", &one, &log, "--json"]));
+    assert!(matches!(code, Some(0 | 1)));
+    let report: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(report["unit"], "FOG-0001");
+    assert!(report["warnings"].to_string().contains("also have unit FOG-0002, which is left out"), "{said}");
+    // Of its own unit, half an hour is too short for a calibration and a voyage.
     let refused = fails(&["impact", &log, "--calibration", &one, "--calibration-hours", "0.5"], 1);
-    assert!(refused.contains("several units (FOG-0001, FOG-0002): choose one with --unit"), "{refused}");
+    assert!(refused.contains("h of calibration and at least"), "{refused}");
 }

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use isotherm_calibration::document::provenance::origin;
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::{Written, origin};
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::runs::table::Table;
 use isotherm_correction::sample::OutputKind;
@@ -177,7 +176,7 @@ fn what_cannot_be_judged_is_refused_in_words() {
         assert!(got == Some(code) && stderr.contains(word), "{arguments:?} {got:?}: {stderr}");
     };
     record(Path::new(&path("other.mcap")), &fibre_optic(5, "FOG-0009", 200.0));
-    refused(&["validate", &good, &path("other.mcap")], 1, "other.mcap is of unit FOG-0009");
+    refused(&["validate", &good, &path("other.mcap")], 1, "the logs are of unit FOG-0009");
     let mut moving = fibre_optic(5, "FOG-0001", 200.0);
     moving.motion = moving.motion.along(isotherm_simulator::motion::Path::Sine {
         axis: [1.0, 0.0, 0.0],

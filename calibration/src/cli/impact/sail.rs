@@ -19,26 +19,7 @@ use crate::runs::cut::Cut;
 /// Seeds where nobody says.
 const SEEDS: u32 = 50;
 
-/// A case: which gyros have the drift, in words.
-struct Case {
-    name: String,
-    share: [f64; 3],
-}
-
 impl ImpactArgs {
-    fn cases(&self) -> Vec<Case> {
-        let of = |name: &str, share| Case { name: name.to_owned(), share };
-        let (x, y) = (of("level gyro x", [1.0, 0.0, 0.0]), of("level gyro y", [0.0, 1.0, 0.0]));
-        let z = of("azimuth gyro z", [0.0, 0.0, 1.0]);
-        match self.gyro.unwrap_or(Gyro::Each) {
-            Gyro::X => vec![x],
-            Gyro::Y => vec![y],
-            Gyro::Z => vec![z],
-            Gyro::Each => vec![x, y, z],
-            Gyro::All => vec![of("all gyros", [1.0; 3])],
-        }
-    }
-
     /// A drift without noise: what comes out is what the drift adds to all other errors.
     pub(super) fn sail_stated(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
         let (trend, constant) = (self.trend.unwrap_or(0.0), self.constant.unwrap_or(0.0));
@@ -49,11 +30,15 @@ impl ImpactArgs {
         };
         let ramp: Vec<f64> = (0..voyage.ticks()).map(rate).collect();
         let mut rows = Vec::new();
-        for case in self.cases() {
-            let truth: Vec<[f64; 3]> = ramp.iter().map(|rate| case.share.map(|share| share * rate)).collect();
+        let gyros = match self.gyro.unwrap_or(Gyro::Each) {
+            Gyro::Each => vec![Gyro::X, Gyro::Y, Gyro::Z],
+            one => vec![one],
+        };
+        for (name, share) in gyros.into_iter().map(Gyro::case) {
+            let truth: Vec<[f64; 3]> = ramp.iter().map(|rate| share.map(|share| share * rate)).collect();
             let held = truth.get(voyage.calibration_ticks().saturating_sub(1)).copied().unwrap_or_default();
             let drift = Drift { measured: truth.clone(), truth, held };
-            rows.extend(Row::of_cares(&case.name, voyage, &drift, parts)?);
+            rows.extend(Row::of_cares(name, voyage, &drift, parts)?);
         }
         let source = match (self.trend, self.constant) {
             (Some(trend), None) => format!("A trend of {trend} °/h² alone"),
@@ -73,12 +58,8 @@ impl ImpactArgs {
         let count = self.seeds.unwrap_or(SEEDS);
         let seeds: Vec<u64> = (0..count).map(|index| self.seed.wrapping_add(u64::from(index))).collect();
         let slope = AngularRate::from_deg_per_h(self.trend.unwrap_or(0.0)).as_rad_per_s() / HOUR_S;
-        let on_top = match self.gyro.unwrap_or(Gyro::All) {
-            Gyro::X => [slope, 0.0, 0.0],
-            Gyro::Y => [0.0, slope, 0.0],
-            Gyro::Z => [0.0, 0.0, slope],
-            Gyro::Each | Gyro::All => [slope; 3],
-        };
+        let (_, share) = self.gyro.unwrap_or(Gyro::All).case();
+        let on_top = share.map(|share| share * slope);
         let bar = Bar::at_work("sailing");
         let sailed = sail_all(voyage, parts, on_top, &seeds);
         bar.finish();

@@ -5,11 +5,10 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 use super::{BEYOND, Changes, changes};
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::once_each;
-use crate::report::Sheet;
-use crate::report::figures::short;
+use crate::report::{Sheet, short};
 
 /// The changes from each document to the next, and from the first to the last.
 #[derive(Debug, Clone)]

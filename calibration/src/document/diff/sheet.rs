@@ -5,8 +5,7 @@ use serde_json::{Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
-use crate::report::Sheet;
-use crate::report::figures::short;
+use crate::report::{Sheet, short};
 
 /// Entries of an origin that are shown one by one.
 const MOST_ABOUT: usize = 12;

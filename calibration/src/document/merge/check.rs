@@ -6,7 +6,7 @@ use isotherm_protocol::document::{AccelOutput, GyroOutput};
 
 use super::Take;
 use super::sections::is_about;
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 
 /// Refuses documents that are not of one unit, or of other sensors.

@@ -5,9 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use isotherm_protocol::document::Document;
 use toml::{Table, Value};
 
-use crate::document::provenance::{TOOL, command_line};
 use crate::document::show::terms::tree;
-use crate::document::written::Written;
+use crate::document::{TOOL, Written, command_line};
 use crate::error::Error;
 use crate::numbers::hull;
 use crate::report::Sigmas;

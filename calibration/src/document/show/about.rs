@@ -5,8 +5,7 @@ use isotherm_protocol::document::{Document, Orientation};
 use super::parts;
 use super::terms::Term;
 use crate::document::accelerometers;
-use crate::report::Sheet;
-use crate::report::figures::short;
+use crate::report::{Sheet, short};
 
 /// Seconds of arc in a radian.
 pub(crate) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;

@@ -6,11 +6,9 @@ use isotherm_pages::{Axis, Chart, Content, Ink, Panel, Samples, Series};
 use super::about::ARCSEC;
 use super::terms::Term;
 use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
-use crate::document::accelerometers;
-use crate::document::written::Written;
-use crate::numbers::once_each;
+use crate::document::{Written, accelerometers};
+use crate::numbers::{Size, once_each};
 use crate::report::Sheet;
-use crate::size::Size;
 
 /// Points of a curve.
 const POINTS: usize = 201;

@@ -3,8 +3,7 @@
 use isotherm_protocol::document::{Document, Measure, Residual, Sample};
 use toml::{Table, Value};
 
-use crate::report::Sheet;
-use crate::report::figures::short;
+use crate::report::{Sheet, short};
 
 /// Most entries of a list that are named.
 const NAMED: usize = 4;

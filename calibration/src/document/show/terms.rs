@@ -10,7 +10,7 @@ use toml::{Table, Value};
 
 use crate::error::Error;
 use crate::numbers::real;
-use crate::report::figures::{six, superscript};
+use crate::report::{six, superscript};
 
 /// One curve of one sensor, in the document's units.
 #[derive(Debug, Clone)]

@@ -6,16 +6,16 @@ use toml::{Table, Value};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
-use crate::document::accelerometers;
-use crate::document::written::{Written, tidy};
+use crate::document::{Written, accelerometers, tidy};
 use crate::error::Error;
 use crate::finding::AccelKind;
 use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
 use crate::numbers::{dot, hull};
-use crate::report::figures::{fixed, short};
-use crate::report::{Coefficient, Curve, Figure, FitReport, Judged, Rest, Sigmas, judge};
+use crate::report::{
+    Coefficient, Curve, Figure, FitReport, Judged, Rest, Sigmas, fixed, judge, per_deg_c, short,
+};
 use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
@@ -209,7 +209,7 @@ fn tell(
             Ok(ratio) => {
                 report.warnings.extend(ratio.doubt.clone().map(|kind| kind.of(name).to_string()));
                 for (power, (x, sigma)) in ratio.x.iter().zip(&ratio.sigmas).enumerate() {
-                    let unit = crate::report::figures::per_deg_c("ppm", power + 1);
+                    let unit = per_deg_c("ppm", power + 1);
                     let what = format!("accelerometer {name} board ratio, power {}", power + 1);
                     report.coefficients.push(Coefficient::new(what, unit, -1e6 * x, Some(1e6 * sigma)));
                 }

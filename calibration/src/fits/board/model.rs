@@ -3,11 +3,10 @@
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::{Curve, Shape};
 
-use crate::document::written::tidy;
+use crate::document::tidy;
 use crate::finding::AccelKind;
-use crate::lsq::weighted::{once, solve};
-use crate::numbers::ends;
-use crate::size::Size;
+use crate::lsq::weighted::{beside_cubic, solve};
+use crate::numbers::{Size, ends};
 
 /// Least change of the board's temperature (°C).
 const LEAST_RANGE_DEG_C: f64 = 10.0;
@@ -105,16 +104,8 @@ impl Rows {
 
     /// What the board's temperature has of its own beside a cubic of the accelerometer's (°C rms).
     fn own_of_board(&self) -> Option<f64> {
-        let [low, high] = ends(self.own_deg_c.iter().copied());
-        let (middle, half) = (0.5 * (low + high), (0.5 * (high - low)).max(1e-9));
-        let power = |power| -> Vec<f64> {
-            self.own_deg_c.iter().map(|t| ((t - middle) / half).powi(power)).collect()
-        };
-        let powers = [0, 1, 2, 3].map(power);
-        let columns: Vec<&[f64]> = powers.iter().map(Vec::as_slice).collect();
-        let weights = self.weights();
-        let left = once(&columns, &self.board_deg_c, &weights, None)?.residual;
-        let left: Vec<f64> = left.into_iter().filter(|left| left.is_finite()).collect();
+        let range = ends(self.own_deg_c.iter().copied());
+        let left = beside_cubic(&self.own_deg_c, range, &self.board_deg_c, &self.weights())?;
         Some(Size::of(&left).rms)
     }
 

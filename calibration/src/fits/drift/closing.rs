@@ -8,8 +8,7 @@ use super::fit::Analysis;
 use super::page::page;
 use super::report::Report;
 use crate::fits::drift::allan::{Coefficient, Term};
-use crate::report::figures::short;
-use crate::report::{BatchRow, UnitReport};
+use crate::report::{BatchRow, UnitReport, short};
 
 impl UnitReport for Report {
     const COLUMNS: &'static [&'static str] =

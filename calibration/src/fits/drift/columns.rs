@@ -77,76 +77,47 @@ pub fn unnamed() -> Result<UnitId, Error> {
 const DEG_PER_H_IN_ARCSEC_PER_S: f64 = 1.0;
 
 impl Columns {
-    /// From raw gyro ticks; counts need the angle that one stands for (″).
+    /// From raw ticks of a kind; counts of gyros need the angle that one stands for (″).
     ///
     /// # Errors
-    /// [`Error::Refused`] where there are no ticks, or counts without a weight.
-    pub fn of_gyros(series: Series, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
-        let Series { unit, gyros, .. } = series;
-        let scale = match (gyros.output, increment_weight_arcsec) {
-            (None, _) => return Err(nothing("gyro ticks", "for the accelerometers use --accelerometers")),
+    /// [`Error::Refused`] where there are none, or counts without a weight.
+    pub fn raw(series: Series, kind: Kind, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
+        let Series { unit, gyros, accels, .. } = series;
+        let (ticks, instead, scale, weight) = match kind {
+            Kind::Rate => (
+                gyros,
+                "for the accelerometers use --accelerometers",
+                DEG_PER_H_IN_RAD_PER_S,
+                "the angle per count with --increment-weight ARCSEC, or ",
+            ),
+            Kind::Force => (accels, "for the gyros remove --accelerometers", 1.0, ""),
+        };
+        let Ticks { end_ns, duration_s, readings, output, .. } = ticks;
+        let sensor = kind.sensor();
+        let per_count = match (output, increment_weight_arcsec.filter(|_| kind == Kind::Rate)) {
+            (None, _) => return Err(nothing(&format!("{sensor} ticks"), instead)),
             (Some(OutputKind::Counts), None) => {
-                return Err(Error::refused(
-                    "the gyro readings are counts: give the angle per count with --increment-weight ARCSEC, or a \
-                     calibration document with --calibration",
-                ));
+                return Err(Error::refused(format!(
+                    "the {sensor} readings are counts: give {weight}a calibration document with --calibration"
+                )));
             }
-            (Some(OutputKind::Counts), Some(weight)) => Scale::PerSecond(weight * DEG_PER_H_IN_ARCSEC_PER_S),
-            (Some(OutputKind::Mean), _) => Scale::Mean(DEG_PER_H_IN_RAD_PER_S),
+            (Some(OutputKind::Counts), weight) => weight.map(|weight| weight * DEG_PER_H_IN_ARCSEC_PER_S),
+            (Some(OutputKind::Mean), _) => None,
         };
-        Ok(Self::build(unit, Kind::Rate, gyros, scale))
-    }
-
-    /// From raw accelerometer ticks; counts become counts per second.
-    ///
-    /// # Errors
-    /// [`Error::Refused`] where there are none.
-    pub fn of_accelerometers(series: Series) -> Result<Self, Error> {
-        let Series { unit, accels, .. } = series;
-        let scale = match accels.output {
-            None => {
-                return Err(nothing("accelerometer ticks", "for the gyros remove --accelerometers"));
-            }
-            Some(OutputKind::Counts) => {
-                return Err(Error::refused(
-                    "the accelerometer readings are counts: give a calibration document with --calibration",
-                ));
-            }
-            Some(OutputKind::Mean) => Scale::Mean(1.0),
-        };
-        let mut columns = Self::build(unit, Kind::Force, accels, scale);
-        columns.notes.push(
-            "The readings are the accelerometers' mean outputs in the log. If they are volts, read V for m/s²; \
-             --calibration converts them to specific force."
-                .to_owned(),
-        );
-        Ok(columns)
-    }
-
-    fn build(unit: UnitId, kind: Kind, ticks: Ticks, scale: Scale) -> Self {
-        let Ticks { end_ns, duration_s, readings, .. } = ticks;
         let names: Vec<String> =
             (0..readings.len()).map(|index| sensor_name(index, readings.len())).collect();
         let looked = names.iter().zip(&readings);
         let frozen = looked
-            .filter_map(|(name, column)| {
-                checks::frozen(&format!("{} {name}", kind.sensor()), &end_ns, column)
-            })
+            .filter_map(|(name, column)| checks::frozen(&format!("{sensor} {name}"), &end_ns, column))
             .collect();
-        let values = readings.into_iter().map(|mut column| {
-            match scale {
-                Scale::Mean(factor) => column.iter_mut().for_each(|reading| *reading *= factor),
-                Scale::PerSecond(factor) => {
-                    column
-                        .iter_mut()
-                        .zip(&duration_s)
-                        .for_each(|(reading, duration)| *reading *= factor / duration);
-                }
-            }
-            column
-        });
-        let values = values.collect();
-        Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes: Vec::new() }
+        let mut values = readings;
+        for (reading, duration) in values.iter_mut().flat_map(|column| column.iter_mut().zip(&duration_s)) {
+            *reading *= per_count.map_or(scale, |weight| weight / duration);
+        }
+        let mean_outputs = "The readings are the accelerometers' mean outputs in the log. If they are volts, read V \
+                            for m/s²; --calibration converts them to specific force.";
+        let notes = if kind == Kind::Force { vec![mean_outputs.to_owned()] } else { Vec::new() };
+        Ok(Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes })
     }
 
     /// From the run of a unit, corrected with a document by the same stream as the service's.
@@ -283,15 +254,6 @@ impl Kind {
             Self::Force => "accelerometer",
         }
     }
-}
-
-/// How readings become rates.
-#[derive(Debug, Clone, Copy)]
-enum Scale {
-    /// Means: times this.
-    Mean(f64),
-    /// Counts: times this over the tick's duration.
-    PerSecond(f64),
 }
 
 fn nothing(what: &str, advice: &str) -> Error {

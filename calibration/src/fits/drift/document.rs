@@ -7,7 +7,7 @@ use super::markov::Fit;
 use crate::axes::AXES;
 use crate::error::Error;
 use crate::fits::drift::allan::{Coefficient, Term};
-use crate::report::figures::short;
+use crate::report::short;
 
 /// How long a trend's rate holds where the log does not say: 002's extrapolation errs by 30 % over the 50 h behind the
 /// fit, and e^(−50/140) = 0.7.

@@ -12,15 +12,6 @@ use crate::fits::drift::spectrum::{Line, Spectrum};
 use crate::numbers::real;
 use crate::report::in_parallel;
 
-/// What is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
-    /// Factor from one averaging time to the next: 2 or 10.
-    pub factor: usize,
-    /// Hours that the extrapolation is fitted to.
-    pub fit_h: f64,
-}
-
 /// Deviations at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviations {
@@ -31,9 +22,10 @@ pub struct Deviations {
 }
 
 /// One deviation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Deviation {
     /// The deviation.
+    #[serde(rename = "deviation")]
     pub value: f64,
     /// Ends of its 95 % interval, by χ².
     pub interval: [f64; 2],
@@ -101,22 +93,15 @@ struct Prepared {
     spectrum: Option<Spectrum>,
 }
 
-/// Analyses every sensor of a log.
-pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
+/// Analyses every sensor of a log; the extrapolation is fitted to so many hours.
+pub fn analyse(grid: &Grid, fit_h: f64) -> Vec<Analysis> {
     let sensors = &grid.sensors;
     let prepared = in_parallel(sensors, |_| (), |sensor| prepare(grid, sensor));
     // One thing of work per sensor and averaging time, the slow ones first.
     let mut work = Vec::new();
     for (index, of) in prepared.iter().enumerate() {
-        let longest = of.phase.longest();
         for estimator in [Estimator::Modified, Estimator::Overlapping, Estimator::Plain] {
-            let mut ticks = lengths(longest, wanted.factor);
-            if estimator == Estimator::Overlapping && wanted.factor != 2 {
-                ticks.extend(lengths(longest, 2));
-                ticks.sort_unstable();
-                ticks.dedup();
-            }
-            work.extend(ticks.into_iter().map(|m| (index, estimator, m)));
+            work.extend(lengths(of.phase.longest()).into_iter().map(|m| (index, estimator, m)));
         }
     }
     let variances = in_parallel(
@@ -136,7 +121,7 @@ pub fn analyse(grid: &Grid, wanted: Wanted) -> Vec<Analysis> {
                 .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
                 .collect();
             let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
-            Some(finish(grid, sensor, prepared, &of_sensor, wanted))
+            Some(finish(grid, sensor, prepared, &of_sensor, fit_h))
         },
     );
     finished.into_iter().flatten().collect()
@@ -172,11 +157,10 @@ fn finish(
     sensor: &Sensor,
     prepared: &Prepared,
     variances: &[(Estimator, Variance)],
-    wanted: Wanted,
+    fit_h: f64,
 ) -> Analysis {
-    let octaves = |variance: &Variance| variance.ticks.is_power_of_two();
     let overlapping = variances.iter().filter(|(estimator, _)| *estimator == Estimator::Overlapping);
-    let fitted: Vec<Variance> = overlapping.map(|(_, variance)| *variance).filter(octaves).collect();
+    let fitted: Vec<Variance> = overlapping.map(|(_, variance)| *variance).collect();
     let noise = NoiseFit::of(&fitted, grid.tick_s);
     let slow = prepared.slow.clone();
     let markov = Fit::with_daily_lines(&slow, 1);
@@ -194,11 +178,11 @@ fn finish(
         mean: prepared.mean,
         deviation: prepared.deviation,
         slow_deviation: deviation_of(&slow.mean),
-        allan: table(grid.tick_s, variances, noise.as_ref(), wanted.factor),
+        allan: table(grid.tick_s, variances, noise.as_ref()),
         fitted,
         noise,
         slope: markov.as_ref().and_then(|(fit, _)| fit.slope(&slow)),
-        extrapolation: Extrapolation::of(&slow, wanted.fit_h),
+        extrapolation: Extrapolation::of(&slow, fit_h),
         markov,
         second_order,
         autocorrelation,
@@ -217,17 +201,10 @@ fn deviation_of(values: &[f64]) -> f64 {
 }
 
 /// Deviations by averaging time, with their confidence by the kind of noise that dominates there.
-fn table(
-    tick_s: f64,
-    variances: &[(Estimator, Variance)],
-    noise: Option<&NoiseFit>,
-    factor: usize,
-) -> Vec<Deviations> {
+fn table(tick_s: f64, variances: &[(Estimator, Variance)], noise: Option<&NoiseFit>) -> Vec<Deviations> {
     let mut factors: Vec<usize> = variances.iter().map(|(_, variance)| variance.ticks).collect();
     factors.sort_unstable();
     factors.dedup();
-    let wanted = lengths(factors.last().map_or(0, |last| last * 3), factor);
-    factors.retain(|m| wanted.contains(m));
     let row = |m: usize| {
         let tau_s = real(m) * tick_s;
         let law = noise.map_or(PowerLaw::White, |noise| noise.dominant(tau_s).law());

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::slow::Slow;
 use crate::lsq::linear;
-use crate::report::figures::{short, within};
+use crate::report::{short, within};
 use likelihood::{Problem, Solution, noise};
 
 /// Fewest bins.

@@ -5,6 +5,7 @@ use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series, Table};
 use super::fit::Analysis;
 use super::markov::{Fit, Noise};
 use super::report::Report;
+use crate::report::short;
 
 /// Most points of a spectrum in the page.
 const SPECTRUM_POINTS: usize = 4096;
@@ -20,7 +21,7 @@ pub fn page(report: &Report) -> String {
     page.paragraph(&format!(
         "{} ticks of {} s, {:.2} h{}.",
         report.ticks,
-        crate::report::figures::short(report.tick_s),
+        short(report.tick_s),
         report.length_h,
         if report.corrected { ", corrected and along the case axes" } else { ", raw readings" }
     ));

@@ -7,7 +7,7 @@ pub(crate) mod steps;
 use super::columns::Columns;
 use crate::error::Error;
 use crate::numbers::{real, seconds};
-use crate::report::figures::{counted, short};
+use crate::report::{counted, short};
 use crate::runs::faults::{self, Fault};
 
 /// Fewest ticks of a log.

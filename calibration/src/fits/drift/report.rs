@@ -9,10 +9,9 @@ use serde_json::{Value, json};
 use super::columns::Kind;
 use super::columns::stated_in;
 use super::document::{Parameters, Trend, trend};
-use super::fit::{Analysis, Deviation};
+use super::fit::{Analysis, Deviation, Deviations};
 use crate::fits::drift::allan::{Coefficient, Term};
-use crate::report::figures::{short, table, within};
-use crate::report::words::dozen;
+use crate::report::{dozen, short, table, within};
 
 /// What is said of the log as a whole.
 #[derive(Debug, Clone, Serialize)]
@@ -303,17 +302,11 @@ impl Report {
     }
 
     fn sensor_json(&self, sensor: &Analysis) -> Value {
-        let deviation = |d: &Option<Deviation>| {
-            d.map(|d| json!({ "deviation": d.value, "interval": d.interval, "degrees_of_freedom": d.degrees_of_freedom }))
+        let deviations = |row: &Deviations| {
+            let [plain, overlapping, modified] = row.of;
+            json!({ "tau_s": row.tau_s, "plain": plain, "overlapping": overlapping, "modified": modified })
         };
-        let allan: Vec<Value> = sensor
-            .allan
-            .iter()
-            .map(|row| {
-                let [plain, overlapping, modified] = row.of.each_ref().map(deviation);
-                json!({ "tau_s": row.tau_s, "plain": plain, "overlapping": overlapping, "modified": modified })
-            })
-            .collect();
+        let allan: Vec<Value> = sensor.allan.iter().map(deviations).collect();
         let mut noise = serde_json::Map::new();
         for term in Term::ALL {
             let (factor, unit) = stated_in(term, self.kind);
@@ -355,8 +348,8 @@ impl Report {
             "daily_lines": daily,
             "lines": sensor.lines,
             "extrapolation": sensor.extrapolation,
-            "drift": parameters.map(|(_, parameters)| json!(parameters.drift)),
-            "drift_notes": parameters.map(|(_, parameters)| json!(parameters.notes)),
+            "drift": parameters.map(|(_, parameters)| &parameters.drift),
+            "drift_notes": parameters.map(|(_, parameters)| &parameters.notes),
         })
     }
 }

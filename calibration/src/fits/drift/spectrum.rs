@@ -3,7 +3,7 @@
 //! Segments under a Hann window, half overlapping, never across a gap. Two real segments go through one complex
 //! transform: |Z(f)|² + |Z(−f)|² is twice the sum of their powers.
 
-use crate::numbers::real;
+use crate::numbers::{percentile, real};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -124,9 +124,8 @@ impl Spectrum {
     fn background(&self, k: usize) -> f64 {
         let half = NEIGHBOURHOOD.min((k - LOBE).max(4));
         let side = |from: usize, to: usize| {
-            let mut values = self.density.get(from..to.min(self.density.len())).unwrap_or(&[]).to_vec();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(0.0)
+            let values = self.density.get(from..to.min(self.density.len())).unwrap_or(&[]);
+            percentile(values.iter().copied(), 50)
         };
         let below = side(k.saturating_sub(half + LOBE), k.saturating_sub(LOBE));
         let above = side(k + LOBE + 1, k + LOBE + 1 + half);

@@ -18,7 +18,7 @@ use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
 use crate::fits::drift::markov::{Beside, Fit, Noise};
 use crate::fits::drift::slow::Slow;
 use crate::numbers::real;
-use crate::report::figures::short;
+use crate::report::short;
 
 /// A difference of the criterion from which on a log is said to bear a model out: odds of 20 to 1.
 const BORNE_OUT: f64 = 6.0;

@@ -7,7 +7,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use super::estimate::{REFERENCE_TICKS, TICK_S};
 use super::scenario::{CARES, Course, Drift, Figures, Voyage};
 use crate::error::Error;
-use crate::numbers::real;
+use crate::numbers::{percentile, real};
 use crate::report::in_parallel;
 
 /// Normal deviates from a seed, the same on every machine.
@@ -125,14 +125,7 @@ pub fn sail_all(
 
 fn spread(figures: &[Figures]) -> Spread {
     let at = |share: usize| {
-        let of = |value: fn(&Figures) -> f64| {
-            let mut values: Vec<f64> = figures.iter().map(value).collect();
-            values.sort_by(f64::total_cmp);
-            values
-                .get((values.len() * share / 100).min(values.len().saturating_sub(1)))
-                .copied()
-                .unwrap_or(0.0)
-        };
+        let of = |value: fn(&Figures) -> f64| percentile(figures.iter().map(value), share);
         Figures {
             radial_at_end_m: of(|figures| figures.radial_at_end_m),
             radial_largest_m: of(|figures| figures.radial_largest_m),

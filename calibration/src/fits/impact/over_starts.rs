@@ -5,8 +5,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::fits::drift::columns::Columns;
-use crate::numbers::real;
-use crate::size::Size;
+use crate::numbers::{Size, real};
 
 /// Probability beyond either end of an interval.
 const BEYOND: f64 = 0.025;

@@ -14,7 +14,7 @@ use super::scenario::{CARES, Care, Course, Drift, Figures, Voyage};
 use crate::axes::AXES;
 use crate::error::Error;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
-use crate::report::figures::{short, table};
+use crate::report::{short, table};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;

@@ -12,7 +12,7 @@ use isotherm_protocol::document::{Curve, Document, Orientation, OrientationTherm
 
 use jackknife::Jackknife;
 
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::real;
 use crate::runs::{Run, Troubles, Watch};

@@ -1,7 +1,6 @@
 //! What makes a log useless for the modes: every reason, with its value, limit and what to do.
 
 use isotherm_correction::sample::OutputKind;
-use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::cells::{Gathered, Second};
@@ -10,11 +9,9 @@ use super::seen::Stay;
 use super::switches::Switches;
 use super::{steps, units};
 use crate::axes::AXES;
-use crate::numbers::{dot, ends, real};
-use crate::report::figures::{counted, short, six};
-use crate::robust::{median, scatter_of_steps};
+use crate::numbers::{Size, dot, ends, median, real, scatter_of_steps};
+use crate::report::{counted, short, six};
 use crate::runs::swapped::Shown;
-use crate::size::Size;
 
 /// Fewest switches.
 const SWITCHES: usize = 8;
@@ -202,7 +199,7 @@ pub(super) fn lacks_temperatures(gathered: &Gathered) -> bool {
 }
 
 /// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
-pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]>) -> Vec<String> {
+pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, force: Option<[f64; 3]>) -> Vec<String> {
     let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
     let looks = |of: [&'static str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
         let sizes = [0, 1, 2].map(|axis| {
@@ -214,7 +211,6 @@ pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, up: Option<[f64; 3]
         let shown = Shown::of(of, sizes, stated?);
         shown.swapped().or_else(|| shown.far())
     };
-    let force = up.map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
     let words = [
         looks(["gyros", "°/h"], |second| second.rate, earth),
         looks(["accelerometers", "m/s²"], |second| second.force, force),

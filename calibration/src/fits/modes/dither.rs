@@ -8,7 +8,7 @@ use super::model::largest_order;
 use super::units::LARGEST_HZ;
 use crate::lsq::correlated::Data;
 use crate::numbers::ends;
-use crate::report::figures::short;
+use crate::report::short;
 
 /// Squared standard errors that the highest coefficient must be away from zero.
 const BETTER: f64 = 4.0;

@@ -7,10 +7,9 @@ use toml::{Table, Value};
 
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
-use crate::document::written::{matrix, numbers, tidy};
+use crate::document::{matrix, numbers, tidy};
 use crate::numbers::unit;
-use crate::report::Sigmas;
-use crate::report::words::gyros as gyros_in_words;
+use crate::report::{Sigmas, gyros as gyros_in_words};
 
 /// Multiples of τ after which the servo's transient counts as settled: e⁻¹⁶ of it is left.
 pub const SETTLED: f64 = 8.0;

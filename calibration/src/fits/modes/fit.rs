@@ -14,11 +14,10 @@ use super::servo::{self, Transient};
 use super::switches::Switches;
 use super::{temperatures, units};
 use crate::axes::{main_axis, output_name};
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
-use crate::numbers::real;
+use crate::numbers::{median, real};
 use crate::report::{Curve as Residual, FitReport, Rest, judge};
-use crate::robust::median;
 use crate::runs::table::{Rows, Takes};
 use crate::runs::{Run, Watch};
 

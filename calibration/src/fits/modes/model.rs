@@ -240,15 +240,16 @@ fn drop_rows(data: &mut Data, kept: &mut Vec<f64>, stretch: &mut Vec<usize>, far
     for row in 1..data.len() {
         data.joined[row] &= !far[row - 1];
     }
-    let keep =
-        |values: &[f64]| values.iter().zip(far).filter(|(_, far)| !**far).map(|(value, _)| *value).collect();
-    data.value = keep(&data.value);
-    data.time_s = keep(&data.time_s);
-    data.length_s = keep(&data.length_s);
-    data.columns = data.columns.iter().map(|column| keep(column)).collect();
-    *kept = keep(kept);
-    data.joined = data.joined.iter().zip(far).filter(|(_, far)| !**far).map(|(is, _)| *is).collect();
-    *stretch = stretch.iter().zip(far).filter(|(_, far)| !**far).map(|(is, _)| *is).collect();
+    let numbers = [&mut data.value, &mut data.time_s, &mut data.length_s, kept];
+    numbers.into_iter().chain(&mut data.columns).for_each(|column| keep(column, far));
+    keep(&mut data.joined, far);
+    keep(stretch, far);
+}
+
+/// Keeps what is not far off.
+fn keep<T>(values: &mut Vec<T>, far: &[bool]) {
+    let mut far = far.iter();
+    values.retain(|_| far.next() == Some(&false));
 }
 
 /// °/h from rad/s.

@@ -30,25 +30,21 @@ pub struct Model {
 impl Model {
     /// Its columns among all.
     pub fn columns(&self) -> Vec<usize> {
-        let magnetic = MAX_POWER + 1;
-        let meander = 2 * magnetic;
-        let mut columns: Vec<usize> = (0..=self.static_order).collect();
-        columns.extend((0..=self.magnetic_order).map(|power| magnetic + power));
-        columns.extend(
-            self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| meander + power)),
-        );
-        columns
+        let place = |(term, power): (Term, usize)| (MAX_POWER + 1) * term as usize + power;
+        self.terms().into_iter().map(place).collect()
     }
 
     /// Term and power of each column.
     pub fn terms(&self) -> Vec<(Term, usize)> {
-        let mut terms: Vec<(Term, usize)> =
-            (0..=self.static_order).map(|power| (Term::Static, power)).collect();
-        terms.extend((0..=self.magnetic_order).map(|power| (Term::Magnetic, power)));
-        let meander =
-            self.meander_order.into_iter().flat_map(|order| (0..=order).map(|power| (Term::Meander, power)));
-        terms.extend(meander);
-        terms
+        let orders = [
+            (Term::Static, Some(self.static_order)),
+            (Term::Magnetic, Some(self.magnetic_order)),
+            (Term::Meander, self.meander_order),
+        ];
+        let powers = |(term, order): (Term, Option<usize>)| {
+            order.into_iter().flat_map(move |order| (0..=order).map(move |power| (term, power)))
+        };
+        orders.into_iter().flat_map(powers).collect()
     }
 }
 

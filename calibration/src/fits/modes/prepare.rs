@@ -10,7 +10,8 @@ use super::switches::Switches;
 use super::{checks, document, temperatures};
 use crate::error::Error;
 use crate::runs::Watch;
-use crate::runs::swapped::up;
+use crate::runs::swapped::force_at_rest;
+use crate::runs::table;
 
 /// Length of a window of the residuals, in whole reversal periods (s).
 const WINDOW_S: f64 = 600.0;
@@ -58,17 +59,7 @@ pub(super) fn provisional(transient: &Transient) -> Servo {
 
 /// Earth rate in case axes (rad/s); `None` where the place is not known.
 pub(super) fn earth_rate(wanted: &Wanted<'_>, gathered: &Gathered) -> Result<Option<[f64; 3]>, Error> {
-    let Some(place) = &wanted.place else { return Ok(None) };
-    let rate = place.earth_rate_in_case(gathered.force).ok_or_else(|| {
-        let force = gathered.force.map_or_else(
-            || "the document or the log has no accelerometers".to_owned(),
-            |[x, y, z]| format!("the mean force is ({x:.3}, {y:.3}, {z:.3}) m/s²"),
-        );
-        Error::refused(format!(
-            "the unit cannot be levelled: {force}; it must be within 2 % of one g, x not vertical. Give --pitch and --roll"
-        ))
-    })?;
-    Ok(Some(rate))
+    wanted.place.as_ref().map(|place| table::earth_rate(place, gathered.force)).transpose()
 }
 
 /// Earth rate along the input axis of a gyro in a cell (°/h).
@@ -98,7 +89,7 @@ pub(super) fn check<W: Watch>(
         }
         return Err(Error::Refused(reasons));
     }
-    Ok(checks::attitude(&gathered.seconds, along, wanted.place.as_ref().and_then(up)))
+    Ok(checks::attitude(&gathered.seconds, along, wanted.place.as_ref().and_then(force_at_rest)))
 }
 
 pub(super) fn gaps(gathered: &Gathered, warnings: &mut Vec<String>) {

@@ -6,9 +6,7 @@ use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, Term};
 use crate::axes::{main_axis, output_name};
 use crate::numbers::real;
-use crate::report::figures::{counted, fixed, per_deg_c, short};
-use crate::report::words::together;
-use crate::report::{Coefficient, Curve, Figure, FitReport};
+use crate::report::{Coefficient, Curve, Figure, FitReport, counted, fixed, per_deg_c, short, together};
 
 /// Models of the cross-validation that the report lists for each gyro.
 const MODELS: usize = 5;

@@ -6,7 +6,7 @@ use super::cells::Second;
 use crate::axes::AXES;
 use crate::fits::drift::pieces::steps::step;
 use crate::numbers::real;
-use crate::report::figures::fixed;
+use crate::report::fixed;
 
 /// Most parts of a run that are compared.
 const PARTS: usize = 128;

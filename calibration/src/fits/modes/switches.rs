@@ -7,8 +7,7 @@ use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 
 use super::seen::Seen;
 use crate::error::Error;
-use crate::numbers::{real, seconds};
-use crate::robust::{median, scatter};
+use crate::numbers::{median, real, scatter, seconds};
 use crate::runs::{Run, Watch};
 
 /// Ticks before a switch that show what a reading is like.

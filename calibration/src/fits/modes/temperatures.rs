@@ -6,10 +6,8 @@ use isotherm_protocol::document::Document;
 
 use crate::error::Error;
 use crate::fits::drift::pieces::checks::frozen;
-use crate::numbers::{ends, once_each};
-use crate::report::figures::short;
-use crate::report::words::grouped;
-use crate::robust::median;
+use crate::numbers::{ends, median, once_each};
+use crate::report::{grouped, short};
 use crate::runs::series::Channel;
 use crate::runs::{Run, Watch};
 

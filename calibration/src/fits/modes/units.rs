@@ -6,10 +6,8 @@ use isotherm_protocol::document::{Document, GyroOutput};
 use super::checks::TURNING_DEG_PER_H;
 use super::document::count_arcsec;
 use super::switches::Switches;
-use crate::numbers::real;
-use crate::report::figures::short;
-use crate::report::words::gyros;
-use crate::robust::median;
+use crate::numbers::{median, real};
+use crate::report::{gyros, short};
 
 /// The Earth's rate (°/h).
 const EARTH_DEG_PER_H: f64 = 15.04;

@@ -4,7 +4,7 @@ use isotherm_protocol::document::{AccelOutput, Channel, Document, Filter, GyroOu
 
 use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
 
-use crate::document::plain::plain;
+use crate::document::plain;
 use crate::error::Error;
 use crate::runs::series::Series;
 use crate::runs::{Run, Watch};

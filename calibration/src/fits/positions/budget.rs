@@ -9,7 +9,7 @@ use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::solve::{Positions, Weights, guesses};
 use crate::numbers::{norm, real};
-use crate::report::figures::{counted, short, table};
+use crate::report::{counted, short, table};
 
 /// ″ in one radian.
 pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;

@@ -7,6 +7,7 @@ use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
 use crate::axes::{AXES, main_axis};
+use crate::report::bars;
 
 /// Points of a curve over temperature.
 const POINTS: u32 = 60;
@@ -79,13 +80,13 @@ pub(super) fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[Stri
             let fit = fit.as_ref()?;
             let value = fit.sensors[index].axis[0][i] * ARCSEC_PER_RAD;
             let sigma = fit.axis_sigma(&settings.plan, index, 0)[i] * ARCSEC_PER_RAD * analysis.widened;
-            Some([(*deg_c, value - 1.96 * sigma), (*deg_c, value + 1.96 * sigma), (*deg_c, f64::NAN)])
+            Some((*deg_c, [value, sigma]))
         };
-        let bars = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar).flatten();
+        let known = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar);
 
         let mut content = vec![
             Series::dots("each temperature", Ink::Raw, by_level),
-            Series::line("95 %", Ink::Faint, bars),
+            bars("95 %", Ink::Faint, known),
             Series::line("linear", Ink::Second, curve(&analysis.fit)),
         ];
         if let Some((quadratic, ..)) = &analysis.quadratic {

@@ -6,7 +6,7 @@ use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationTherm
 
 use super::fit::Analysis;
 use super::model::Sensor;
-use crate::document::written::tidy;
+use crate::document::tidy;
 use crate::numbers::{hull, unit};
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.

@@ -14,7 +14,7 @@ use crate::axes::{AXES, sensor_name, several};
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
 use crate::numbers::real;
-use crate::report::figures::{counted, short};
+use crate::report::{counted, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
 pub const GOOD_POSITIONS: usize = 9;

@@ -3,7 +3,7 @@
 use super::pose::Pose;
 use super::track::Track;
 use crate::axes::{sensor_name, several};
-use crate::report::figures::{counted, six};
+use crate::report::{counted, six};
 use crate::runs::faults::{self, Fault};
 
 /// Takes another fault of the same kind in; false where it is another one.

@@ -20,7 +20,7 @@ use super::times::Times;
 use super::track::Track;
 use crate::document::accelerometers;
 use crate::numbers::ends;
-use crate::report::figures::counted;
+use crate::report::counted;
 
 /// How the positions are looked at.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Gravity at the place of a calibration: every scale factor of an accelerometer is relative to it.
 
 use crate::error::Error;
-use crate::report::figures::{short, six};
+use crate::report::{short, six};
 
 /// Standard gravity (m/s²).
 pub const STANDARD_M_PER_S2: f64 = 9.806_65;

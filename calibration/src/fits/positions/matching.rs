@@ -10,7 +10,7 @@ use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
 use crate::numbers::{ends, real};
-use crate::report::figures::{counted, fixed};
+use crate::report::{counted, fixed};
 use crate::runs::swapped::{ORDERS, moved};
 
 /// Largest angle between the direction found and that of the plan (rad): 20°.

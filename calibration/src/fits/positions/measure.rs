@@ -4,7 +4,7 @@ use isotherm_protocol::document::AccelOutput;
 
 use crate::axes::sensor_name;
 use crate::numbers::real;
-use crate::report::figures::short;
+use crate::report::short;
 
 /// Times that a scale factor may be away from what is stated, and one sensor's from another's: beyond it, it is another unit of
 /// measure. Nominal scale factors are off by less.

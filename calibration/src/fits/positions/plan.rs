@@ -231,7 +231,7 @@ mod tests {
         let slanting = up.up(&up.positions[0].attitude, [1e-3; 3]);
         assert!(slanting.iter().zip([0.0, 0.6, 0.8]).all(|(a, b)| (a - b).abs() < 1e-15), "{slanting:?}");
         for (name, text, word) in [
-            ("b.csv", "a,b\n", "first line"),
+            ("b.csv", "a,b\n", "column \"a\""),
             ("c.csv", "name,axis_1_deg,axis_2_deg\nYa,0\n", "line 2"),
             ("d.toml", "[[position]]\nname = \"Ya\"\n", "needs axis_1_deg"),
             ("e.toml", "axis_1 = \"y\"\naxis_2 = \"y\"\nposition = []\n", "two of x, y, z"),

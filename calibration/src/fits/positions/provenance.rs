@@ -8,7 +8,7 @@ use super::budget::ARCSEC_PER_RAD;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::model::SMALL;
-use crate::document::written::tidy;
+use crate::document::tidy;
 use crate::error::Error;
 use crate::numbers::real;
 use crate::report::{FitReport, Sigmas};

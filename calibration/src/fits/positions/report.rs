@@ -13,8 +13,9 @@ use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
 use crate::document::accelerometers;
-use crate::report::figures::{counted, fixed, per_deg_c, short, six};
-use crate::report::{Coefficient, Curve, Figure, FitReport, Verdict, output_unit};
+use crate::report::{
+    Coefficient, Curve, Figure, FitReport, Verdict, counted, fixed, output_unit, per_deg_c, short, six,
+};
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::doubts::LARGEST_TURN_DEG;
 use crate::axes::sensor_name;
-use crate::report::figures::{fixed, short};
+use crate::report::{fixed, short};
 
 /// One sensor beside what the document at hand states of it.
 pub(crate) struct Beside {

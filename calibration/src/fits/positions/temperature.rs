@@ -9,7 +9,7 @@ use super::pose::Pose;
 use crate::axes::several;
 use crate::document::accelerometers;
 use crate::numbers::{ends, mean, once_each};
-use crate::report::figures::fixed;
+use crate::report::fixed;
 
 /// Distance of temperatures that are two (°C).
 pub const LEVEL_GAP_DEG_C: f64 = 5.0;

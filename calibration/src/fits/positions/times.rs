@@ -8,6 +8,7 @@ use super::plan::Plan;
 use super::pose::Pose;
 use super::still::Interval;
 use super::track::Track;
+use crate::csv;
 use crate::error::Error;
 
 /// Rows of the table.
@@ -24,39 +25,22 @@ impl Times {
     /// [`Error::Log`] where it cannot be read, [`Error::Usage`] with what is wrong in it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = read_small_text(path, "read the table of times")?;
-        let wrong = |line: usize, words: String| {
-            Error::Usage(format!("{}:{line}: {words}; a row is start_s,end_s,position[,log]", path.display()))
+        let row = |row: csv::Row<'_>| {
+            let span: [f64; 2] = [row.need("start_s")?, row.need("end_s")?];
+            if !(span[1] > span[0] && span.iter().all(|time| time.is_finite())) {
+                let [start, end] = span;
+                return Err(
+                    row.wrong(&format!("it starts at {start} s and ends at {end} s, which must be later"))
+                );
+            }
+            Ok((span, row.need("position")?, row.get("log")?))
         };
-        let mut rows = Vec::new();
-        let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
-        let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        match lines.next() {
-            Some((_, "start_s,end_s,position" | "start_s,end_s,position,log")) => {}
-            other => {
-                return Err(wrong(other.map_or(1, |o| o.0), "the first line must name the columns".into()));
-            }
-        }
-        for (line, row) in lines {
-            let cells: Vec<&str> = row.split(',').map(str::trim).collect();
-            let (start, end, position, log) = match cells[..] {
-                [start, end, position] => (start, end, position, None),
-                [start, end, position, log] => (start, end, position, Some(log.to_owned())),
-                _ => return Err(wrong(line, format!("{} cells", cells.len()))),
-            };
-            let number = |cell: &str| {
-                let value: Option<f64> = cell.parse().ok().filter(|value: &f64| value.is_finite());
-                value.ok_or_else(|| wrong(line, format!("{cell:?} is not a number of seconds")))
-            };
-            let span = [number(start)?, number(end)?];
-            if span[1] <= span[0] {
-                return Err(wrong(
-                    line,
-                    format!("it ends at {} s, before it starts at {} s", span[1], span[0]),
-                ));
-            }
-            rows.push((span, position.to_owned(), log));
-        }
-        Ok(Self { rows })
+        let rows = csv::rows(&text, &["start_s", "end_s", "position", "log"])
+            .and_then(|rows| rows.into_iter().map(row).collect::<Result<_, String>>());
+        let wrong = |words| {
+            Error::Usage(format!("{}: {words}; a row is start_s,end_s,position[,log]", path.display()))
+        };
+        Ok(Self { rows: rows.map_err(wrong)? })
     }
 
     /// The poses of a run, with their positions' numbers.

@@ -7,7 +7,7 @@ use isotherm_log::offline::Loaded;
 
 use crate::error::Error;
 use crate::numbers::{real, seconds};
-use crate::report::figures::{counted, six};
+use crate::report::{counted, six};
 use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Watch};
 

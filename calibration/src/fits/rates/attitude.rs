@@ -4,16 +4,14 @@
 //! there are swapped for whoever uses the document next. A level unit tells nothing of x and y: the rests behind its turns do.
 
 use isotherm_correction::earth::Place;
-use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 
 use super::earth::carried_along;
 use super::measure::in_case;
 use super::plateaus::Plateau;
 use super::read::Turned;
 use crate::finding::{Finding, Kind};
-use crate::robust::median;
-use crate::runs::swapped::{Looks, Shown, up};
-use crate::size::Size;
+use crate::numbers::{Size, median};
+use crate::runs::swapped::{Looks, Shown, force_at_rest};
 
 /// Time at the beginning of a run that tells its attitude (s).
 const BEGINNING_S: f64 = 1.0;
@@ -44,8 +42,7 @@ type Rest = Option<([f64; 2], usize)>;
 
 fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> Option<(Looks, Rest)> {
     let bins = &run.binned.bins;
-    let stated = up(place).map(|up| up.map(|part| part * STANDARD_GRAVITY_M_PER_S2));
-    let start = stated.or(run.binned.first_force)?;
+    let start = force_at_rest(place).or(run.binned.first_force)?;
     let beginning = bins.iter().take_while(|bin| bin.begin_s < BEGINNING_S).count();
     let shown = |window: std::ops::Range<usize>, stated: [f64; 3]| {
         let forces: Vec<[f64; 3]> = bins.get(window)?.iter().filter_map(|bin| bin.force).collect();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Document, OrientationThermal};
 
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::fits::modes::cells::{along_input_axes, temperature};
 use crate::runs::table::{Rows, Table, Takes};

@@ -11,9 +11,7 @@ use super::steps::Step;
 use crate::axes::main_axis;
 use crate::finding::{Instead, Kind};
 use crate::fits::modes::document::row;
-use crate::numbers::{dot, ends, norm, real};
-use crate::robust::median;
-use crate::size::Size;
+use crate::numbers::{Size, dot, ends, median, norm, real};
 
 /// Share of a run's fastest step from which on a step shows what the table turned about.
 const FAST: f64 = 0.5;

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 use super::fit::Made;
 use super::model::GyroRates;
 use super::over_temperature::Level;
-use crate::document::written::{matrix, numbers, tidy};
+use crate::document::{matrix, numbers, tidy};
 use crate::finding::Kind;
 use crate::numbers::unit;
 use crate::report::Sigmas;

@@ -7,13 +7,10 @@ use super::over_temperature::{Level, OverTemperature};
 use crate::axes::{AXES, main_axis};
 use crate::document::accelerometers;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
-use crate::report::Sigmas;
-use crate::report::figures::fixed;
+use crate::report::{Sigmas, bars, fixed};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 150;
-/// Standard errors of a 95 % interval.
-const WIDE: f64 = 1.96;
 
 /// An element of C over temperature, of a gyro and of the accelerometer along the same case axis.
 struct Element<'a> {
@@ -88,23 +85,17 @@ pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
     let panel = |element: Element<'_>| {
         let all: Vec<(f64, [f64; 2])> =
             over.levels.iter().map(|level| (level.deg_c, element.measured(level))).collect();
-        let bars = all.iter().flat_map(|(deg_c, [value, sigma])| {
-            [(*deg_c, value - WIDE * sigma), (*deg_c, value + WIDE * sigma), (*deg_c, f64::NAN)]
-        });
         let ends = || all.iter().map(|(deg_c, _)| *deg_c);
         let dots = all.iter().map(|(deg_c, [value, _])| (*deg_c, *value));
         let mut content = vec![
             Series::dots("gyro, each temperature", Ink::Raw, dots),
-            Series::line("95 %", Ink::Faint, bars),
+            bars("95 %", Ink::Faint, all.iter().copied()),
             Series::line("gyro", Ink::First, ends().map(|t| (t, element.line_at(t)))),
         ];
         if let Some(accel) = element.accel {
             content.push(Series::line("accelerometer", Ink::Second, ends().map(|t| (t, accel.at(t)))));
             if let Some(sigma) = accel.sigma {
-                let bars = ends().flat_map(|t| {
-                    [(t, accel.at(t) - WIDE * sigma), (t, accel.at(t) + WIDE * sigma), (t, f64::NAN)]
-                });
-                content.push(Series::line("95 % of it", Ink::Faint, bars));
+                content.push(bars("95 % of it", Ink::Faint, ends().map(|t| (t, [accel.at(t), sigma]))));
             }
             let apart = ends().map(|t| (t, element.line_at(t) - accel.at(t)));
             content.push(Series::line("gyro less accelerometer", Ink::Third, apart));

@@ -14,16 +14,13 @@ use super::over_temperature::OverTemperature;
 use super::read::{Turned, read, whole_turns};
 use super::steps::Step;
 use crate::axes::{AXES, main_axis};
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
-use crate::numbers::hull;
-use crate::report::words::of_logs;
-use crate::report::{Figure, FitReport, Verdict};
-use crate::robust::median;
+use crate::numbers::{Size, hull, median};
+use crate::report::{Figure, FitReport, Verdict, of_logs};
 use crate::runs::{Run, Watch};
-use crate::size::Size;
 
 /// Rounds in which the Earth's turning and the fit settle.
 const ROUNDS: usize = 3;

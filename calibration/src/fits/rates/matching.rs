@@ -4,8 +4,7 @@ use super::bins::Bin;
 use super::plateaus::{Plateau, within};
 use super::steps::Step;
 use crate::finding::Kind;
-use crate::numbers::ends;
-use crate::robust::median;
+use crate::numbers::{ends, median};
 
 /// Share of the smallest stated rate below which a plateau is a rest.
 const REST: f64 = 0.5;

@@ -10,7 +10,7 @@ use super::fit::Wanted;
 use super::measure::points;
 use super::model::{GyroRates, Point, solve};
 use super::read::Turned;
-use crate::document::written::tidy;
+use crate::document::tidy;
 use crate::finding::Kind;
 use crate::fits::modes::document::row;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;

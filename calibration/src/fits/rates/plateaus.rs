@@ -1,8 +1,7 @@
 //! Where the table turned steadily: runs of bins between which no gyro changes by more than noise.
 
 use super::bins::Bin;
-use crate::numbers::norm;
-use crate::robust::scatter_of_steps;
+use crate::numbers::{norm, scatter_of_steps};
 
 /// Standard deviations, and share of the rate, by which two neighbouring bins may differ.
 const SIGMAS: f64 = 8.0;

@@ -81,7 +81,7 @@ pub(super) fn read<W: Watch>(
         Some(Some(rate)) => Some(rate.map(deg_per_h)),
         Some(None) => {
             let Binned { first_force: force, troubles, .. } = binned;
-            return Ok(Err(Kind::NotLevel { force, troubles }.in_log(number)));
+            return Ok(Err(Kind::NotLevel { at_beginning: true, force, troubles }.in_log(number)));
         }
     };
     Ok(Ok(Turned { binned, matched, rests: slow(&own, found), earth_start }))

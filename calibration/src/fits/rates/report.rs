@@ -10,9 +10,7 @@ use super::over_temperature::OverTemperature;
 use crate::axes::{AXES, main_axis};
 use crate::finding::Kind;
 use crate::numbers::dot;
-use crate::report::figures::{counted, fixed, per_deg_c, short};
-use crate::report::words::{gyros, together};
-use crate::report::{Coefficient, FitReport};
+use crate::report::{Coefficient, FitReport, counted, fixed, gyros, per_deg_c, short, together};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;

@@ -6,9 +6,10 @@ use isotherm_log::file::read_small_text;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::csv;
 use crate::error::Error;
 use crate::numbers::norm;
-use crate::report::figures::counted;
+use crate::report::counted;
 
 /// Fastest table (°/s).
 const FASTEST_DEG_PER_S: f64 = 20_000.0;
@@ -169,49 +170,14 @@ fn checked(step: Step, runs: usize) -> Result<Step, String> {
 }
 
 fn of_csv(text: &str) -> Result<Vec<Row>, String> {
-    let mut lines =
-        text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    let (_, head) = lines.next().ok_or("it is empty")?;
-    let head: Vec<&str> = head.split(',').map(str::trim).collect();
-    for name in &head {
-        if !["log", "axis", "rate_deg_per_s", "begin_s", "end_s"].contains(name) {
-            return Err(format!(
-                "line 1: column {name:?} is not one of log, axis, rate_deg_per_s, begin_s, end_s (axis by name; \
-                 vectors go into TOML)"
-            ));
-        }
-    }
-    let row = |(index, line): (usize, &str)| {
-        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-        if fields.len() != head.len() {
-            return Err(format!(
-                "line {}: {}, the first line has {}",
-                index + 1,
-                counted(fields.len(), "field", "fields"),
-                head.len()
-            ));
-        }
-        let field = |name: &str| {
-            let place = head.iter().position(|column| *column == name)?;
-            fields.get(place).copied().filter(|field| !field.is_empty())
-        };
-        let number = |name: &str| {
-            let parse = |text: &str| {
-                text.parse().map_err(|_| format!("line {}: {name} is {text:?}, not a number", index + 1))
-            };
-            field(name).map(parse).transpose()
-        };
-        let need = |name: &str| format!("line {}: {name} is missing", index + 1);
-        let log = field("log").map(|text| {
-            text.parse().map_err(|_| format!("line {}: log is {text:?}, not a number", index + 1))
-        });
+    let row = |row: csv::Row<'_>| {
         Ok(Row {
-            log: log.transpose()?,
-            axis: Axis::Name(field("axis").ok_or_else(|| need("axis"))?.to_owned()),
-            rate_deg_per_s: number("rate_deg_per_s")?.ok_or_else(|| need("rate_deg_per_s"))?,
-            begin_s: number("begin_s")?,
-            end_s: number("end_s")?,
+            log: row.get("log")?,
+            axis: Axis::Name(row.need("axis")?),
+            rate_deg_per_s: row.need("rate_deg_per_s")?,
+            begin_s: row.get("begin_s")?,
+            end_s: row.get("end_s")?,
         })
     };
-    lines.map(row).collect()
+    csv::rows(text, &["log", "axis", "rate_deg_per_s", "begin_s", "end_s"])?.into_iter().map(row).collect()
 }

@@ -15,7 +15,7 @@ use isotherm_simulator::{Scenario, Simulation};
 
 use super::fit::{Made, Wanted, make};
 use super::steps::{Step, listed};
-use crate::document::plain::plain;
+use crate::document::plain;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::runs::Run;

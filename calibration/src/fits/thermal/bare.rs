@@ -8,8 +8,9 @@ use isotherm_protocol::document::{
 
 use super::checks::median_step_s;
 use crate::axes::AXES;
-use crate::document::plain::{follows, plain};
+use crate::document::{follows, plain};
 use crate::error::Error;
+use crate::numbers::percentile;
 use crate::runs::{self, series::Series};
 
 /// Longest step of a grid that a document may state (s).
@@ -167,13 +168,6 @@ pub fn carry(document: &mut Document, runs: &[&Series], step_s: f64) -> Option<[
 
 /// A spike limit that the log's own slope does not touch.
 fn spike_limit(raw: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = raw
-        .iter()
-        .zip(raw.iter().skip(1))
-        .map(|(a, b)| (b - a).abs())
-        .filter(|step| step.is_finite())
-        .collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    let high = steps.get(steps.len() * 99 / 100).copied().unwrap_or(0.0);
+    let high = percentile(raw.iter().zip(raw.iter().skip(1)).map(|(a, b)| (b - a).abs()), 99);
     if high > 0.2 { libm::ceil(10.0 * high) } else { 2.0 }
 }

@@ -1,7 +1,6 @@
 //! Plateaus, ramps between turning points, and the pieces that cross-validation leaves out.
 
-use crate::numbers::{ends, real};
-use crate::robust::median;
+use crate::numbers::{ends, median, percentile, real};
 
 /// Share of the range of temperature by which a turning point must stand out.
 const STANDS_OUT: f64 = 0.1;
@@ -58,10 +57,7 @@ impl History {
         let all = runs.iter().flat_map(|(t, _)| t.iter().copied()).filter(|t| t.is_finite());
         let mut history = Self { range_deg_c: ends(all), ..Self::default() };
         let slopes: Vec<Vec<f64>> = runs.iter().map(|(t, window)| slopes(t, *window)).collect();
-        let mut sizes: Vec<f64> =
-            slopes.iter().flatten().filter(|s| s.is_finite()).map(|s| s.abs()).collect();
-        sizes.sort_unstable_by(f64::total_cmp);
-        let fastest = sizes.get(sizes.len() * 98 / 100).copied().unwrap_or(0.0);
+        let fastest = percentile(slopes.iter().flatten().map(|slope| slope.abs()), 98);
         let limit = (PLATEAU_SHARE * fastest).min(PLATEAU_DEG_C_PER_S);
         for ((temperature, window_s), slopes) in runs.iter().zip(&slopes) {
             history.add(temperature, *window_s, slopes, limit);

@@ -8,14 +8,11 @@ use super::samples::Samples;
 use super::stand::Stand;
 use crate::axes::sensor_name;
 use crate::fits::drift::pieces::checks::moves;
-use crate::numbers::{dot, ends, norm, real, seconds};
-use crate::report::Rest;
-use crate::report::figures::{counted, short};
-use crate::robust::{median, median_if_any};
+use crate::numbers::{Size, dot, ends, median, median_if_any, norm, real, seconds};
+use crate::report::{Rest, counted, short};
 use crate::runs::faults::{self, Fault};
 use crate::runs::series::{Series, Ticks};
 use crate::runs::swapped::{Looks, Shown};
-use crate::size::Size;
 
 /// How far a gyro on a rate table may be from what is stated: share of the rate, and beside it (°/s).
 const TABLE_SHARE: f64 = 0.05;

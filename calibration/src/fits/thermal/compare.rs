@@ -9,13 +9,10 @@ use super::columns::Term;
 use super::outcome::{Outcome, axis_of};
 use super::stand::Stand;
 use crate::axes::output_name;
-use crate::document::accelerometers;
-use crate::document::written::Written;
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
-use crate::numbers::real;
-use crate::report::figures::short;
-use crate::report::{Curve, Rest};
-use crate::robust::scatter_of_steps;
+use crate::numbers::{real, scatter_of_steps};
+use crate::report::{Curve, Rest, short};
 use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
 

@@ -13,8 +13,9 @@ use super::model::{Dynamics, Spec};
 use super::samples::Samples;
 use super::select::Target;
 use super::settings::{Method, Settings};
+use crate::document::tidy;
 use crate::error::Error;
-use crate::numbers::real;
+use crate::numbers::{percentile, real};
 
 /// For the stepwise methods, whose derivatives know nothing of lags: smoothing, its delay being all the lag that there is, and
 /// derivative step (s).
@@ -75,7 +76,7 @@ pub(super) fn choose_filter(
                 cost += solution.map_or(0.0, |solution| libm::log(solution.rms));
             }
         }
-        trial.branch_dead_band_deg_c2_per_s3 = Some(crate::document::written::tidy(dead_band));
+        trial.branch_dead_band_deg_c2_per_s3 = Some(tidy(dead_band));
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
             best = Some((cost, trial));
         }
@@ -104,9 +105,6 @@ pub(super) fn longest_run_s(samples: &[Samples]) -> f64 {
 
 /// A twentieth of what Ṫ·T̈ reaches: the blend between run-up and braking.
 fn usual_product(rate: &[f64], acceleration: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> =
-        rate.iter().zip(acceleration).map(|(r, a)| (r * a).abs()).filter(|p| p.is_finite()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let high = sizes.get(sizes.len() * 95 / 100).copied().unwrap_or(0.0);
-    (0.05 * high).max(1e-12)
+    let sizes = rate.iter().zip(acceleration).map(|(r, a)| (r * a).abs());
+    (0.05 * percentile(sizes, 95)).max(1e-12)
 }

@@ -10,7 +10,7 @@ use super::columns::{Basis, Columns};
 use super::fit::Sensor;
 use super::samples::Samples;
 use crate::error::Error;
-use crate::report::figures::{counted, short};
+use crate::report::{counted, short};
 
 /// What chambers for instruments hardly reach (°C).
 const HOTTEST_DEG_C: f64 = 130.0;

@@ -7,8 +7,8 @@ use isotherm_protocol::document::{AccelSensor, Curve, GyroSensor, Shape, StatedT
 
 use super::columns::{Basis, Branch, Term, tau_s};
 use super::scale::{Holds, put};
-use crate::document::written::tidy;
-use crate::report::figures::per_deg_c;
+use crate::document::tidy;
+use crate::report::per_deg_c;
 
 /// The dynamic part of a model.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -13,13 +13,12 @@ use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
 use crate::axes::output_name;
-use crate::document::accelerometers;
-use crate::document::written::Written;
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
+use crate::numbers::Size;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
-use crate::size::Size;
 
 /// Everything that gathers on the way.
 #[derive(Debug)]

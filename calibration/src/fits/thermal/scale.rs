@@ -12,10 +12,10 @@
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::{Curve, Shape};
 
-use crate::document::written::tidy;
-use crate::lsq::weighted::once;
+use crate::document::tidy;
+use crate::lsq::weighted::beside_cubic;
 use crate::numbers::real;
-use crate::report::figures::short;
+use crate::report::short;
 
 /// Highest power of temperature in a scale factor error.
 pub const HIGHEST: usize = 2;
@@ -86,21 +86,15 @@ pub fn told(gyro: bool, inputs: &[f64], temperature: &[f64], [low, high]: [f64; 
 }
 
 /// What a gyro showed without its noise: a cubic over temperature for each run.
-pub fn smoothed(shown: &[f64], run: &[usize], temperature: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
-    let middle = 0.5 * (low + high);
-    let half = (0.5 * (high - low)).max(1e-9);
+pub fn smoothed(shown: &[f64], run: &[usize], temperature: &[f64], range: [f64; 2]) -> Vec<f64> {
     let runs = run.last().map_or(0, |last| last + 1);
     let mut smooth = vec![f64::NAN; shown.len()];
     for of in 0..runs {
         let rows: Vec<usize> = (0..shown.len()).filter(|&row| run[row] == of).collect();
-        let values: Vec<f64> = rows.iter().map(|&row| shown[row]).collect();
-        let power = |power: i32| -> Vec<f64> {
-            rows.iter().map(|&row| ((temperature[row] - middle) / half).powi(power)).collect()
-        };
-        let powers = [power(0), power(1), power(2), power(3)];
-        let columns: Vec<&[f64]> = powers.iter().map(Vec::as_slice).collect();
-        let Some(solution) = once(&columns, &values, &vec![1.0; rows.len()], None) else { continue };
-        for (row, (value, left)) in rows.iter().zip(values.iter().zip(&solution.residual)) {
+        let [values, at] =
+            [shown, temperature].map(|of| rows.iter().map(|&row| of[row]).collect::<Vec<f64>>());
+        let Some(left) = beside_cubic(&at, range, &values, &vec![1.0; rows.len()]) else { continue };
+        for (row, (value, left)) in rows.iter().zip(values.iter().zip(&left)) {
             smooth[*row] = value - left;
         }
     }

@@ -12,8 +12,7 @@ use super::noise::Noise;
 use super::scale::{self, Kept};
 use crate::lsq::folds::{Folds, Shrink};
 use crate::lsq::weighted::{Solution, once, solve};
-use crate::numbers::{ends, hull};
-use crate::robust::{block_length, is_white, median_if_any};
+use crate::numbers::{block_length, ends, hull, is_white, median_if_any};
 
 /// Score of a larger model, as a share of that of a smaller one, above which the smaller one is kept.
 const NO_BETTER: f64 = 0.985;

@@ -7,7 +7,7 @@ use super::branches::History;
 use super::columns::{Branch, Columns, Term};
 use super::select::Target;
 use crate::lsq::weighted::solve;
-use crate::report::figures::counted;
+use crate::report::counted;
 
 /// Rounds of rate and acceleration.
 const ROUNDS: usize = 60;

@@ -11,13 +11,12 @@ use super::samples::Samples;
 use super::scale::{Kept, smoothed, told};
 use super::select::{Target, equal_temperature};
 use super::stand::{Site, Stand};
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
-use crate::numbers::{dot, real};
+use crate::numbers::{Size, dot, real};
 use crate::report::Rest;
-use crate::runs::table::Table;
+use crate::runs::table::{Table, earth_rate};
 use crate::runs::{Run, Watch};
-use crate::size::Size;
 
 /// Shortest windows of a levelling (s).
 const LEVELLING_S: f64 = 60.0;
@@ -38,19 +37,7 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Wa
         }
         None => None,
     };
-    let rate = place.earth_rate_in_case(mean_force).ok_or_else(|| {
-        Error::refused(format!(
-            "{}: the unit cannot be levelled{}. State --roll and --pitch, or remove the mean with --remove-mean",
-            run.name,
-            mean_force.map_or_else(
-                || ": it has no accelerometers".to_owned(),
-                |[x, y, z]| format!(
-                    " from its accelerometers, with a mean of ({x:.3}, {y:.3}, {z:.3}) m/s²: it must be one g within \
-                     2 %, with x not vertical"
-                )
-            )
-        ))
-    })?;
+    let rate = earth_rate(place, mean_force).map_err(|error| error.of(&run.name))?;
     let deg_per_h = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
     Ok(match &stand.turning {
         None => Rest { rate_deg_per_h: Some(deg_per_h), force_m_per_s2: *force_m_per_s2, ..Rest::default() },

@@ -7,8 +7,7 @@
 //! Nemirovski 1997]: long on plateaus and ramps, none at all where a ramp begins.
 
 use crate::lsq::local::parabola;
-use crate::numbers::{ends, real};
-use crate::robust::{SIGMA_PER_MAD, median, median_if_any};
+use crate::numbers::{SIGMA_PER_MAD, ends, median, median_if_any, real};
 
 /// Length of the bins whose means are smoothed (s); one reading where they come more seldom.
 const BIN_S: f64 = 2.0;

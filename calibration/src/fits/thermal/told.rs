@@ -10,8 +10,7 @@ use super::model::described;
 use super::outcome::Outcome;
 use super::scale::Kept;
 use super::select::{Target, Tried};
-use crate::report::figures::short;
-use crate::report::{Coefficient, Curve, FitReport, Verdict, output_unit, residuals};
+use crate::report::{Coefficient, Curve, FitReport, Verdict, output_unit, residuals, short};
 
 impl Outcome {
     /// Says which sensors keep their scale factors, and why.

@@ -5,9 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fits::positions::pose::Pose;
 use crate::lsq::linear::{SINGULAR, Weak, solve};
-use crate::numbers::real;
-use crate::report::figures::short;
-use crate::size::Size;
+use crate::numbers::{Size, real};
+use crate::report::short;
 
 /// Most that may be left of a gyro's scatter over the poses, in poses that the fit has not seen, by what there was.
 const LARGEST_SHARE: f64 = 0.8;

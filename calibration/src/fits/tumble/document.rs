@@ -9,7 +9,7 @@ use super::acceleration::GyroDrift;
 use super::fit::Tumble;
 use super::fit::odd::odd;
 use super::gyro::GyroFit;
-use crate::document::written::tidy;
+use crate::document::tidy;
 use crate::fits::positions::document::level;
 
 /// Puts what was found into a document; gives what is to be said of it.

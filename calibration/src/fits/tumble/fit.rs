@@ -8,9 +8,8 @@ use crate::fits::positions::faults;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::still::{StillLimits, still};
 use crate::fits::positions::track::Track;
-use crate::numbers::{dot, ends, norm, real, unit};
-use crate::report::figures::{counted, short};
-use crate::size::Size;
+use crate::numbers::{Size, dot, ends, norm, real, unit};
+use crate::report::{counted, short};
 
 use super::accel::{self, AccelFit, SENSORS};
 use super::acceleration::{self, GyroDrift};

@@ -7,8 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::fits::positions::track::Track;
 use crate::lsq::nonlinear::{NoSolution, solve};
-use crate::numbers::{norm, real};
-use crate::size::Size;
+use crate::numbers::{Size, norm, real};
 
 use search::Start;
 

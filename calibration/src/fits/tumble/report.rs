@@ -10,17 +10,17 @@ use super::acceleration::GyroDrift;
 use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
 use crate::axes::AXES;
-use crate::document::accelerometers;
-use crate::document::written::tidy;
+use crate::document::{accelerometers, tidy};
 use crate::error::Error;
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
-use crate::numbers::{norm, unit};
-use crate::report::figures::{counted, fixed, short, six};
-use crate::report::{Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict, output_unit};
-use crate::size::Size;
+use crate::numbers::{Size, norm, unit};
+use crate::report::{
+    Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict, counted, fixed, output_unit, short,
+    six,
+};
 
 /// Times by which the rms may grow in poses that the fit has not seen.
 const LARGEST_GROWTH: f64 = 2.0;

@@ -1,6 +1,6 @@
 //! How what was found on the stand is held against the truth.
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::fit::{Analysis, Settings, analyse};
 use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::fits::positions::still::StillLimits;

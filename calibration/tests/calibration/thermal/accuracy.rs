@@ -6,11 +6,11 @@
 //! growing with depth, or changing sign from layer to layer), times a thermo-optic coefficient that grows with temperature, beside a
 //! static bias that is no polynomial, and white noise of 0.001 °/√h. Sizes, contacts, windings and thermometers differ by seed.
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::thermal::{Method, Settings, fit};
+use isotherm_calibration::numbers::Size;
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::runs::table::Table;
-use isotherm_calibration::size::Size;
 use isotherm_correction::sample::{ChannelName, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, fit};
+use isotherm_calibration::numbers::Size;
 use isotherm_calibration::runs::Run;
 use isotherm_calibration::runs::table::Table;
-use isotherm_calibration::size::Size;
 use isotherm_correction::units::Span;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
-use isotherm_calibration::document::written::Written;
+use isotherm_calibration::document::Written;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Span;
 use isotherm_log::part::{LogFiles, Part};
@@ -114,7 +114,7 @@ fn folders_recordings_and_several_units() {
         (&["whole.mcap", "other.mcap", "--unit", "B"], "whole.mcap has no raw ticks of unit B"),
         (&["whole.mcap", "./whole.mcap"], "is given twice"),
         (&["whole.mcap", "--judge", "whole.mcap"], "another part (--duration"),
-        (&["whole.mcap", "--latitude", "55", "--heading", "30"], "State --roll and --pitch"),
+        (&["whole.mcap", "--latitude", "55", "--heading", "30"], "Give --pitch and --roll"),
         (&["whole.mcap", "--axis", "z", "--rate", "0", "--rate", "20"], "2 times --rate for 1 log"),
         (&["whole.mcap", "--axis", "z", "--rate", "20"], "20.000 °/s are stated"),
         (&["whole.mcap", "--axis", "z", "--rate", "0.1"], "slower turns do not determine"),

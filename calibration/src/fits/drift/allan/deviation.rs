@@ -138,10 +138,9 @@ fn modified(x: &[f64], m: usize) -> (f64, usize) {
     (sum, count)
 }
 
-/// Averaging lengths in octaves or decades, as far as a log of `ticks` allows.
-pub fn lengths(ticks: usize, factor: usize) -> Vec<usize> {
-    let lengths = std::iter::successors(Some(1_usize), |m| m.checked_mul(factor.max(2)));
-    lengths.take_while(|m| 3 * m <= ticks).collect()
+/// Averaging lengths in octaves, as far as a log of `ticks` allows.
+pub fn lengths(ticks: usize) -> Vec<usize> {
+    std::iter::successors(Some(1), |m| Some(2 * m)).take_while(|m| 3 * m <= ticks).collect()
 }
 
 #[cfg(test)]
@@ -198,8 +197,7 @@ mod tests {
 
     #[test]
     fn lengths_go_as_far_as_the_log() {
-        assert_eq!(lengths(100, 2), [1, 2, 4, 8, 16, 32]);
-        assert_eq!(lengths(300, 10), [1, 10, 100]);
-        assert!(lengths(2, 2).is_empty());
+        assert_eq!(lengths(100), [1, 2, 4, 8, 16, 32]);
+        assert!(lengths(2).is_empty());
     }
 }

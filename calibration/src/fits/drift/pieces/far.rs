@@ -1,7 +1,7 @@
 //! Readings far beyond the noise: single ones, or a time in which the unit was moved.
 
 use crate::fits::drift::columns::Columns;
-use crate::report::figures::{counted, short};
+use crate::report::{counted, short};
 
 /// Readings farther than this from the middle one (robust standard deviations).
 const FAR: f64 = 50.0;

@@ -1,9 +1,8 @@
 //! A step in readings that are otherwise steady: no drift, but a log of two states.
 
 use crate::fits::drift::columns::Columns;
-use crate::numbers::real;
-use crate::report::figures::short;
-use crate::robust::{SIGMA_PER_MAD, median};
+use crate::numbers::{SIGMA_PER_MAD, median, real};
+use crate::report::short;
 
 /// Parts of a log whose means are compared, and the fewest ticks of one.
 const PARTS: usize = 128;

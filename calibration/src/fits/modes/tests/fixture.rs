@@ -12,7 +12,7 @@ use isotherm_simulator::presets::zeeman_rest;
 use isotherm_simulator::zeeman::Zeeman;
 use isotherm_simulator::{Scenario, Simulation, Step};
 
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::fits::modes::fit::{Made, Wanted, make};
 use crate::fits::modes::model::{Asked, Term, deg_per_h};
 use crate::fixture::simulated;

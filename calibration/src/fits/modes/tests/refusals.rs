@@ -10,7 +10,7 @@ use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 
 use super::fixture::{base, cycle, events, fitted, scenario, wanted, zeeman};
-use crate::document::written::Written;
+use crate::document::Written;
 use crate::error::Error;
 use crate::fits::modes::fit::{Made, Wanted, make};
 use crate::fits::modes::model::Term;

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Attitude, Plan, Position, mounting};
+use crate::csv;
 use crate::numbers::{norm, unit};
 
 /// Reads the text of a file with a plan: CSV or TOML. What is wrong is told with the name.
@@ -87,29 +88,17 @@ impl Written {
     }
 }
 
-/// Rows `name,axis_1_deg,axis_2_deg` behind a line that names them.
+/// Rows of `name`, `axis_1_deg` and `axis_2_deg`.
 fn of_csv(text: &str) -> Result<Written, String> {
-    let mut lines =
-        text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    match lines.next() {
-        Some((_, "name,axis_1_deg,axis_2_deg")) => {}
-        head => {
-            return Err(format!(
-                "the first line is {:?}, must be name,axis_1_deg,axis_2_deg",
-                head.map(|h| h.1)
-            ));
-        }
-    }
-    let row = |(index, line): (usize, &str)| {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        let [name, first, second] = cells[..] else {
-            return Err(format!("line {}: {} cells, must be three", index + 1, cells.len()));
-        };
-        let number =
-            |cell: &str| cell.parse().map_err(|_| format!("line {}: {cell:?} is not a number", index + 1));
-        let (first, second) = (number(first)?, number(second)?);
-        Ok(WrittenPosition { name: name.into(), axis_1_deg: Some(first), axis_2_deg: Some(second), up: None })
+    let row = |row: csv::Row<'_>| {
+        Ok(WrittenPosition {
+            name: row.need("name")?,
+            axis_1_deg: Some(row.need("axis_1_deg")?),
+            axis_2_deg: Some(row.need("axis_2_deg")?),
+            up: None,
+        })
     };
-    let position = lines.map(row).collect::<Result<_, _>>()?;
+    let position = csv::rows(text, &["name", "axis_1_deg", "axis_2_deg"])?.into_iter().map(row);
+    let position = position.collect::<Result<_, String>>()?;
     Ok(Written { axis_1: along_1(), axis_2: along_2(), position })
 }

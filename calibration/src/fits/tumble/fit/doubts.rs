@@ -10,9 +10,8 @@ use crate::fits::positions::track::Track;
 use crate::fits::tumble::gyro::LARGEST_LEFT_DEG;
 use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::lsq::nonlinear::NoSolution;
-use crate::numbers::real;
-use crate::report::figures::short;
-use crate::size::Size;
+use crate::numbers::{Size, real};
+use crate::report::short;
 
 /// Largest standard error of a scale factor that is still a result (relative).
 const LARGEST_SIGMA: f64 = 0.01;

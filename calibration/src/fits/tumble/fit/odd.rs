@@ -6,7 +6,7 @@ use super::Tumble;
 use crate::axes::{AXES, several};
 use crate::fits::positions::measure;
 use crate::fits::positions::sense::{Beside, found_along, out_of_place, places, turned};
-use crate::report::figures::short;
+use crate::report::short;
 
 /// What to do where sensors lie along the others' axes or the other way round: the fewest mistakes that make it.
 ///
