@@ -261,3 +261,75 @@ impl Found {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use isotherm_correction::sample::{ChannelName, TemperatureReading};
+    use isotherm_correction::units::{Span, Timestamp};
+    use isotherm_protocol::document::{Channel, Filter};
+
+    use super::super::bare;
+    use super::super::noise::Thermometer;
+    use super::*;
+    use crate::fixture::noise;
+
+    const WINDOW_S: f64 = 10.0;
+
+    /// A chamber's cycle with holds at both ends (°C), by window.
+    fn cycle() -> Vec<f64> {
+        let mut t = vec![20.0];
+        for (to, windows) in [(20.0, 60), (-40.0, 360), (-40.0, 120), (60.0, 600), (60.0, 120), (20.0, 240)] {
+            let from = t[t.len() - 1];
+            t.extend((1..=windows).map(|i| from + (to - from) * f64::from(i) / f64::from(windows)));
+        }
+        t
+    }
+
+    /// Whether T̈ is chosen for a gyro that has a little of it, by the noise of a thermometer (°C) that the columns are without.
+    fn leads(sigma: f64) -> bool {
+        let name = "gyro0".to_owned();
+        let cycle = cycle();
+        let middles = |first: f64| (0_u32..).map(move |i| (f64::from(i) + first) * WINDOW_S);
+        let readings = cycle.iter().zip(middles(0.0)).map(|(t, time_s)| TemperatureReading {
+            channel: ChannelName::from(&name).unwrap(),
+            time: Timestamp::from_ns(Span::from_s(time_s).as_ns()),
+            raw: *t,
+        });
+        let samples = [Samples {
+            window_s: WINDOW_S,
+            time_s: middles(0.5).take(cycle.len() - 1).collect(),
+            temperatures: [(name.clone(), readings.collect())].into(),
+            thermometers: [(name.clone(), Thermometer { usual: 20.0, sigma, step_s: WINDOW_S })].into(),
+            ..Samples::default()
+        }];
+        let filter = Filter { smoothing_s: 20.0, derivative_step_s: 20.0, ..bare::filter(WINDOW_S) };
+        let channel = Channel {
+            name: name.clone(),
+            conversion_deg_c: vec![0.0, 1.0],
+            range_deg_c: [-80.0, 130.0],
+            spike_limit_deg_c: 100.0,
+        };
+        let known =
+            Known { history: History::of(&[(&cycle[1..], WINDOW_S)]), temperature: cycle[1..].to_vec() };
+        let mut columns = Columns::new(known.basis(channel, &filter), &samples);
+        let (lag, led) = (Term::Lag(30_000, 0), Term::Acceleration(Branch::Both, 0));
+        columns.make(&[lag, led]).unwrap();
+        let mut noise = noise();
+        let parts = columns.get(lag).iter().zip(columns.get(led));
+        let values: Vec<f64> = parts.map(|(lag, led)| 20.0 * lag + 300.0 * led + 0.02 * noise()).collect();
+        let target = Target {
+            weights: vec![1.0; values.len()],
+            run: vec![0; values.len()],
+            values,
+            ..Target::default()
+        };
+        let sensor = Sensor { gyro: true, index: 0, name: name.clone(), channel: name, dead: None };
+        let joint = Joint::of(columns, &samples, (&known, 15000.0), &[(&sensor, &target)]).unwrap();
+        joint.plans[joint.best.unwrap().0].leads
+    }
+
+    #[test]
+    fn what_fits_hardly_better_is_not_chosen_where_it_passes_on_a_thermometers_noise() {
+        assert!(leads(0.0) && !leads(0.003));
+    }
+}
