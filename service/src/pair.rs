@@ -281,8 +281,8 @@ mod tests {
         assert_eq!(pair.look(Instant::now()), Some(true));
     }
 
-    #[test]
-    fn a_unit_that_appears_beside_another_instance_waits_for_what_that_one_knows() {
+    /// An intake with a unit that has appeared beside another instance, and how many frames it has published.
+    fn beside_another() -> (Arc<Pair>, Intake, Arc<AtomicU64>) {
         let pair = Arc::new(Pair::new(&Settings::default(), "me".to_owned(), 2, vec![other()]));
         let published = Arc::new(AtomicU64::new(0));
         let count = Arc::clone(&published);
@@ -296,21 +296,42 @@ mod tests {
         let intake = Intake::new(Settings::default(), Calibrations::default(), outlets);
         let intake = intake.paired_with(Arc::clone(&pair));
         pair.opened(&intake, &BTreeSet::new());
-        let start = Instant::now();
         for sequence in 0..20 {
             let end_time = Timestamp::from_ns(i64::try_from(sequence).unwrap() * 5_000_000);
             let readings = [1.0, 2.0, 3.0].into_iter().collect();
             let tick =
                 GyroTick { sequence, end_time, duration: Span::from_ms(5), readings, ..GyroTick::default() };
             let frame = encode(&GyroBatch { output: OutputKind::Counts, ticks: vec![tick] }).unwrap();
-            intake.receive("imu/U/raw/gyro", Some(&frame), start);
+            intake.receive("imu/U/raw/gyro", Some(&frame), Instant::now());
         }
+        (pair, intake, published)
+    }
+
+    #[test]
+    fn a_unit_that_appears_beside_another_instance_waits_for_what_that_one_knows() {
+        let start = Instant::now();
+        let (pair, intake, published) = beside_another();
         let speaks_after = |ms| {
             let now = start + Duration::from_millis(ms);
             intake.each_unit(|actor| actor.watch_speech(now, &pair.standing()).spoke)
         };
         assert_eq!((speaks_after(100), published.load(Ordering::Relaxed)), (vec![false], 0));
-        assert_eq!(speaks_after(2500), [true], "nobody else speaks");
+        assert_eq!(speaks_after(3000), [true], "nobody else speaks");
         assert!(published.load(Ordering::Relaxed) > 0);
+    }
+
+    #[test]
+    fn what_is_asked_while_nobody_publishes_any_more_waits_for_the_takeover() {
+        let (pair, intake, _) = beside_another();
+        let unit = UnitId::new("U").unwrap();
+        assert!(!intake.answers_for(&unit), "the other does");
+        pair.go("other");
+        std::thread::scope(|scope| {
+            let answers = scope.spawn(|| intake.answers_for(&unit));
+            // However long that is, the answer is the same; it is long enough for one that does not wait.
+            std::thread::sleep(Duration::from_millis(30));
+            intake.with(&unit, |actor| actor.speak(Instant::now(), Duration::ZERO)).unwrap();
+            assert!(answers.join().unwrap());
+        });
     }
 }
