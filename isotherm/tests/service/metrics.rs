@@ -23,9 +23,9 @@ use zenoh::Session;
 
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// A service with metrics on a port of the system's choice.
+/// A service with metrics on a port of the system's choice, where it is not said.
 async fn service(settings: Settings) -> (RunningService, Session, SocketAddr) {
-    let listen = Some("127.0.0.1:0".parse().unwrap());
+    let listen = settings.metrics.listen.or(Some("127.0.0.1:0".parse().unwrap()));
     let settings = Settings { metrics: MetricsSettings { listen, allow_remote: false }, ..settings };
     let session = open(&settings.zenoh.session).await.unwrap();
     let connect = locators(&session);
@@ -77,7 +77,10 @@ fn until(address: SocketAddr, status: u16) -> Answer {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn the_page_says_what_came_in_and_what_went_out() {
-    let (service, session, address) = service(Settings::default()).await;
+    // An address that no other test has: what is free after the end stays free.
+    let listen = Some("127.0.0.77:0".parse().unwrap());
+    let metrics = MetricsSettings { listen, ..MetricsSettings::default() };
+    let (service, session, address) = service(Settings { metrics, ..Settings::default() }).await;
     let empty = page(address);
     assert_eq!(empty.value("isotherm_units", &[]), Some(0.0));
     assert_eq!(empty.value("isotherm_build_info", &[("version", env!("CARGO_PKG_VERSION"))]), Some(1.0));

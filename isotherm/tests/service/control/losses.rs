@@ -18,9 +18,11 @@ fn told<'s>(status: &'s ServiceStatus, kind: &str) -> Option<&'s str> {
     status.faults.iter().find(|fault| fault.kind == kind).map(|fault| fault.first.as_str())
 }
 
-/// Removes a folder into which the service may be writing.
+/// Removes a folder into which the service may be writing: from its place at once, so that nobody meets half of it there.
 fn remove(folder: &Path) {
-    while let Err(error) = std::fs::remove_dir_all(folder) {
+    let gone = folder.with_file_name("gone");
+    std::fs::rename(folder, &gone).unwrap();
+    while let Err(error) = std::fs::remove_dir_all(&gone) {
         assert_eq!(error.kind(), ErrorKind::DirectoryNotEmpty, "{error}");
     }
 }
