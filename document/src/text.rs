@@ -68,13 +68,20 @@ impl<'t> Reader<'t> {
             return None;
         }
         let (root, errors) = parse_toml(text);
+        let mut before = None;
         for error in &errors {
             let span = error.span().unwrap_or(0..0);
-            let message = match error.message() {
-                DUPLICATE_KEY => {
+            let message = match (error.message(), spaced_number(text, span.start)) {
+                (DUPLICATE_KEY, _) => {
                     format!("TOML: {DUPLICATE_KEY} `{}`: remove one", self.excerpt(span.clone()))
                 }
-                other => format!("TOML: {other}"),
+                // The parser finds fault with each part of it.
+                (_, Some((line, ..))) if before == Some(line) => continue,
+                (_, Some((line, spaced, number))) => {
+                    before = Some(line);
+                    format!("TOML: `{spaced}` has blanks between its digits: write {number}")
+                }
+                (other, None) => format!("TOML: {other}"),
             };
             self.report_at(span.start, "", message);
         }
@@ -100,9 +107,41 @@ impl<'t> Reader<'t> {
     }
 }
 
+/// In the line of an offset a number with blanks between its digits: where the line starts, the number as it stands there, and as it
+/// must be written.
+fn spaced_number(text: &str, offset: usize) -> Option<(usize, &str, String)> {
+    let start = text.get(..offset)?.rfind('\n').map_or(0, |at| at + 1);
+    let line = text.get(start..)?.lines().next()?;
+    let value = line.split_once('=').map_or(line, |(_, value)| value).split('#').next()?;
+    let items = value.split(['[', ']', '{', '}', '=', ',']).map(str::trim);
+    let mut spaced = items.filter(|item| item.contains(char::is_whitespace));
+    spaced.find_map(|item| {
+        let number: String = item.split_whitespace().collect();
+        let is_number = number.contains(|c: char| c.is_ascii_digit()) && number.parse::<f64>().is_ok();
+        is_number.then_some((start, item, number))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_with_blanks_between_its_digits_is_told_once_with_what_to_write() {
+        for (text, spaced, number) in [
+            ("a = 1\nb = 1 440\n", "1 440", "1440"),
+            ("a = 1\nb = 12\u{202f}345.5 # pasted\n", "12\u{202f}345.5", "12345.5"),
+            ("a = 1\nb = [1, -1\u{a0}440, 2]\n", "-1\u{a0}440", "-1440"),
+        ] {
+            let mut reader = Reader::new(text, Some("f"));
+            assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
+            let problems = reader.into_problems().unwrap();
+            let words = format!("TOML: `{spaced}` has blanks between its digits: write {number}");
+            assert_eq!(problems.len(), 1, "{problems:?}");
+            assert_eq!((problems[0].line, &problems[0].message), (2, &words));
+        }
+        assert_eq!(spaced_number("a = 1 b\n", 6), None);
+    }
 
     #[test]
     fn a_text_with_more_errors_than_are_listed_is_not_read_to_its_end() {
