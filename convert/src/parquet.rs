@@ -12,7 +12,6 @@
 //! Messages are written as they came: in their order, doubled where they were. Where ticks of one stream have different
 //! numbers or kinds of readings, the columns are there for all of them and empty where a tick has none.
 
-mod columns;
 mod rows;
 mod streams;
 mod table;
@@ -39,7 +38,7 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
             let partial = conversion.place.partial(&path)?;
             let writing = partial.writing().to_owned();
             partials.push(partial);
-            Ok::<_, Error>(writing)
+            Ok(writing)
         })?;
         tables.insert(unit.clone(), created);
     }

@@ -1,220 +1,199 @@
-//! The rows of each stream's messages.
+//! What each stream's rows hold, column by column.
 
-use std::fmt::Write as _;
-use std::iter::once;
-
-use isotherm_correction::sample::{GyroTick, LasingMode, SensorFlags};
+use isotherm_correction::sample::{self, AccelTick, GyroTick, LasingMode, OutputKind, SensorFlags};
 use isotherm_correction::units::Span;
-use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
+use isotherm_log::streams::contents::{CorrectedShape, Shape, Shapes};
+use isotherm_protocol::corrected::{AppliedTemperature, CorrectedTick, Revision};
 use isotherm_protocol::reference::Reference;
-use isotherm_protocol::status::Status;
 
-use super::columns::{Sensors, padded};
-use super::table::{Cell, Table};
-use isotherm_log::error::Error;
-use isotherm_log::streams::contents::CorrectedShape;
+use super::table::{I32, I64, Kind, Row, U64, full, sparse};
 
-/// A row per gyro tick.
-pub(super) fn write_gyro(
-    table: Option<&mut Table>,
-    sensors: Sensors,
-    received_ns: u64,
-    batch: &GyroBatch,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    for tick in &batch.ticks {
-        let head = [
-            received_ns.into(),
-            tick.sequence.into(),
-            tick.series.into(),
-            tick.end_time.as_ns().into(),
-            length_ns(tick.duration),
-            mode(tick.mode),
-            Cell::Boolean(tick.switch_command),
-            mode(tick.meander),
-        ];
-        let cells = head.into_iter().chain(sensors.cells(batch.output, &tick.readings));
-        table.push(cells.chain(half_periods(tick, sensors.half_periods)))?;
-    }
-    Ok(())
+/// The case axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// What standard errors come from, in the order of `Causes::all`.
+const CAUSES: [&str; 4] = ["noise", "restoration", "calibration", "clamping"];
+/// Small numbers: modes, flags.
+const I8: Kind = Kind::Integer(8, true);
+const U8: Kind = Kind::Integer(8, false);
+const U16: Kind = Kind::Integer(16, false);
+
+/// Columns for the readings of a stream.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sensors {
+    counts: usize,
+    means: usize,
+    half_periods: usize,
 }
 
-fn half_periods(tick: &GyroTick, sensors: usize) -> impl Iterator<Item = Cell<'static>> {
-    let halves = tick.half_periods.iter().flat_map(|half| [half.positive, half.negative]);
-    let cells: Vec<_> = padded(halves.map(|count| i64::from(count).into()), 2 * sensors).collect();
-    cells.into_iter()
-}
-
-/// A row per accelerometer tick.
-pub(super) fn write_accel(
-    table: Option<&mut Table>,
-    sensors: Sensors,
-    received_ns: u64,
-    batch: &AccelBatch,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    for tick in &batch.ticks {
-        let head = [
-            received_ns.into(),
-            tick.sequence.into(),
-            tick.end_time.as_ns().into(),
-            length_ns(tick.duration),
-        ];
-        table.push(head.into_iter().chain(sensors.cells(batch.output, &tick.readings)))?;
-    }
-    Ok(())
-}
-
-/// A row per reading.
-pub(super) fn write_temperature(
-    table: Option<&mut Table>,
-    received_ns: u64,
-    batch: &TemperatureBatch,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    for reading in &batch.readings {
-        let time_ns = reading.time.as_ns();
-        table.push([received_ns.into(), time_ns.into(), Cell::Text(&reading.channel), reading.raw.into()])?;
-    }
-    Ok(())
-}
-
-/// A row per reading.
-pub(super) fn write_health(
-    table: Option<&mut Table>,
-    received_ns: u64,
-    batch: &HealthBatch,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    for tick in &batch.ticks {
-        for reading in &tick.readings {
-            table.push([
-                received_ns.into(),
-                tick.time_ns.into(),
-                Cell::Text(&reading.name),
-                reading.value.into(),
-            ])?;
+impl Sensors {
+    /// As many as any tick has.
+    pub(super) fn of(shapes: &Shapes) -> Self {
+        let most = |kind: fn(&Shape) -> bool| {
+            shapes.keys().filter(|shape| kind(shape)).map(|shape| shape.sensors).max().unwrap_or(0)
+        };
+        Self {
+            counts: most(|shape| shape.counts),
+            means: most(|shape| !shape.counts),
+            half_periods: most(|shape| shape.half_periods),
         }
     }
-    Ok(())
-}
 
-/// A row per reference.
-pub(super) fn write_reference(
-    table: Option<&mut Table>,
-    received_ns: u64,
-    reference: &Reference,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    let head = [received_ns.into(), reference.start_ns.into(), reference.end_ns.into()];
-    let rates = reference.angular_rate_rad_per_s.into_iter().map(Cell::from);
-    table.push(head.into_iter().chain(rates).chain(once(reference.sigma_rad_per_s.into())))
-}
-
-/// A row per corrected tick.
-pub(super) fn write_corrected(
-    table: Option<&mut Table>,
-    shape: CorrectedShape,
-    received_ns: u64,
-    batch: &CorrectedBatch,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    let digest = hex(&batch.revision.digest);
-    for tick in &batch.ticks {
-        let cells = corrected_cells(received_ns, tick, shape);
-        let cells = cells.chain([batch.revision.counter.into(), Cell::Text(&digest)]);
-        table.push(cells.chain(sigma(tick, shape)))?;
+    fn readings(
+        self,
+        row: &mut Row<'_>,
+        mean_unit: &str,
+        output: OutputKind,
+        readings: &sample::Sensors<f64>,
+    ) {
+        let (counts, means): (&[f64], &[f64]) = match output {
+            OutputKind::Counts => (readings, &[]),
+            OutputKind::Mean => (&[], readings),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "counts are whole numbers of 32 bits")]
+        let counts = counts.iter().map(|count| *count as i64);
+        row.each(self.counts, |n| sparse(format!("sensor_{n}_counts"), I32), counts);
+        let means = means.iter().copied();
+        row.each(self.means, |n| sparse(format!("sensor_{n}_{mean_unit}"), Kind::Double), means);
     }
-    Ok(())
 }
 
-fn corrected_cells<'a>(
+/// A gyro tick.
+pub(super) fn gyro(
+    row: &mut Row<'_>,
+    sensors: Sensors,
     received_ns: u64,
-    tick: &'a CorrectedTick,
-    shape: CorrectedShape,
-) -> impl Iterator<Item = Cell<'a>> {
-    let head = [
-        received_ns.into(),
-        tick.sequence.into(),
-        tick.end_time.as_ns().into(),
-        length_ns(tick.duration),
-        i64::from(tick.ticks).into(),
-        tick.missed.into(),
-    ];
-    let deltas = tick.delta_angle.iter().chain(&tick.delta_velocity);
-    let flags = |flags: &'a [SensorFlags], length| {
-        padded(flags.iter().map(|flags| i64::from(flags.bits()).into()), length)
+    output: OutputKind,
+    tick: &GyroTick,
+) {
+    row.full("received_ns", U64, received_ns);
+    row.full("sequence", U64, tick.sequence);
+    row.full("series", U64, tick.series);
+    row.full("end_time_ns", I64, tick.end_time.as_ns());
+    row.full("duration_ns", U64, length_ns(tick.duration));
+    row.sparse("mode", I8, mode(tick.mode));
+    row.full("switch_command", Kind::Boolean, tick.switch_command);
+    row.sparse("meander", I8, mode(tick.meander));
+    sensors.readings(row, "rad_per_s", output, &tick.readings);
+    let half = |n: usize| {
+        let sign = if n.is_multiple_of(2) { "positive" } else { "negative" };
+        sparse(format!("sensor_{}_half_{sign}_counts", n / 2), I32)
     };
-    let parity = |parity: &'a [f64], length| padded(parity.iter().map(|value| (*value).into()), length);
-    head.into_iter()
-        .chain(deltas.map(|delta| (*delta).into()))
-        .chain([mode(tick.mode), i64::from(tick.flags.bits()).into()])
-        .chain(flags(&tick.gyro_flags, shape.gyros))
-        .chain(flags(&tick.accel_flags, shape.accels))
-        .chain(parity(&tick.gyro_parity, shape.gyro_parity))
-        .chain(parity(&tick.accel_parity, shape.accel_parity))
+    let halves = tick.half_periods.iter().flat_map(|half| [half.positive, half.negative]);
+    row.each(2 * sensors.half_periods, half, halves.map(i64::from));
 }
 
-/// Standard errors: all of the angle, then of the velocity.
-fn sigma<'a>(tick: &CorrectedTick, shape: CorrectedShape) -> impl Iterator<Item = Cell<'a>> + use<'a> {
-    let causes = tick.sigma.iter().flat_map(|sigma| [sigma.angle, sigma.velocity]);
-    let cells: Vec<_> = causes.flat_map(|causes| causes.all()).flatten().map(Cell::from).collect();
-    padded(cells.into_iter(), if shape.sigma { 24 } else { 0 })
-}
-
-/// A row per channel.
-pub(super) fn write_applied(
-    table: Option<&mut Table>,
+/// An accelerometer tick.
+pub(super) fn accel(
+    row: &mut Row<'_>,
+    sensors: Sensors,
     received_ns: u64,
-    batch: &CorrectedBatch,
-) -> Result<(), Error> {
-    let (Some(table), Some(last)) = (table, batch.ticks.last()) else { return Ok(()) };
-    for applied in &batch.temperatures {
-        table.push([
-            received_ns.into(),
-            last.end_time.as_ns().into(),
-            Cell::Text(&applied.channel),
-            applied.temperature_deg_c.into(),
-            applied.rate_deg_c_per_s.into(),
-        ])?;
+    output: OutputKind,
+    tick: &AccelTick,
+) {
+    row.full("received_ns", U64, received_ns);
+    row.full("sequence", U64, tick.sequence);
+    row.full("end_time_ns", I64, tick.end_time.as_ns());
+    row.full("duration_ns", U64, length_ns(tick.duration));
+    sensors.readings(row, "v_or_m_per_s2", output, &tick.readings);
+}
+
+/// A reading of a temperature, or of the instrument's health: what its name and its value are called, and are.
+pub(super) fn reading(
+    row: &mut Row<'_>,
+    received_ns: u64,
+    time_ns: i64,
+    (name, of): (&str, &str),
+    (value, reading): (&str, f64),
+) {
+    row.full("received_ns", U64, received_ns);
+    row.full("time_ns", I64, time_ns);
+    row.full(name, Kind::Text, of);
+    row.full(value, Kind::Double, reading);
+}
+
+/// A reference.
+pub(super) fn reference(row: &mut Row<'_>, received_ns: u64, reference: &Reference) {
+    row.full("received_ns", U64, received_ns);
+    row.full("start_ns", I64, reference.start_ns);
+    row.full("end_ns", I64, reference.end_ns);
+    axes(row, "angular_rate", "rad_per_s", reference.angular_rate_rad_per_s);
+    row.full("sigma_rad_per_s", Kind::Double, reference.sigma_rad_per_s);
+}
+
+/// A corrected tick.
+pub(super) fn corrected(
+    row: &mut Row<'_>,
+    shape: CorrectedShape,
+    received_ns: u64,
+    revision: Revision,
+    tick: &CorrectedTick,
+) {
+    row.full("received_ns", U64, received_ns);
+    row.full("sequence", U64, tick.sequence);
+    row.full("end_time_ns", I64, tick.end_time.as_ns());
+    row.full("duration_ns", U64, length_ns(tick.duration));
+    row.full("ticks", U16, i64::from(tick.ticks));
+    row.full("missed", U64, tick.missed);
+    axes(row, "delta_angle", "rad", tick.delta_angle);
+    axes(row, "delta_velocity", "m_per_s", tick.delta_velocity);
+    row.sparse("mode", I8, mode(tick.mode));
+    row.full("flags", U16, i64::from(tick.flags.bits()));
+    let bits = |flags: &SensorFlags| i64::from(flags.bits());
+    row.each(shape.gyros, |n| sparse(format!("gyro_{n}_flags"), U8), tick.gyro_flags.iter().map(bits));
+    row.each(shape.accels, |n| sparse(format!("accel_{n}_flags"), U8), tick.accel_flags.iter().map(bits));
+    let parity = |n| sparse(format!("gyro_parity_{n}_rad_per_s"), Kind::Double);
+    row.each(shape.gyro_parity, parity, tick.gyro_parity.iter().copied());
+    let parity = |n| sparse(format!("accel_parity_{n}_m_per_s2"), Kind::Double);
+    row.each(shape.accel_parity, parity, tick.accel_parity.iter().copied());
+    row.full("revision", U64, revision.counter);
+    row.full("calibration_digest", Kind::Text, &*format!("{:016x}", u64::from_be_bytes(revision.digest)));
+    if !shape.sigma {
+        return;
     }
-    Ok(())
+    let sigma = tick.sigma.as_deref();
+    let (angle, velocity) = (sigma.map(|sigma| sigma.angle), sigma.map(|sigma| sigma.velocity));
+    for (increment, unit, causes) in [("angle", "rad", angle), ("velocity", "m_per_s", velocity)] {
+        let column = |n: usize| {
+            let (cause, axis) = (CAUSES[n / AXES.len()], AXES[n % AXES.len()]);
+            sparse(format!("{increment}_{cause}_sigma_{axis}_{unit}"), Kind::Double)
+        };
+        let cells = causes.iter().flat_map(|causes| causes.all()).flatten();
+        row.each(CAUSES.len() * AXES.len(), column, cells);
+    }
 }
 
-/// A row per message.
-pub(super) fn write_status(
-    table: Option<&mut Table>,
-    received_ns: u64,
-    status: &Status,
-) -> Result<(), Error> {
-    let Some(table) = table else { return Ok(()) };
-    // Plain structures of numbers and texts always serialise.
-    let value = serde_json::to_value(status).unwrap_or_default();
-    let state = value.get("state").map_or(String::new(), |state| match state.as_str() {
+/// A channel's temperature as it was applied up to a tick.
+pub(super) fn applied(row: &mut Row<'_>, received_ns: u64, end_time_ns: i64, applied: &AppliedTemperature) {
+    row.full("received_ns", U64, received_ns);
+    row.full("end_time_ns", I64, end_time_ns);
+    row.full("channel", Kind::Text, applied.channel.as_str());
+    row.full("temperature_deg_c", Kind::Double, applied.temperature_deg_c);
+    row.full("rate_deg_c_per_s", Kind::Double, applied.rate_deg_c_per_s);
+}
+
+/// A status: the state's name, and all of it as JSON.
+pub(super) fn status(row: &mut Row<'_>, received_ns: u64, status: &serde_json::Value) {
+    let state = status.get("state").map_or(String::new(), |state| match state.as_str() {
         Some(word) => word.to_owned(),
         None => state.to_string(),
     });
-    let text = value.to_string();
-    table.push([received_ns.into(), Cell::Text(&state), Cell::Text(&text)])
+    row.full("received_ns", U64, received_ns);
+    row.full("state", Kind::Text, &*state);
+    row.full("status", Kind::Json, &*status.to_string());
+}
+
+fn axes(row: &mut Row<'_>, what: &str, unit: &str, values: [f64; 3]) {
+    row.each(3, |axis| full(format!("{what}_{}_{unit}", AXES[axis]), Kind::Double), values);
 }
 
 /// Length of a span (ns).
-fn length_ns(span: Span) -> Cell<'static> {
-    span.as_ns().unsigned_abs().into()
+fn length_ns(span: Span) -> u64 {
+    span.as_ns().unsigned_abs()
 }
 
-fn mode(mode: Option<LasingMode>) -> Cell<'static> {
-    Cell::from(mode.map(|mode| match mode {
-        LasingMode::Plus => 1_i64,
+fn mode(mode: Option<LasingMode>) -> Option<i64> {
+    mode.map(|mode| match mode {
+        LasingMode::Plus => 1,
         LasingMode::Minus => -1,
-    }))
-}
-
-/// Bytes as hexadecimal digits.
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
     })
 }

@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind};
+use isotherm_protocol::corrected::{AppliedTemperature, CorrectedTick, Revision};
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::reference::Reference;
 
-use super::columns::{
-    Sensors, accel_columns, applied_columns, corrected_columns, gyro_columns, reading_columns,
-    reference_columns, status_columns,
-};
-use super::rows;
-use super::table::{Column, Table};
+use super::rows::{self, Sensors};
+use super::table::{Row, Table, columns};
 use crate::Written;
 use isotherm_log::error::Error;
 use isotherm_log::streams::contents::{CorrectedShape, Shapes, UnitContents};
@@ -19,17 +18,11 @@ use isotherm_log::streams::decoded::Decoded;
 #[derive(Debug)]
 pub(crate) struct UnitTables {
     unit: UnitId,
-    gyro: Option<Table>,
+    /// By stream.
+    tables: Vec<(&'static str, Table)>,
     gyros: Sensors,
-    accel: Option<Table>,
     accels: Sensors,
-    temperature: Option<Table>,
-    health: Option<Table>,
-    reference: Option<Table>,
-    corrected: Option<Table>,
     shape: CorrectedShape,
-    applied: Option<Table>,
-    status: Option<Table>,
 }
 
 impl UnitTables {
@@ -39,44 +32,56 @@ impl UnitTables {
     ///
     /// # Errors
     /// [`Error::File`], and those of `path`.
-    pub(crate) fn create<E: From<Error>>(
+    pub(crate) fn create(
         unit: &UnitId,
         contents: &UnitContents,
         provenance: &[(String, String)],
-        mut path: impl FnMut(&'static str) -> Result<PathBuf, E>,
-    ) -> Result<Self, E> {
-        let mut create = |stream: &'static str, rows: u64, columns: &[Column]| {
-            if rows == 0 {
-                return Ok(None);
-            }
+        mut path: impl FnMut(&'static str) -> Result<PathBuf, Error>,
+    ) -> Result<Self, Error> {
+        let ticks = |shapes: &Shapes| shapes.values().sum::<u64>();
+        let (gyros, accels) = (Sensors::of(&contents.gyro), Sensors::of(&contents.accel));
+        let shape = contents.corrected;
+        // At most: where every message has one tick.
+        let applied = contents.corrected_ticks.saturating_mul(contents.applied_channels.len() as u64);
+        let (counts, gyro, accel) = (OutputKind::Counts, GyroTick::default(), AccelTick::default());
+        let (revision, corrected) = (Revision { counter: 0, digest: [0; 8] }, CorrectedTick::default());
+        let reference =
+            Reference { start_ns: 0, end_ns: 0, angular_rate_rad_per_s: [0.0; 3], sigma_rad_per_s: 0.0 };
+        let temperature = AppliedTemperature {
+            channel: ChannelName::default(),
+            temperature_deg_c: 0.0,
+            rate_deg_c_per_s: 0.0,
+        };
+        let streams = [
+            ("raw_gyro", ticks(&contents.gyro), columns(|row| rows::gyro(row, gyros, 0, counts, &gyro))),
+            ("raw_accel", ticks(&contents.accel), columns(|row| rows::accel(row, accels, 0, counts, &accel))),
+            (
+                "raw_temperature",
+                contents.temperature_readings,
+                columns(|row| rows::reading(row, 0, 0, ("channel", ""), ("raw", 0.0))),
+            ),
+            (
+                "raw_health",
+                contents.health_readings,
+                columns(|row| rows::reading(row, 0, 0, ("name", ""), ("value", 0.0))),
+            ),
+            ("reference", contents.references, columns(|row| rows::reference(row, 0, &reference))),
+            (
+                "corrected",
+                contents.corrected_ticks,
+                columns(|row| rows::corrected(row, shape, 0, revision, &corrected)),
+            ),
+            ("applied_temperature", applied, columns(|row| rows::applied(row, 0, 0, &temperature))),
+            ("status", contents.status, columns(|row| rows::status(row, 0, &serde_json::Value::Null))),
+        ];
+        let mut tables = Vec::new();
+        for (stream, expected, columns) in streams.into_iter().filter(|(_, expected, _)| *expected > 0) {
             let mut words = provenance.to_vec();
             words.push(("unit".to_owned(), unit.to_string()));
             words.push(("stream".to_owned(), stream.to_owned()));
-            let path: PathBuf = path(stream)?;
-            Ok::<_, E>(Some(Table::create(&path, columns, rows, &words)?))
-        };
-        let ticks = |shapes: &Shapes| shapes.values().sum::<u64>();
-        let (gyros, accels) = (Sensors::of(&contents.gyro), Sensors::of(&contents.accel));
-        // At most: where every message has one tick.
-        let applied = contents.corrected_ticks.saturating_mul(contents.applied_channels.len() as u64);
-        Ok(Self {
-            unit: unit.clone(),
-            gyro: create("raw_gyro", ticks(&contents.gyro), &gyro_columns(gyros))?,
-            gyros,
-            accel: create("raw_accel", ticks(&contents.accel), &accel_columns(accels))?,
-            accels,
-            temperature: create(
-                "raw_temperature",
-                contents.temperature_readings,
-                &reading_columns("channel", "raw"),
-            )?,
-            health: create("raw_health", contents.health_readings, &reading_columns("name", "value"))?,
-            reference: create("reference", contents.references, &reference_columns())?,
-            corrected: create("corrected", contents.corrected_ticks, &corrected_columns(contents.corrected))?,
-            shape: contents.corrected,
-            applied: create("applied_temperature", applied, &applied_columns())?,
-            status: create("status", contents.status, &status_columns())?,
-        })
+            tables.push((stream, Table::create(&path(stream)?, &columns, expected, &words)?));
+        }
+        Ok(Self { unit: unit.clone(), tables, gyros, accels, shape })
     }
 
     /// Writes a message of the unit, received at a time; false where it has no place.
@@ -84,24 +89,63 @@ impl UnitTables {
     /// # Errors
     /// [`Error::File`].
     pub(crate) fn take(&mut self, received_ns: u64, decoded: &Decoded) -> Result<bool, Error> {
+        let Self { gyros, accels, shape, .. } = *self;
         match decoded {
-            Decoded::Gyro(batch) => rows::write_gyro(self.gyro.as_mut(), self.gyros, received_ns, batch)?,
-            Decoded::Accel(batch) => rows::write_accel(self.accel.as_mut(), self.accels, received_ns, batch)?,
+            Decoded::Gyro(batch) => self.write("raw_gyro", &batch.ticks, |row, tick| {
+                rows::gyro(row, gyros, received_ns, batch.output, tick);
+            })?,
+            Decoded::Accel(batch) => self.write("raw_accel", &batch.ticks, |row, tick| {
+                rows::accel(row, accels, received_ns, batch.output, tick);
+            })?,
             Decoded::Temperature(batch) => {
-                rows::write_temperature(self.temperature.as_mut(), received_ns, batch)?;
+                self.write("raw_temperature", &batch.readings, |row, reading| {
+                    let (name, value) = (("channel", reading.channel.as_str()), ("raw", reading.raw));
+                    rows::reading(row, received_ns, reading.time.as_ns(), name, value);
+                })?;
             }
-            Decoded::Health(batch) => rows::write_health(self.health.as_mut(), received_ns, batch)?,
-            Decoded::Reference(reference) => {
-                rows::write_reference(self.reference.as_mut(), received_ns, reference)?;
+            Decoded::Health(batch) => {
+                let readings =
+                    batch.ticks.iter().flat_map(|tick| tick.readings.iter().map(|of| (tick.time_ns, of)));
+                self.write("raw_health", readings, |row, (time_ns, reading)| {
+                    let (name, value) = (("name", reading.name.as_str()), ("value", reading.value));
+                    rows::reading(row, received_ns, time_ns, name, value);
+                })?;
             }
+            Decoded::Reference(reference) => self.write("reference", [reference], |row, reference| {
+                rows::reference(row, received_ns, reference);
+            })?,
             Decoded::Corrected(batch) => {
-                rows::write_corrected(self.corrected.as_mut(), self.shape, received_ns, batch)?;
-                rows::write_applied(self.applied.as_mut(), received_ns, batch)?;
+                self.write("corrected", &batch.ticks, |row, tick| {
+                    rows::corrected(row, shape, received_ns, batch.revision, tick);
+                })?;
+                let last = batch.ticks.last().map(|last| last.end_time.as_ns());
+                let applied =
+                    last.into_iter().flat_map(|end| batch.temperatures.iter().map(move |t| (end, t)));
+                self.write("applied_temperature", applied, |row, (end_ns, applied)| {
+                    rows::applied(row, received_ns, end_ns, applied);
+                })?;
             }
-            Decoded::Status(status) => rows::write_status(self.status.as_mut(), received_ns, status)?,
+            Decoded::Status(status) => {
+                // Plain structures of numbers and texts always serialise.
+                let status = serde_json::to_value(status).unwrap_or_default();
+                self.write("status", [status], |row, status| rows::status(row, received_ns, &status))?;
+            }
             Decoded::Journal => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// A row for each item, where the log has the stream.
+    fn write<T>(
+        &mut self,
+        stream: &str,
+        items: impl IntoIterator<Item = T>,
+        row: impl Fn(&mut Row<'_>, T),
+    ) -> Result<(), Error> {
+        let Some((_, table)) = self.tables.iter_mut().find(|(name, _)| *name == stream) else {
+            return Ok(());
+        };
+        items.into_iter().try_for_each(|item| table.push(|cells| row(cells, item)))
     }
 
     /// Ends the files; gives each stream with its rows.
@@ -109,23 +153,11 @@ impl UnitTables {
     /// # Errors
     /// [`Error::File`].
     pub(crate) fn finish(self) -> Result<Vec<Written>, Error> {
-        let tables = [
-            ("raw_gyro", self.gyro),
-            ("raw_accel", self.accel),
-            ("raw_temperature", self.temperature),
-            ("raw_health", self.health),
-            ("reference", self.reference),
-            ("corrected", self.corrected),
-            ("applied_temperature", self.applied),
-            ("status", self.status),
-        ];
-        let mut written = Vec::new();
-        for (what, table) in tables {
-            let Some(table) = table else { continue };
+        let unit = self.unit.to_string();
+        let written = self.tables.into_iter().map(|(what, table)| {
             let path = table.path().to_owned();
-            let rows = table.finish()?;
-            written.push(Written { path, unit: Some(self.unit.to_string()), what, rows });
-        }
-        Ok(written)
+            Ok(Written { path, unit: Some(unit.clone()), what, rows: table.finish()? })
+        });
+        written.collect()
     }
 }

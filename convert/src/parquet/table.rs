@@ -97,9 +97,80 @@ impl From<f64> for Cell<'_> {
     }
 }
 
+impl From<bool> for Cell<'_> {
+    fn from(boolean: bool) -> Self {
+        Self::Boolean(boolean)
+    }
+}
+
+impl<'a> From<&'a str> for Cell<'a> {
+    fn from(text: &'a str) -> Self {
+        Self::Text(text)
+    }
+}
+
 impl<'a, T: Into<Cell<'a>>> From<Option<T>> for Cell<'a> {
     fn from(cell: Option<T>) -> Self {
         cell.map_or(Self::Empty, Into::into)
+    }
+}
+
+/// A row that is being given cell by cell: what gives it is asked for its columns first, so that each stands in one place with
+/// what it holds.
+pub(super) struct Row<'t> {
+    columns: Columns<'t>,
+    /// The first cell that did not fit.
+    misfit: Option<String>,
+}
+
+/// The columns of a row's table.
+enum Columns<'t> {
+    /// Asked for: what is given names them.
+    Asked(Vec<Column>),
+    /// There, from the next one on.
+    There(std::slice::IterMut<'t, Pending>),
+}
+
+/// The columns of what gives rows.
+pub(super) fn columns(row: impl FnOnce(&mut Row<'_>)) -> Vec<Column> {
+    let mut asked = Row { columns: Columns::Asked(Vec::new()), misfit: None };
+    row(&mut asked);
+    match asked.columns {
+        Columns::Asked(columns) => columns,
+        Columns::There(_) => Vec::new(),
+    }
+}
+
+impl Row<'_> {
+    /// A cell of a column that has a value in every row.
+    pub(super) fn full<'a>(&mut self, name: &str, kind: Kind, cell: impl Into<Cell<'a>>) {
+        self.each(1, |_| full(name, kind), [cell]);
+    }
+
+    /// A cell of a column that may be empty.
+    pub(super) fn sparse<'a>(&mut self, name: &str, kind: Kind, cell: impl Into<Cell<'a>>) {
+        self.each(1, |_| sparse(name, kind), [cell]);
+    }
+
+    /// The cells of so many columns; where there are fewer, the last are empty.
+    pub(super) fn each<'a, T: Into<Cell<'a>>>(
+        &mut self,
+        count: usize,
+        column: impl Fn(usize) -> Column,
+        cells: impl IntoIterator<Item = T>,
+    ) {
+        let mut cells = cells.into_iter().map(Into::into);
+        match &mut self.columns {
+            Columns::Asked(columns) => columns.extend((0..count).map(column)),
+            Columns::There(columns) => {
+                for column in columns.take(count) {
+                    let cell = cells.next().unwrap_or(Cell::Empty);
+                    if !column.push(cell) && self.misfit.is_none() {
+                        self.misfit = Some(format!("{cell:?} does not fit the column {:?}", column.name));
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -160,15 +231,12 @@ impl Table {
         })
     }
 
-    /// Writes one row: a cell for each column.
-    pub(super) fn push<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Error> {
-        let mut cells = cells.into_iter();
-        for column in &mut self.columns {
-            let cell = cells.next().unwrap_or(Cell::Empty);
-            if !column.push(cell) {
-                let words = format!("{cell:?} does not fit the column {:?}", column.name);
-                return Err(Error::file(&self.path, "write", io::Error::other(words)));
-            }
+    /// Writes one row, which gives a cell for each column.
+    pub(super) fn push(&mut self, row: impl FnOnce(&mut Row<'_>)) -> Result<(), Error> {
+        let mut cells = Row { columns: Columns::There(self.columns.iter_mut()), misfit: None };
+        row(&mut cells);
+        if let Some(words) = cells.misfit {
+            return Err(Error::file(&self.path, "write", io::Error::other(words)));
         }
         self.rows += 1;
         self.waiting += 1;

@@ -15,8 +15,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 
 use super::UnitTables;
-use super::table::{Cell, I64, Kind, Table, full, sparse};
-use isotherm_log::error::Error;
+use super::table::{Cell, I64, Kind, Row, Table, columns, full};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::streams::contents::Contents;
 use isotherm_log::streams::decoded::Decoded;
@@ -34,14 +33,15 @@ fn read(path: &Path) -> (Vec<String>, Vec<Vec<Field>>) {
 fn rows_of_many_groups_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.parquet");
-    let columns = vec![full("time_ns", I64), sparse("value", Kind::Double), full("name", Kind::Text)];
+    let give = |row: &mut Row<'_>, n: i32| {
+        row.full("time_ns", I64, i64::from(n));
+        row.sparse("value", Kind::Double, (n % 3 != 0).then_some(f64::from(n) * 0.1));
+        row.full("name", Kind::Text, ["a", "b"][usize::from(n % 2 == 0)]);
+    };
     let words = [("unit".to_owned(), "A-1".to_owned())];
-    let mut table = Table::create(&path, &columns, 40_000, &words).unwrap();
-    for n in 0..40_000_i32 {
-        let value = (n % 3 != 0).then_some(f64::from(n) * 0.1);
-        table
-            .push([Cell::from(i64::from(n)), value.into(), Cell::Text(["a", "b"][usize::from(n % 2 == 0)])])
-            .unwrap();
+    let mut table = Table::create(&path, &columns(|row| give(row, 0)), 40_000, &words).unwrap();
+    for n in 0..40_000 {
+        table.push(|row| give(row, n)).unwrap();
     }
     assert_eq!(table.finish().unwrap(), 40_000);
     let reader = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
@@ -63,7 +63,8 @@ fn a_cell_that_does_not_fit_is_an_error() {
     let columns = || vec![full("value", Kind::Double)];
     for cell in [Cell::Empty, Cell::Integer(1)] {
         let mut table = Table::create(&folder.path().join("x.parquet"), &columns(), 1, &[]).unwrap();
-        assert!(table.push([cell]).unwrap_err().to_string().contains("does not fit the column \"value\""));
+        let error = table.push(|row| row.full("value", Kind::Double, cell)).unwrap_err();
+        assert!(error.to_string().contains("does not fit the column \"value\""));
     }
 }
 
@@ -123,10 +124,9 @@ fn streams_have_columns_for_every_shape_of_tick() {
     let status = Status { unit: "A-1".to_owned(), ..Status::default() };
     contents.add(&frame("imu/A-1/status", isotherm_protocol::codec::encode(&status).unwrap()));
     contents.add(&frame("imu/A-1/corrected", isotherm_protocol::codec::encode(&corrected).unwrap()));
-    let mut tables = UnitTables::create(&unit, &contents.units[&unit], &[], |stream| {
-        Ok::<_, Error>(folder.path().join(stream))
-    })
-    .unwrap();
+    let mut tables =
+        UnitTables::create(&unit, &contents.units[&unit], &[], |stream| Ok(folder.path().join(stream)))
+            .unwrap();
     let status = Decoded::Status(Box::new(status));
     for decoded in
         [Decoded::Gyro(counts), Decoded::Gyro(means), Decoded::Corrected(Box::new(corrected)), status]
