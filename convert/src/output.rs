@@ -1,11 +1,9 @@
 //! Files that are written under another name until they are whole.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use flate2::{Compression, write::GzEncoder};
-use isotherm_log::file::{refuse_overwriting, refuse_replacing};
+use isotherm_log::file::{self, refuse_overwriting, refuse_replacing};
 use isotherm_protocol::key::UnitId;
 
 use isotherm_log::error::Error;
@@ -79,14 +77,7 @@ impl Place {
     /// A file of text or bytes to be written, compressed where its name ends in `.gz`.
     pub(super) fn sink(&self, path: &Path) -> Result<Sink, Error> {
         let partial = self.partial(path)?;
-        let file = File::create(partial.writing()).map_err(|source| Error::file(path, "create", source))?;
-        let file = BufWriter::with_capacity(1 << 16, file);
-        let stream = if path.extension().is_some_and(|extension| extension == "gz") {
-            Stream::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
-        } else {
-            Stream::Plain(file)
-        };
-        Ok(Sink { stream, partial })
+        Ok(Sink { stream: file::Sink::create(partial.writing(), path)?, partial })
     }
 
     /// A whole text as a file.
@@ -129,14 +120,8 @@ impl Drop for Partial {
 /// A file that is being written.
 #[derive(Debug)]
 pub(super) struct Sink {
-    stream: Stream,
+    stream: file::Sink,
     partial: Partial,
-}
-
-#[derive(Debug)]
-enum Stream {
-    Plain(BufWriter<File>),
-    Gzip(Box<GzEncoder<BufWriter<File>>>),
 }
 
 impl Sink {
@@ -145,21 +130,13 @@ impl Sink {
         &mut self,
         write: impl FnOnce(&mut dyn Write) -> io::Result<T>,
     ) -> Result<T, Error> {
-        let written = match &mut self.stream {
-            Stream::Plain(file) => write(file),
-            Stream::Gzip(encoder) => write(encoder),
-        };
-        written.map_err(|source| Error::file(self.partial.path(), "write", source))
+        write(&mut self.stream).map_err(|source| Error::file(self.partial.path(), "write", source))
     }
 
     /// Everything is written.
     pub(super) fn finish(self) -> Result<Partial, Error> {
         let Self { stream, partial } = self;
-        let flushed = match stream {
-            Stream::Plain(mut file) => file.flush(),
-            Stream::Gzip(encoder) => encoder.finish().and_then(|mut file| file.flush()),
-        };
-        flushed.map_err(|source| Error::file(partial.path(), "write", source))?;
+        stream.finish().map_err(|source| Error::file(partial.path(), "write", source))?;
         Ok(partial)
     }
 }

@@ -1,10 +1,12 @@
 //! Small files read and written whole, and outputs that must not fall on inputs.
 
 use std::fs::{File, Permissions, canonicalize};
-use std::io::{self, Read, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, absolute};
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use isotherm_document::file::read_bounded;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
@@ -87,6 +89,58 @@ pub fn write_whole(path: &Path, bytes: &[u8], overwrite: bool) -> io::Result<()>
     file.as_file().sync_all()?;
     let placed = if overwrite { file.persist(path) } else { file.persist_noclobber(path) };
     placed.map(drop).map_err(|failed| failed.error)
+}
+
+/// A file that is being written, compressed or not.
+#[derive(Debug)]
+pub enum Sink {
+    /// As it is.
+    Plain(BufWriter<File>),
+    /// By gzip.
+    Gzip(Box<GzEncoder<BufWriter<File>>>),
+}
+
+impl Sink {
+    /// Creates a file, to be compressed where the name that it will have ends in `.gz`.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn create(path: &Path, named: &Path) -> Result<Self, Error> {
+        let file = File::create(path).map_err(|source| Error::file(named, "create", source))?;
+        let file = BufWriter::with_capacity(1 << 16, file);
+        Ok(if named.extension().is_some_and(|extension| extension == "gz") {
+            Self::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
+        } else {
+            Self::Plain(file)
+        })
+    }
+
+    /// Writes out what is still here.
+    ///
+    /// # Errors
+    /// That of the disk.
+    pub fn finish(self) -> io::Result<()> {
+        match self {
+            Self::Plain(mut file) => file.flush(),
+            Self::Gzip(encoder) => encoder.finish()?.flush(),
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Plain(file) => file.write(bytes),
+            Self::Gzip(encoder) => encoder.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Plain(file) => file.flush(),
+            Self::Gzip(encoder) => encoder.flush(),
+        }
+    }
 }
 
 /// Whether a file begins with these bytes; what cannot be read does not.

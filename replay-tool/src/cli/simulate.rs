@@ -1,11 +1,8 @@
 //! `isotherm-replay simulate`.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
-use flate2::{Compression, write::GzEncoder};
 use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
@@ -14,7 +11,7 @@ use serde::Serialize;
 use super::{print, seconds, show};
 use crate::error::Error;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
-use isotherm_log::file::{read_small_text, refuse_overwriting, refuse_replacing};
+use isotherm_log::file::{Sink, read_small_text, refuse_overwriting, refuse_replacing};
 use isotherm_log::mapping::Mapping;
 
 /// Simulate a log, with the mapping that reads it back
@@ -173,12 +170,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
 
     let mapping = Mapping::path_beside(out);
     args.refuse_overwriting(out, &mapping)?;
-    let mut log = create(out)?;
+    let mut log = Sink::create(out, out)?;
     std::fs::write(&mapping, columns.mapping()).map_err(|source| Error::file(&mapping, "write", source))?;
     let failed = |source| Error::file(out, "write", source);
     let mut rows = LogWriter::new(columns, &mut log).map_err(failed)?;
     let mut truth = match &args.truth {
-        Some(path) => Some((create(path)?, path)),
+        Some(path) => Some((Sink::create(path, path)?, path)),
         None => None,
     };
     if let Some((writer, path)) = &mut truth {
@@ -224,47 +221,4 @@ fn human(report: &Report) -> String {
     ];
     rows.extend(report.truth.iter().map(|truth| ("truth", truth.clone())));
     show::table(&rows)
-}
-
-/// A file, compressed where its name says so.
-enum Sink {
-    Plain(BufWriter<File>),
-    Gzip(Box<GzEncoder<BufWriter<File>>>),
-}
-
-/// Creates a file.
-fn create(path: &Path) -> Result<Sink, Error> {
-    let file = BufWriter::new(File::create(path).map_err(|source| Error::file(path, "create", source))?);
-    let compressed = path.extension().is_some_and(|extension| extension == "gz");
-    Ok(if compressed {
-        Sink::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
-    } else {
-        Sink::Plain(file)
-    })
-}
-
-impl Sink {
-    /// Writes out what is still here.
-    fn finish(self) -> std::io::Result<()> {
-        match self {
-            Self::Plain(mut file) => file.flush(),
-            Self::Gzip(encoder) => encoder.finish()?.flush(),
-        }
-    }
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        match self {
-            Self::Plain(file) => file.write(bytes),
-            Self::Gzip(encoder) => encoder.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        match self {
-            Self::Plain(file) => file.flush(),
-            Self::Gzip(encoder) => encoder.flush(),
-        }
-    }
 }
