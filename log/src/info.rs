@@ -27,17 +27,14 @@ use std::collections::BTreeMap;
 
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec::{self, CodecError};
-use isotherm_protocol::corrected::CorrectedBatch;
-use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::reference::Reference;
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::service_status::ServiceStatus;
-use isotherm_protocol::status::Status;
 use serde::Serialize;
 
 use crate::message::{Message, Topic};
 use crate::recording::{Attachment, Metadata};
 use crate::source::LogReport;
+use crate::streams::decoded::{Decoded, decode};
 
 pub use corrected::{AppliedInfo, CorrectedInfo, RevisionInfo, SigmaInfo};
 pub use files::{ChunksInfo, FileInfo};
@@ -135,12 +132,10 @@ pub struct Survey {
 /// One unit.
 #[derive(Debug, Default)]
 struct UnitSurvey {
+    /// As far as it is known before the end.
+    info: UnitInfo,
     topics: BTreeMap<Topic, TopicSurvey>,
-    gyros: Vec<ReadingInfo>,
-    accelerometers: Vec<ReadingInfo>,
-    temperatures: Readings,
     modes: Modes,
-    health: Readings,
     corrected: CorrectedSurvey,
     status: StatusInfo,
     journal: JournalSurvey,
@@ -211,14 +206,11 @@ impl Survey {
         let units = self.units.into_iter().map(|(unit, survey)| {
             let info = UnitInfo {
                 topics: finished(survey.topics.into_values().collect()),
-                gyros: survey.gyros,
-                accelerometers: survey.accelerometers,
-                temperatures: survey.temperatures,
                 modes: survey.modes.finish(),
-                health: survey.health,
                 corrected: survey.corrected.finish(),
                 status: (!survey.status.states.is_empty()).then_some(survey.status),
                 journal: survey.journal.finish(),
+                ..survey.info
             };
             (unit.to_string(), info)
         });
@@ -240,14 +232,14 @@ impl Survey {
 impl UnitSurvey {
     /// Takes a message; how many ticks are in it.
     fn take(&mut self, message: &Message) -> u64 {
-        let Message { topic, received_ns, frame } = message;
+        let topic = &message.topic;
         let mut survey = match self.topics.remove(topic) {
             Some(survey) => survey,
             None => TopicSurvey::new(topic.key()),
         };
-        survey.message(frame);
+        survey.message(&message.frame);
         let before = survey.count();
-        if let Err(error) = self.read(topic, *received_ns, frame, &mut survey) {
+        if let Err(error) = self.read(message, &mut survey) {
             survey.unreadable(&error);
         }
         let ticks = survey.count() - before;
@@ -255,16 +247,11 @@ impl UnitSurvey {
         ticks
     }
 
-    fn read(
-        &mut self,
-        topic: &Topic,
-        received_ns: u64,
-        frame: &[u8],
-        survey: &mut TopicSurvey,
-    ) -> Result<(), CodecError> {
-        match topic {
-            Topic::Raw(_, RawStream::Gyro) => {
-                let batch: GyroBatch = codec::decode(frame)?;
+    fn read(&mut self, message: &Message, survey: &mut TopicSurvey) -> Result<(), CodecError> {
+        let received_ns = message.received_ns;
+        let Some((_, decoded)) = decode(message)? else { return Ok(()) };
+        match decoded {
+            Decoded::Gyro(batch) => {
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 match survey.ticks(first.series, first.sequence, received_ns, &times) {
@@ -272,36 +259,31 @@ impl UnitSurvey {
                     place => {
                         self.modes.take(&batch, place == Place::Start);
                         let readings = batch.ticks.iter().map(|tick| &tick.readings);
-                        readings.for_each(|readings| ReadingInfo::tick(&mut self.gyros, readings));
+                        readings.for_each(|readings| ReadingInfo::tick(&mut self.info.gyros, readings));
                     }
                 }
             }
-            Topic::Raw(_, RawStream::Accel) => {
-                let batch: AccelBatch = codec::decode(frame)?;
+            Decoded::Accel(batch) => {
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 if survey.ticks(0, first.sequence, received_ns, &times) != Place::Old {
                     let readings = batch.ticks.iter().map(|tick| &tick.readings);
-                    readings.for_each(|readings| ReadingInfo::tick(&mut self.accelerometers, readings));
+                    readings.for_each(|readings| ReadingInfo::tick(&mut self.info.accelerometers, readings));
                 }
             }
-            Topic::Raw(_, RawStream::Temperature) => {
-                let batch: TemperatureBatch = codec::decode(frame)?;
+            Decoded::Temperature(batch) => {
                 let times = batch.ticks().filter_map(|tick| tick.first()).map(|reading| reading.time.as_ns());
                 survey.readings(received_ns, times);
-                self.temperatures.temperatures(&batch);
+                self.info.temperatures.temperatures(&batch);
             }
-            Topic::Raw(_, RawStream::Health) => {
-                let batch: HealthBatch = codec::decode(frame)?;
+            Decoded::Health(batch) => {
                 survey.readings(received_ns, batch.ticks.iter().map(|tick| tick.time_ns));
-                self.health.health(&batch);
+                self.info.health.health(&batch);
             }
-            Topic::Reference(_) => {
-                let reference: Reference = codec::decode(frame)?;
+            Decoded::Reference(reference) => {
                 survey.readings(received_ns, std::iter::once(reference.end_ns));
             }
-            Topic::Corrected(_) => {
-                let batch: CorrectedBatch = codec::decode(frame)?;
+            Decoded::Corrected(batch) => {
                 // A batch may have gaps between its ticks, and an output may stand for several raw ticks.
                 for tick in &batch.ticks {
                     let first = tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1)));
@@ -317,9 +299,8 @@ impl UnitSurvey {
                 }
                 self.corrected.take(&batch);
             }
-            Topic::Status(_) => self.status.take(received_ns, &codec::decode::<Status>(frame)?),
-            Topic::Journal(_) => self.journal.take(received_ns, frame)?,
-            Topic::Service(_) | Topic::Other(_) => {}
+            Decoded::Status(status) => self.status.take(received_ns, &status),
+            Decoded::Journal => self.journal.take(received_ns, &message.frame)?,
         }
         Ok(())
     }

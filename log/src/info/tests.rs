@@ -3,8 +3,10 @@
 use isotherm_correction::sample as core;
 use isotherm_correction::sigma::{Causes, Sigma};
 use isotherm_correction::units::{Span, Timestamp};
-use isotherm_protocol::corrected::{Revision, SigmaRun};
+use isotherm_protocol::corrected::{CorrectedBatch, Revision, SigmaRun};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
+use isotherm_protocol::key::RawStream;
+use isotherm_protocol::raw::{GyroBatch, TemperatureBatch};
 
 use super::*;
 use crate::recording::{RecordingOptions, RecordingReport, RecordingWriter};

@@ -65,21 +65,13 @@ pub struct TopicInfo {
 /// Follows one topic.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TopicSurvey {
-    key: String,
-    messages: u64,
-    bytes: u64,
-    unreadable: u64,
-    first_unreadable: Option<String>,
-    ticks: u64,
-    first_ns: Option<i64>,
-    last_ns: Option<i64>,
+    /// As far as it is known before the end.
+    info: TopicInfo,
     /// Sum of the steps from tick to tick (ns).
     covered_ns: i64,
     steps: u64,
     intervals: Histogram,
-    longest: Option<LongestInterval>,
     durations: Histogram,
-    time_went_back: u64,
     sequence: Option<Sequence>,
     delays: Delays,
 }
@@ -89,19 +81,19 @@ pub(super) type TickTime = (i64, u64);
 
 impl TopicSurvey {
     pub(super) fn new(key: String) -> Self {
-        Self { key, ..Self::default() }
+        Self { info: TopicInfo { key, ..TopicInfo::default() }, ..Self::default() }
     }
 
     /// Counts a message.
     pub(super) fn message(&mut self, frame: &[u8]) {
-        self.messages += 1;
-        self.bytes += frame.len() as u64;
+        self.info.messages += 1;
+        self.info.bytes += frame.len() as u64;
     }
 
     /// Counts a message that cannot be read.
     pub(super) fn unreadable(&mut self, error: &CodecError) {
-        self.unreadable += 1;
-        self.first_unreadable.get_or_insert_with(|| error.to_string());
+        self.info.unreadable += 1;
+        self.info.first_unreadable.get_or_insert_with(|| error.to_string());
     }
 
     /// Takes the consecutive ticks of a message.
@@ -118,17 +110,10 @@ impl TopicSurvey {
         };
         let count = times.clone().count() as u64;
         let run = Run { series, first, ticks: count, first_end_ns, last_end_ns };
-        let place = self.sequence.get_or_insert_default().take(run);
-        self.ticks += count;
         for (_, duration) in times.clone() {
             self.durations.add(duration);
         }
-        match place {
-            Place::Old => {}
-            Place::Start => self.steps_of(None, false, ends()),
-            Place::Next => self.steps_of(self.last_ns, true, ends()),
-            Place::BehindGap => self.steps_of(self.last_ns, false, ends()),
-        }
+        let place = self.run(run, count, ends());
         self.delays.take(received_ns, last_end_ns);
         place
     }
@@ -136,15 +121,21 @@ impl TopicSurvey {
     /// Takes one output, which stands for so many raw ticks.
     pub(super) fn outputs(&mut self, first: u64, ticks: u64, end_ns: i64, duration_ns: u64) {
         let run = Run { series: 0, first, ticks, first_end_ns: end_ns, last_end_ns: end_ns };
-        self.ticks += 1;
         self.durations.add(duration_ns);
-        let ends = std::iter::once(end_ns);
-        match self.sequence.get_or_insert_default().take(run) {
+        self.run(run, 1, std::iter::once(end_ns));
+    }
+
+    /// Takes ticks or an output, which end at these times.
+    fn run(&mut self, run: Run, count: u64, ends: impl Iterator<Item = i64>) -> Place {
+        self.info.ticks += count;
+        let place = self.sequence.get_or_insert_default().take(run);
+        match place {
             Place::Old => {}
             Place::Start => self.steps_of(None, false, ends),
-            Place::Next => self.steps_of(self.last_ns, true, ends),
-            Place::BehindGap => self.steps_of(self.last_ns, false, ends),
+            Place::Next => self.steps_of(self.info.last_ns, true, ends),
+            Place::BehindGap => self.steps_of(self.info.last_ns, false, ends),
         }
+        place
     }
 
     /// Notes when a message was received whose last tick ended then.
@@ -155,8 +146,8 @@ impl TopicSurvey {
     /// Takes times of readings, which have no sequence.
     pub(super) fn readings(&mut self, received_ns: u64, times: impl Iterator<Item = i64> + Clone) {
         let Some(last) = times.clone().last() else { return };
-        self.ticks += times.clone().count() as u64;
-        self.steps_of(self.last_ns, true, times);
+        self.info.ticks += times.clone().count() as u64;
+        self.steps_of(self.info.last_ns, true, times);
         self.delays.take(received_ns, last);
     }
 
@@ -164,11 +155,11 @@ impl TopicSurvey {
     fn steps_of(&mut self, before: Option<i64>, contiguous: bool, ends: impl Iterator<Item = i64>) {
         let (mut before, mut contiguous) = (before, contiguous);
         for end in ends {
-            self.first_ns.get_or_insert(end);
+            self.info.first_ns.get_or_insert(end);
             if let Some(before) = before {
                 let step = end.saturating_sub(before);
                 if step <= 0 {
-                    self.time_went_back += 1;
+                    self.info.time_went_back += 1;
                 } else {
                     self.covered_ns = self.covered_ns.saturating_add(step);
                     self.steps += 1;
@@ -179,19 +170,19 @@ impl TopicSurvey {
             }
             (before, contiguous) = (Some(end), true);
         }
-        self.last_ns = before;
+        self.info.last_ns = before;
     }
 
     fn enter(&mut self, ns: u64, after_ns: i64) {
         self.intervals.add(ns);
-        if self.longest.is_none_or(|longest| ns > longest.ns) {
-            self.longest = Some(LongestInterval { ns, after_ns });
+        if self.info.longest_interval.is_none_or(|longest| ns > longest.ns) {
+            self.info.longest_interval = Some(LongestInterval { ns, after_ns });
         }
     }
 
     /// Ticks so far.
     pub(super) fn count(&self) -> u64 {
-        self.ticks
+        self.info.ticks
     }
 
     /// What it comes to; receive times say something only in recordings.
@@ -203,22 +194,13 @@ impl TopicSurvey {
             mean_hz: as_f64(self.steps) / duration_s,
         });
         TopicInfo {
-            key: self.key,
-            messages: self.messages,
-            bytes: self.bytes,
-            unreadable: self.unreadable,
-            first_unreadable: self.first_unreadable,
-            ticks: self.ticks,
-            first_ns: self.first_ns,
-            last_ns: self.last_ns,
             duration_s,
             rate,
             intervals: self.intervals.spread(),
-            longest_interval: self.longest,
             tick_durations: self.durations.spread().filter(|spread| spread.max_ns > 0),
-            time_went_back: self.time_went_back,
             order: self.sequence.map(|sequence| sequence.order()),
             jitter: if recording { self.delays.jitter() } else { None },
+            ..self.info
         }
     }
 }

@@ -8,15 +8,13 @@ use std::collections::BTreeMap;
 use isotherm_correction::sample::{CorrectedTick, LasingMode, TickFlags};
 use isotherm_correction::sigma::{Causes, Sigma};
 use isotherm_correction::units::{AngularRate, Timestamp};
-use isotherm_protocol::codec;
-use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::RawStream;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::message::{Message, Topic};
 use crate::ros2::means;
+use crate::streams::decoded::{Decoded, decode};
 
 /// Encoding of the messages.
 pub(super) const ENCODING: &str = "json";
@@ -189,66 +187,45 @@ fn sigma(tick: &CorrectedTick, of: impl Fn(&Sigma) -> Causes) -> Option<[f64; 3]
 
 /// What is shown of a message; nothing of one that cannot be read.
 pub(super) fn points(message: &Message) -> Vec<Point> {
-    let frame = &message.frame;
-    match &message.topic {
-        Topic::Corrected(_) => codec::decode::<CorrectedBatch>(frame).map_or_else(
-            |_| Vec::new(),
-            |batch| {
-                let ticks = batch.ticks.iter().map(|tick| {
-                    let known = !tick.flags.contains(TickFlags::UNCALIBRATED);
-                    let (rate, force) = means(tick);
-                    let deg_per_h =
-                        |rate: [f64; 3]| rate.map(|axis| AngularRate::from_rad_per_s(axis).as_deg_per_h());
-                    let shown = Corrected {
-                        sequence: tick.sequence,
-                        missed: tick.missed,
-                        angular_rate_deg_per_h: rate.filter(|_| known).map(deg_per_h).and_then(Axes::of),
-                        specific_force_m_per_s2: force.filter(|_| known).and_then(Axes::of),
-                        angular_rate_sigma_deg_per_h: sigma(tick, |sigma| sigma.angle)
-                            .map(deg_per_h)
-                            .and_then(Axes::of),
-                        specific_force_sigma_m_per_s2: sigma(tick, |sigma| sigma.velocity).and_then(Axes::of),
-                        mode: tick.mode.map_or(0, |mode| if mode == LasingMode::Plus { 1 } else { -1 }),
-                        flags: tick.flags.bits(),
-                        revision: tick.revision,
-                    };
-                    (tick.end_time, shown)
-                });
-                shown(message.received_ns, ticks)
-            },
-        ),
-        Topic::Raw(_, RawStream::Gyro) => codec::decode::<GyroBatch>(frame).map_or_else(
-            |_| Vec::new(),
-            |batch| {
-                let ticks = batch.ticks.iter();
-                shown(
-                    message.received_ns,
-                    ticks.map(|tick| (tick.end_time, raw_of(tick.sequence, &tick.readings))),
-                )
-            },
-        ),
-        Topic::Raw(_, RawStream::Accel) => codec::decode::<AccelBatch>(frame).map_or_else(
-            |_| Vec::new(),
-            |batch| {
-                let ticks = batch.ticks.iter();
-                shown(
-                    message.received_ns,
-                    ticks.map(|tick| (tick.end_time, raw_of(tick.sequence, &tick.readings))),
-                )
-            },
-        ),
-        Topic::Raw(_, RawStream::Temperature) => codec::decode::<TemperatureBatch>(frame).map_or_else(
-            |_| Vec::new(),
-            |batch| {
-                let good = batch.readings.iter().filter(|reading| reading.raw.is_finite());
-                let readings = good.map(|reading| {
-                    let raw = BTreeMap::from([(reading.channel.as_str(), reading.raw)]);
-                    (reading.time, Temperature { raw })
-                });
-                shown(message.received_ns, readings)
-            },
-        ),
+    let received_ns = message.received_ns;
+    match decode(message) {
+        Ok(Some((_, Decoded::Corrected(batch)))) => {
+            shown(received_ns, batch.ticks.iter().map(|tick| (tick.end_time, corrected_of(tick))))
+        }
+        Ok(Some((_, Decoded::Gyro(batch)))) => {
+            let ticks = batch.ticks.iter();
+            shown(received_ns, ticks.map(|tick| (tick.end_time, raw_of(tick.sequence, &tick.readings))))
+        }
+        Ok(Some((_, Decoded::Accel(batch)))) => {
+            let ticks = batch.ticks.iter();
+            shown(received_ns, ticks.map(|tick| (tick.end_time, raw_of(tick.sequence, &tick.readings))))
+        }
+        Ok(Some((_, Decoded::Temperature(batch)))) => {
+            let good = batch.readings.iter().filter(|reading| reading.raw.is_finite());
+            let readings = good.map(|reading| {
+                let raw = BTreeMap::from([(reading.channel.as_str(), reading.raw)]);
+                (reading.time, Temperature { raw })
+            });
+            shown(received_ns, readings)
+        }
         _ => Vec::new(),
+    }
+}
+
+fn corrected_of(tick: &CorrectedTick) -> Corrected {
+    let known = !tick.flags.contains(TickFlags::UNCALIBRATED);
+    let (rate, force) = means(tick);
+    let deg_per_h = |rate: [f64; 3]| rate.map(|axis| AngularRate::from_rad_per_s(axis).as_deg_per_h());
+    Corrected {
+        sequence: tick.sequence,
+        missed: tick.missed,
+        angular_rate_deg_per_h: rate.filter(|_| known).map(deg_per_h).and_then(Axes::of),
+        specific_force_m_per_s2: force.filter(|_| known).and_then(Axes::of),
+        angular_rate_sigma_deg_per_h: sigma(tick, |sigma| sigma.angle).map(deg_per_h).and_then(Axes::of),
+        specific_force_sigma_m_per_s2: sigma(tick, |sigma| sigma.velocity).and_then(Axes::of),
+        mode: tick.mode.map_or(0, |mode| if mode == LasingMode::Plus { 1 } else { -1 }),
+        flags: tick.flags.bits(),
+        revision: tick.revision,
     }
 }
 
