@@ -8,6 +8,7 @@ use isotherm_protocol::status::{
     ChannelStatus, Output, Place, PreLaunchVerdict, Rest, SensorStatus, State, Status,
 };
 use ratatui::style::Style;
+use serde::Serialize;
 
 use super::{Unit, figure, tone};
 
@@ -17,7 +18,8 @@ const RECENT: Duration = Duration::from_secs(60);
 const OLD: Duration = Duration::from_secs(10);
 
 /// How grave something is, in rising order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Level {
     /// All is well.
     Fine,

@@ -45,7 +45,7 @@ struct Service {
 struct Row {
     unit: String,
     instance: String,
-    level: &'static str,
+    level: Level,
     /// What is to be noticed, the gravest first.
     reasons: Vec<String>,
     state: &'static str,
@@ -77,7 +77,7 @@ impl Row {
         Self {
             unit: status.unit.clone(),
             instance: status.instance.clone(),
-            level: level(unit.level()),
+            level: unit.level(),
             reasons: unit.remarks().into_iter().map(|remark| remark.words).collect(),
             state: state_word(status.state),
             running: is_running(status.state) && unit.gone.is_none(),
@@ -124,7 +124,7 @@ struct Half<'f> {
 struct Instance<'f> {
     /// Whether it is this service.
     own: bool,
-    level: &'static str,
+    level: Level,
     remarks: Vec<Said>,
     /// How long nobody has answered for it (s).
     gone_s: Option<u64>,
@@ -137,27 +137,15 @@ struct Instance<'f> {
 /// Something to be noticed.
 #[derive(Debug, Serialize)]
 struct Said {
-    level: &'static str,
+    level: Level,
     words: String,
-}
-
-impl From<(Level, String)> for Said {
-    fn from((level, words): (Level, String)) -> Self {
-        Self { level: self::level(level), words }
-    }
 }
 
 /// A line in columns.
 #[derive(Debug, Serialize)]
 struct Columns {
-    level: &'static str,
+    level: Level,
     columns: Vec<String>,
-}
-
-impl From<(Level, Vec<String>)> for Columns {
-    fn from((level, columns): (Level, Vec<String>)) -> Self {
-        Self { level: self::level(level), columns }
-    }
 }
 
 /// Temperatures some time ago.
@@ -187,13 +175,14 @@ impl Web {
             // Their names and states are told in the lines of the units.
             Service { gone, status: ServiceStatus { units: Vec::new(), ..status } }
         });
+        let pair = said_of_pairs(&fleet.pairs).into_iter().map(|(level, columns)| Columns { level, columns });
         serde_json::to_string(&Overview {
             instance: &self.instance,
             write: self.write,
             options: &self.options,
             now_unix_ms,
             services: services.collect(),
-            pair: said_of_pairs(&fleet.pairs).into_iter().map(Columns::from).collect(),
+            pair: pair.collect(),
             units: worst_first(self.seen(&fleet, now, now_unix_ms)).iter().map(Row::of).collect(),
         })
     }
@@ -240,26 +229,15 @@ impl Web {
             let age_s = now.saturating_duration_since(of.at).as_secs_f64();
             Past { age_s, of }
         });
-        let said = unit.remarks().into_iter().map(|it| Said::from((it.level, it.words)));
+        let said = unit.remarks().into_iter().map(|it| Said { level: it.level, words: it.words });
         Instance {
             own: unit.status.instance == self.instance,
-            level: level(unit.level()),
+            level: unit.level(),
             remarks: said.collect(),
             gone_s: unit.gone.map(|gone| gone.as_secs()),
             allowed: operation::State::from(unit.status.state).allowed(),
             past: past.collect(),
             status: unit.status,
         }
-    }
-}
-
-/// A level by its name.
-fn level(level: Level) -> &'static str {
-    match level {
-        Level::Fine => "fine",
-        Level::Note => "note",
-        Level::Warning => "warning",
-        Level::Gone => "gone",
-        Level::Fault => "fault",
     }
 }
