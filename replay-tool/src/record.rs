@@ -69,7 +69,6 @@ pub enum ServiceWait {
 
 /// What is recorded, and how.
 #[derive(Debug, Clone)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub struct RecordOptions {
     /// Where it is written to; with rotation, `-0001` and so on is added to the name.
     pub out: PathBuf,
@@ -87,16 +86,12 @@ pub struct RecordOptions {
     pub duration: Option<Duration>,
     /// Whether recording ends with the last service.
     pub until_service_stops: bool,
-    /// Whether chunks are compressed.
-    pub compress: bool,
-    /// Whether ticks and readings are written once more as JSON, for viewers.
-    pub json: bool,
+    /// How files are written.
+    pub writing: RecordingOptions,
     /// When chunks and files end.
     pub bounds: Bounds,
     /// How many files of a row are kept.
     pub keep: Option<usize>,
-    /// Whether files that are there already are written over.
-    pub overwrite: bool,
     /// What may wait to be written (bytes).
     pub queue_bytes: u64,
 }
@@ -114,7 +109,7 @@ pub async fn record(
     mut watch: impl FnMut(&RecordReport),
 ) -> Result<RecordReport, Error> {
     let rotates = options.bounds.file_bytes.is_some() || options.bounds.file_time.is_some();
-    let files = Files::new(&options.out, rotates, options.keep, options.overwrite)?;
+    let files = Files::new(&options.out, rotates, options.keep, options.writing.overwrite)?;
     let mut stop = Stop::listen()?;
     let session = open(options, &mut stop).await?;
     let recorded = on_session(&session, options, files, &mut stop, &mut watch).await;
@@ -167,15 +162,15 @@ async fn on_session(
     let life = follow_services(session, tell).await?;
     await_service(session, options.service, stop).await?;
 
-    let writing = RecordingOptions {
-        compress: options.compress,
-        overwrite: options.overwrite,
-        json: options.json,
-        ..RecordingOptions::default()
-    };
     let (tell, mut told) = unbounded_channel();
-    let writer =
-        FileWriter::begin(Arc::clone(&queue), files, writing, options.bounds, described(options), tell)?;
+    let writer = FileWriter::begin(
+        Arc::clone(&queue),
+        files,
+        options.writing,
+        options.bounds,
+        described(options),
+        tell,
+    )?;
     let thread = std::thread::Builder::new().name("recording".to_owned()).spawn(move || writer.run());
     let thread = thread.map_err(|source| Error::Runtime { source })?;
 
@@ -310,7 +305,7 @@ fn described(options: &RecordOptions) -> BTreeMap<String, String> {
     let join = |texts: Vec<String>| if texts.is_empty() { "all".to_owned() } else { texts.join(" ") };
     let topics = key_expressions(&options.topics, &options.units).iter().map(ToString::to_string).collect();
     let mut described = BTreeMap::from([
-        ("compression".to_owned(), if options.compress { "zstd" } else { "none" }.to_owned()),
+        ("compression".to_owned(), if options.writing.compress { "zstd" } else { "none" }.to_owned()),
         ("chunk_s".to_owned(), options.bounds.chunk.as_secs_f64().to_string()),
         ("units".to_owned(), join(options.units.iter().map(ToString::to_string).collect())),
         ("topics".to_owned(), join(topics)),

@@ -8,6 +8,7 @@ use isotherm_bus::ClientOptions;
 use isotherm_cli::Exit;
 use isotherm_correction::units::Span;
 use isotherm_log::offline::unit_id;
+use isotherm_log::recording::RecordingOptions;
 
 use super::{print, seconds, show};
 use crate::error::Error;
@@ -158,15 +159,18 @@ impl RecordArgs {
             query_limit: time(self.timeout),
             duration: self.duration.map(time),
             until_service_stops: self.until_service_stops,
-            compress: self.compression.compresses(),
-            json: !self.no_json_channels,
+            writing: RecordingOptions {
+                compress: self.compression.compresses(),
+                overwrite: self.overwrite,
+                json: !self.no_json_channels,
+                ..RecordingOptions::default()
+            },
             bounds: Bounds {
                 chunk: time(self.chunk_seconds),
                 file_bytes: self.max_size,
                 file_time: self.max_duration.map(time),
             },
             keep: self.keep.and_then(|keep| usize::try_from(keep).ok()),
-            overwrite: self.overwrite,
             queue_bytes: self.queue,
         })
     }
