@@ -10,6 +10,7 @@
 //! | [`stderr`] | words on stderr, through a queue where a blocked reader must not hold the program up |
 //! | [`bar`] | progress |
 //! | [`exit`] | exit codes |
+//! | [`mod@table`] | tables |
 
 pub mod advanced;
 pub mod bar;
@@ -18,6 +19,7 @@ pub mod print;
 pub mod program;
 mod queue;
 pub mod stderr;
+pub mod table;
 
 pub use advanced::parse;
 pub use bar::Bar;
@@ -25,3 +27,4 @@ pub use exit::Exit;
 pub use print::{coloured, grouped, print, print_within, to_stdout};
 pub use program::Common;
 pub use stderr::{failed, failed_lines, say, say_lines};
+pub use table::table;

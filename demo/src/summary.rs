@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use comfy_table::{CellAlignment, Table, TableComponent, presets};
+use comfy_table::{Table, TableComponent};
 use isotherm_cli::grouped;
 use serde::Serialize;
 
@@ -146,12 +146,9 @@ impl Summary {
     /// The table as text.
     pub(crate) fn table(&self) -> Table {
         let (head, rows) = self.rows();
-        let mut table = Table::new();
-        table.load_preset(presets::NOTHING).set_style(TableComponent::HeaderLines, '─');
-        table.set_style(TableComponent::MiddleHeaderIntersections, '─').set_header(head).add_rows(rows);
-        for column in table.column_iter_mut().skip(1) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
+        let mut table = isotherm_cli::table(head, rows, 1..);
+        table.set_style(TableComponent::HeaderLines, '─');
+        table.set_style(TableComponent::MiddleHeaderIntersections, '─');
         table
     }
 }

@@ -2,15 +2,14 @@
 
 use std::fmt::Write;
 
-use comfy_table::{CellAlignment, Table, TableComponent, presets};
+use comfy_table::{Table, TableComponent};
 use isotherm_protocol::control::{CorrectionChange, Difference, Schedule};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
 
 /// A table with a line under its header; columns from `right` on are aligned to the right.
 pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, right: usize) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    let mut table = isotherm_cli::table(header, rows, right..);
     for line in [
         TableComponent::HeaderLines,
         TableComponent::LeftHeaderIntersection,
@@ -19,11 +18,6 @@ pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, r
     ] {
         table.set_style(line, '─');
     }
-    table.set_header(header);
-    for row in rows {
-        table.add_row(row);
-    }
-    table.column_iter_mut().skip(right).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     table
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::presets;
 use isotherm_cli::Exit;
 use serde::Serialize;
 
@@ -65,10 +65,8 @@ impl Totals {
     /// A table for people.
     #[must_use]
     pub fn table(&self) -> String {
-        let mut table = Table::new();
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY);
-        table.set_header(["unit", "in", "out", "refused", "missing", "uncalibrated", "lost", "runs"]);
-        for (unit, totals) in &self.units {
+        let head = ["unit", "in", "out", "refused", "missing", "uncalibrated", "lost", "runs"];
+        let row = |(unit, totals): (&String, &UnitTotals)| {
             let lost = totals.lost + totals.unsent + totals.unpublished;
             let figures = [
                 totals.imu_in,
@@ -79,9 +77,9 @@ impl Totals {
                 lost,
                 totals.runs,
             ];
-            table.add_row(std::iter::once(unit.clone()).chain(figures.map(|figure| figure.to_string())));
-        }
-        table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-        table.to_string()
+            std::iter::once(unit.clone()).chain(figures.map(|figure| figure.to_string()))
+        };
+        let mut table = isotherm_cli::table(head, self.units.iter().map(row), 1..);
+        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).to_string()
     }
 }

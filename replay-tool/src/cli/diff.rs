@@ -8,7 +8,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
@@ -138,20 +137,13 @@ fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
 
 /// The result as a table, and the first difference of each unit.
 fn human(report: &Report<'_>) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(["unit", "ticks in both", "different", "only in A", "only in B"]);
-    for (unit, account) in report.units {
-        table.add_row([
-            unit.to_string(),
-            account.ticks.to_string(),
-            account.different.to_string(),
-            account.only_a.all().to_string(),
-            account.only_b.all().to_string(),
-        ]);
-    }
-    table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-    let mut text = format!("{table}\n");
+    let row = |(unit, account): (&UnitId, &Account)| {
+        let Account { ticks, different, only_a, only_b, .. } = account;
+        let counts = [*ticks, *different, only_a.all(), only_b.all()];
+        std::iter::once(unit.to_string()).chain(counts.map(|count| count.to_string()))
+    };
+    let head = ["unit", "ticks in both", "different", "only in A", "only in B"];
+    let mut text = show::grid(head, report.units.iter().map(row), 1..);
     for (unit, account) in report.units.iter().filter(|(_, account)| account.other_document > 0) {
         let count = account.other_document;
         let _ =

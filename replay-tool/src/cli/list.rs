@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use comfy_table::{CellAlignment, Table, presets};
 use isotherm_cli::{Bar, Exit};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
@@ -77,20 +76,15 @@ fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
 }
 
 fn human(topics: &BTreeMap<String, Listed>) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(["topic", "messages", "bytes", "first s", "last s"]);
-    for (key, listed) in topics {
-        table.add_row([
+    let row = |(key, listed): (&String, &Listed)| {
+        let Listed { messages, bytes, first_s, last_s } = listed;
+        [
             key.clone(),
-            listed.messages.to_string(),
-            listed.bytes.to_string(),
-            format!("{:.3}", listed.first_s),
-            format!("{:.3}", listed.last_s),
-        ]);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    format!("{table}\n")
+            messages.to_string(),
+            bytes.to_string(),
+            format!("{first_s:.3}"),
+            format!("{last_s:.3}"),
+        ]
+    };
+    show::grid(["topic", "messages", "bytes", "first s", "last s"], topics.iter().map(row), 1..)
 }

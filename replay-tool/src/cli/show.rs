@@ -1,39 +1,34 @@
 //! Summaries as tables and as JSON.
 
 use std::io::{self, Write};
+use std::ops::RangeBounds;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Row;
 use serde::Serialize;
 
 use isotherm_log::text::ReadReport;
 
 /// A table of two columns, figures to the right.
 pub(super) fn table(rows: &[(&str, String)]) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    for (name, figure) in rows {
-        table.add_row([*name, figure.as_str()]);
-    }
-    if let Some(column) = table.column_mut(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    format!("{table}\n")
+    let rows = rows.iter().map(|(name, figure)| [*name, figure.as_str()]);
+    grid([""; 0], rows, 1..)
 }
 
 /// A table of the three case axes.
 pub(super) fn axes(rows: &[(&str, [f64; 3], usize)]) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(["", "x", "y", "z"]);
-    for (name, values, digits) in rows {
-        let mut cells = vec![(*name).to_owned()];
-        cells.extend(values.iter().map(|value| format!("{value:.digits$}")));
-        table.add_row(cells);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    format!("{table}\n")
+    let row = |(name, values, digits): &(&str, [f64; 3], usize)| {
+        std::iter::once((*name).to_owned()).chain(values.map(|value| format!("{value:.digits$}")))
+    };
+    grid(["", "x", "y", "z"], rows.iter().map(row), 1..)
+}
+
+/// A table with a line end; columns in `right` are aligned to the right.
+pub(super) fn grid<R: Into<Row>>(
+    head: impl Into<Row>,
+    rows: impl IntoIterator<Item = R>,
+    right: impl RangeBounds<usize>,
+) -> String {
+    format!("{}\n", isotherm_cli::table(head, rows, right))
 }
 
 /// A warning on standard error.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::presets;
 use isotherm_cli::Exit;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
@@ -66,9 +66,7 @@ impl Totals {
     /// A table for people.
     #[must_use]
     pub fn table(&self) -> String {
-        let mut table = Table::new();
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY);
-        table.set_header([
+        let head = [
             "unit",
             "ticks in",
             "ticks out",
@@ -80,8 +78,8 @@ impl Totals {
             "alarms",
             "added p50 µs",
             "added p99 µs",
-        ]);
-        for (unit, totals) in &self.units {
+        ];
+        let row = |(unit, totals): (&String, &UnitTotals)| {
             let counts = [
                 totals.ticks_in,
                 totals.ticks_out,
@@ -96,10 +94,10 @@ impl Totals {
             let mut row = vec![unit.clone()];
             row.extend(counts.iter().map(u64::to_string));
             row.extend(latencies.iter().map(|ns| format!("{}.{}", ns / 1000, ns % 1000 / 100)));
-            table.add_row(row);
-        }
-        table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-        let mut text = table.to_string();
+            row
+        };
+        let mut table = isotherm_cli::table(head, self.units.iter().map(row), 1..);
+        let mut text = table.load_preset(presets::UTF8_HORIZONTAL_ONLY).to_string();
         for (kind, count) in &self.refused {
             // Writing to a string cannot fail.
             let _ = write!(text, "\n{kind} (no unit): {count}");

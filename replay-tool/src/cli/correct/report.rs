@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{CellAlignment, Table, presets};
 use isotherm_log::offline::UnitReport;
 use isotherm_log::source::LogReport;
 use serde::Serialize;
@@ -48,22 +47,12 @@ impl<'r> Report<'r> {
     }
 
     pub(super) fn human(&self) -> String {
-        let mut table = Table::new();
-        table.load_preset(presets::NOTHING);
-        table.set_header([
-            "unit",
-            "ticks",
-            "gaps",
-            "missing",
-            "duration (s)",
-            "mean rate (°/h)",
-            "journal",
-            "published",
-        ]);
-        for unit in self.units {
+        let head =
+            ["unit", "ticks", "gaps", "missing", "duration (s)", "mean rate (°/h)", "journal", "published"];
+        let row = |unit: &UnitReport| {
             let summary = &unit.summary;
             let rate = summary.mean_rate_deg_per_h.map(|rate| format!("{rate:.4}")).join("  ");
-            table.add_row([
+            [
                 unit.unit.to_string(),
                 summary.ticks.to_string(),
                 summary.gaps.to_string(),
@@ -72,12 +61,9 @@ impl<'r> Report<'r> {
                 rate,
                 journal(unit),
                 published(unit),
-            ]);
-        }
-        for column in table.column_iter_mut().skip(1).take(5) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-        let mut text = format!("{table}\n");
+            ]
+        };
+        let mut text = show::grid(head, self.units.iter().map(row), 1..6);
         for unit in self.units {
             let first = unit.published.as_ref().filter(|account| !account.agrees());
             if let Some(first) = first.and_then(|account| account.first.as_ref()) {

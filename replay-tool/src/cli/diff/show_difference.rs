@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{Table, presets};
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_log::diff::{Equivalent, FieldDifference, FirstDifference, Happened, LogTick, Row, mode};
+
+use crate::cli::show;
 
 /// The first difference with the ticks around it, in words; `names` are those of the two logs.
 pub(in crate::cli) fn first_difference(first: &FirstDifference, names: [&str; 2]) -> String {
@@ -52,33 +53,30 @@ fn happened(happened: &Happened, name: &str) -> String {
 
 /// The ticks around it side by side.
 fn around(first: &FirstDifference, [name_a, name_b]: [&str; 2]) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(["", "tick", "", "Δθ x, y, z (rad)", "Δv x, y, z (m/s)", "mode", "rev", "flags"]);
+    let head = ["", "tick", "", "Δθ x, y, z (rad)", "Δv x, y, z (m/s)", "mode", "rev", "flags"];
+    let mut rows = Vec::new();
     for (place, Row { a, b }) in first.around.iter().enumerate() {
         let marker = if place == first.at { ">" } else { "" };
         match (a, b) {
             (Some(a), Some(b)) if isotherm_log::diff::identical(a, b) => {
-                row(&mut table, marker, "both", Some(a));
+                rows.push(row(marker, "both", Some(a)));
             }
             _ => {
-                row(&mut table, marker, name_a, a.as_ref());
-                row(&mut table, marker, name_b, b.as_ref());
+                rows.extend([row(marker, name_a, a.as_ref()), row(marker, name_b, b.as_ref())]);
             }
         }
     }
-    format!("{table}\n")
+    show::grid(head, rows, ..0)
 }
 
-fn row(table: &mut Table, marker: &str, name: &str, tick: Option<&LogTick>) {
+fn row(marker: &str, name: &str, tick: Option<&LogTick>) -> [String; 8] {
     let Some(LogTick { tick, .. }) = tick else {
-        table.add_row([marker, "", name, "—", "", "", "", ""]);
-        return;
+        return [marker, "", name, "—", "", "", "", ""].map(str::to_owned);
     };
     let CorrectedTick { sequence, delta_angle, delta_velocity, revision, flags, .. } = tick;
     let vector = |vector: &[f64; 3]| vector.map(|value| format!("{value:?}")).join("  ");
     let flags: Vec<_> = flags.iter_names().map(|(name, _)| name).collect();
-    table.add_row([
+    [
         marker.to_owned(),
         sequence.to_string(),
         name.to_owned(),
@@ -87,5 +85,5 @@ fn row(table: &mut Table, marker: &str, name: &str, tick: Option<&LogTick>) {
         mode(tick.mode).to_owned(),
         revision.to_string(),
         flags.join(" "),
-    ]);
+    ]
 }

@@ -1,18 +1,17 @@
 //! Figures of readings.
 
-use comfy_table::{CellAlignment, Table, presets};
 use isotherm_log::info::{ReadingInfo, UnitInfo};
+
+use crate::cli::show;
 
 /// Smallest, largest and mean of every sensor, temperature and health reading, as they were sent.
 pub(super) fn readings(unit: &UnitInfo) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(["as sent", "readings", "minimum", "maximum", "mean", "missing"]);
+    let mut rows = Vec::new();
     let mut add = |name: String, info: &ReadingInfo| {
         let ReadingInfo { readings, missing, min, max, mean, .. } = info;
         let counts = [readings, missing].map(ToString::to_string);
         let [readings, missing] = counts;
-        table.add_row([name, readings, figure(*min), figure(*max), figure(*mean), missing]);
+        rows.push([name, readings, figure(*min), figure(*max), figure(*mean), missing]);
     };
     for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
         sensors.iter().zip(1..).for_each(|(info, number)| add(format!("{what} {number}"), info));
@@ -20,11 +19,10 @@ pub(super) fn readings(unit: &UnitInfo) -> String {
     for (what, named) in [("temperature", &unit.temperatures), ("health", &unit.health)] {
         named.by_name.iter().for_each(|(name, info)| add(format!("{what} {name}"), info));
     }
-    if table.row_count() == 0 {
+    if rows.is_empty() {
         return String::new();
     }
-    table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-    format!("{table}\n")
+    show::grid(["as sent", "readings", "minimum", "maximum", "mean", "missing"], rows, 1..)
 }
 
 /// A number in seven digits, without an exponent where it needs none.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use comfy_table::{CellAlignment, Table, presets};
+use indicatif::DecimalBytes;
 use isotherm_correction::units::{Angle, Span, Timestamp};
 use isotherm_log::date::date;
 use isotherm_log::info::{
@@ -39,7 +39,7 @@ pub(in crate::cli) fn of(info: &LogInfo) -> String {
 
 fn files(text: &mut String, info: &LogInfo) {
     for FileInfo { path, bytes, recording } in &info.files {
-        line(text, format_args!("{path}: {}", bytes_of(*bytes)));
+        line(text, format_args!("{path}: {}", DecimalBytes(*bytes)));
         let Some(layout) = recording else { continue };
         let end =
             if layout.complete { "whole" } else { "cut short: repair it with `isotherm-replay recover`" };
@@ -48,8 +48,8 @@ fn files(text: &mut String, info: &LogInfo) {
             format_args!(
                 "  {} chunks, {} of messages in {} ({}), {} attachments, {end}",
                 layout.chunks,
-                bytes_of(layout.uncompressed_bytes),
-                bytes_of(layout.stored_bytes),
+                DecimalBytes(layout.uncompressed_bytes),
+                DecimalBytes(layout.stored_bytes),
                 layout.compression.join(", "),
                 layout.attachments
             ),
@@ -93,7 +93,7 @@ fn files(text: &mut String, info: &LogInfo) {
     }
     for attachment in info.attachments.iter().take(LISTED) {
         let (name, kind) = (&attachment.name, &attachment.media_type);
-        line(text, format_args!("attachment {name:?} ({kind}, {})", bytes_of(attachment.bytes)));
+        line(text, format_args!("attachment {name:?} ({kind}, {})", DecimalBytes(attachment.bytes)));
     }
     more(text, info.attachments.len());
 }
@@ -112,10 +112,7 @@ fn topics(topics: &[TopicInfo]) -> String {
         "late",
         "jitter p50/p99/max (ms)",
     ];
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(HEAD);
-    for topic in topics {
+    let row = |topic: &TopicInfo| {
         let order = |of: fn(&isotherm_log::info::Order) -> u64| {
             topic.order.as_ref().map_or_else(dash, |order| of(order).to_string())
         };
@@ -123,7 +120,7 @@ fn topics(topics: &[TopicInfo]) -> String {
             topic.rate.as_ref().map_or_else(dash, |rate| format!("{:.4}", of(rate)))
         };
         let ticks = if topic.ticks > 0 { topic.ticks.to_string() } else { dash() };
-        table.add_row([
+        [
             topic.key.clone(),
             topic.messages.to_string(),
             ticks,
@@ -135,12 +132,9 @@ fn topics(topics: &[TopicInfo]) -> String {
             order(|order| order.duplicates),
             order(|order| order.late),
             topic.jitter.as_ref().map_or_else(dash, |jitter| spread(&jitter.delay)),
-        ]);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    let mut text = format!("{table}\n");
+        ]
+    };
+    let mut text = show::grid(HEAD, topics.iter().map(row), 1..);
     for topic in topics {
         topic_details(&mut text, topic);
     }
@@ -348,14 +342,4 @@ fn after(ns: i64, begin_ns: i64) -> String {
 
 fn hexadecimal(digest: [u8; 8]) -> String {
     format!("{:016x}", u64::from_be_bytes(digest))
-}
-
-/// A number of bytes in the unit that suits it.
-fn bytes_of(bytes: u64) -> String {
-    match bytes {
-        0..10_000 => format!("{bytes} B"),
-        10_000..10_000_000 => format!("{} kB", bytes / 1000),
-        10_000_000..10_000_000_000 => format!("{} MB", bytes / 1_000_000),
-        _ => format!("{} GB", bytes / 1_000_000_000),
-    }
 }

@@ -1,7 +1,5 @@
 //! The summary as tables, and what must be said beside it.
 
-use comfy_table::{CellAlignment, Table, presets};
-
 use super::{Report, show};
 use crate::play::{Acknowledge, PlayOptions, PlayReport, UnitReport};
 use isotherm_log::source::LogReport;
@@ -87,9 +85,7 @@ fn units(play: &PlayReport, options: &PlayOptions) -> String {
     if under_way {
         header.push("under way");
     }
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(header);
-    for unit in &play.units {
+    let row = |unit: &UnitReport| {
         let counts = &unit.counts;
         let mut row = vec![
             unit.unit.clone(),
@@ -116,12 +112,9 @@ fn units(play: &PlayReport, options: &PlayOptions) -> String {
         if under_way {
             row.push(figure(unit.returned.ticks_under_way));
         }
-        table.add_row(row);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    format!("{table}\n")
+        row
+    };
+    show::grid(header, play.units.iter().map(row), 1..)
 }
 
 /// What reading the log came to, in words; empty where there is nothing to say.

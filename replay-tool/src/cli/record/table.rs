@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 
-use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isotherm_bus::BusError;
 
@@ -116,17 +115,10 @@ fn topics(counts: &[TopicCount]) -> String {
         let figures = [count.received, count.written, count.lost, count.bytes];
         row.iter_mut().zip(figures).for_each(|(sum, figure)| *sum += figure);
     }
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    table.set_header(["topic", "received", "written", "lost", "bytes"]);
-    for (name, figures) in rows {
-        let figures = figures.map(|figure| figure.to_string());
-        table.add_row(std::iter::once(name).chain(figures));
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    format!("{table}\n")
+    let row = |(name, figures): (String, [u64; 4])| {
+        std::iter::once(name).chain(figures.map(|figure| figure.to_string()))
+    };
+    show::grid(["topic", "received", "written", "lost", "bytes"], rows.into_iter().map(row), 1..)
 }
 
 /// The topic of all units that this one is of.
