@@ -3,22 +3,26 @@
 //! A mapping is a small TOML file, described in full by `docs/replay.md` and by the ready ones in
 //! `config/mappings`. Parsing reports every problem at once, each with file, line, column, key and value.
 
-mod encoding;
+mod check;
 mod keys;
-mod meaning;
+mod layout;
 #[cfg(test)]
 mod tests;
+mod time;
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-pub use encoding::Encoding;
 use isotherm_correction::sample::{ChannelName, OutputKind};
-use isotherm_correction::units::Span;
 pub use isotherm_document::Problem;
-pub use keys::{AccelUnit, GyroUnit, TemperatureUnit};
-pub use meaning::SensorUnit;
+use isotherm_document::{Form, Reader};
+use keys::Output;
+pub use keys::{AccelUnit, GyroUnit, SensorUnit, TemperatureUnit};
+pub use layout::{DecimalMark, Delimiter, Encoding, Layout, OnBadRow};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use time::TimeKeys;
+pub use time::{Marks, TimeColumn, TimeMapping, TimeUnit};
 
 use crate::error::Error;
 use crate::file::read_small_text;
@@ -26,100 +30,44 @@ use crate::file::read_small_text;
 /// Version of the mapping format that this program reads.
 pub const VERSION: u32 = 1;
 
+static FORM: LazyLock<Form> = LazyLock::new(|| Form::of::<Mapping>().versions("version", [VERSION; 2]));
+
 /// How one log, of one or more files, is read.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "Isotherm column mapping")]
 pub struct Mapping {
+    /// Version of the mapping's form.
+    #[schemars(range(min = 1))]
+    pub version: u32,
+    /// Free text for readers.
+    pub description: Option<String>,
     /// Its files, at least one; together they have exactly one gyro stream.
+    #[serde(rename = "file")]
+    #[schemars(length(min = 1, max = 16))]
     pub files: Vec<FileMapping>,
 }
 
 /// How one file of a log is read.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct FileMapping {
     /// Its name inside the log's folder, where the log is a folder.
     pub name: Option<String>,
     /// How bytes become rows and cells.
+    #[serde(flatten)]
     pub layout: Layout,
     /// Where the time of a row comes from.
+    #[schemars(with = "TimeKeys")]
     pub time: TimeMapping,
     /// The gyros, where the file has them.
     pub gyro: Option<GyroMapping>,
     /// The accelerometers, where the file has them.
-    pub accel: Option<TickMapping>,
+    pub accel: Option<TickMapping<AccelUnit>>,
     /// Temperature channels; may be empty.
+    #[serde(rename = "temperature", default)]
     pub temperatures: Vec<TemperatureMapping>,
     /// What says of each row whether it holds, where the file has that.
     pub status: Option<StatusMapping>,
-}
-
-/// What stands between two cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(from = "DelimiterWord")]
-#[schemars(inline)]
-pub enum Delimiter {
-    /// Any run of spaces and tabs; leading ones do not count.
-    Whitespace,
-    /// One ASCII character; cells may be quoted with `"`.
-    Character(u8),
-}
-
-/// What happens to a row that cannot be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(inline)]
-pub enum OnBadRow {
-    /// Reading ends with an error.
-    #[default]
-    Refuse,
-    /// The row is passed over and counted; its tick becomes a gap.
-    Skip,
-}
-
-/// How bytes become rows and cells.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
-pub struct Layout {
-    /// Encoding of the text.
-    #[serde(default)]
-    pub encoding: Encoding,
-    /// What stands between two cells.
-    pub delimiter: Delimiter,
-    /// Lines that begin with this are passed over.
-    #[schemars(
-        regex(pattern = r"^[^0-9\s+\-.]"),
-        extend("x-must-be" = "a prefix that no row of numbers begins with, and not empty")
-    )]
-    pub comment: Option<String>,
-    /// Lines in front, neither blank nor comments, that are passed over.
-    #[serde(default)]
-    #[schemars(range(max = 1_000_000))]
-    pub skip_lines: u64,
-    /// Whether the next line names the columns.
-    #[serde(default)]
-    pub header: bool,
-    /// Rows of data in front that are passed over.
-    #[serde(default)]
-    #[schemars(range(max = 1_000_000))]
-    pub drop_rows: u64,
-    /// Decimal mark.
-    #[serde(default)]
-    pub decimal_mark: DecimalMark,
-    /// What happens to a row that cannot be read.
-    #[serde(default)]
-    pub on_bad_row: OnBadRow,
-}
-
-/// Decimal mark of numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
-#[schemars(inline)]
-#[repr(u8)]
-pub enum DecimalMark {
-    /// A point.
-    #[default]
-    #[serde(rename = ".")]
-    Point = b'.',
-    /// A comma.
-    #[serde(rename = ",")]
-    Comma = b',',
 }
 
 /// A column, by name or by place.
@@ -131,64 +79,6 @@ pub enum Column {
     Name(String),
     /// Counted from 0; files count from 1.
     Index(usize),
-}
-
-/// Unit of a time column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[schemars(inline)]
-pub enum TimeUnit {
-    /// Nanoseconds.
-    #[serde(rename = "ns")]
-    Nanoseconds,
-    /// Microseconds.
-    #[serde(rename = "us")]
-    Microseconds,
-    /// Milliseconds.
-    #[serde(rename = "ms")]
-    Milliseconds,
-    /// Seconds.
-    #[serde(rename = "s")]
-    Seconds,
-    /// None: date and time of ISO 8601, in UTC where they name no offset.
-    #[serde(rename = "iso")]
-    DateTime,
-}
-
-/// A column that holds a time or a duration.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TimeColumn {
-    /// Which column.
-    pub column: Column,
-    /// Its unit.
-    pub unit: TimeUnit,
-}
-
-/// Which end of the tick a stamp marks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(inline)]
-pub enum Marks {
-    /// The start.
-    Start,
-    /// The end.
-    End,
-}
-
-/// Where the time of a row comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TimeMapping {
-    /// Column of stamps; without one, rows follow each other by `tick`.
-    pub stamps: Option<TimeColumn>,
-    /// Which end of the tick a stamp marks.
-    pub marks: Marks,
-    /// Nominal duration of a tick.
-    pub tick: Option<Span>,
-    /// Whether a tick's duration is the difference of successive stamps; otherwise it is `tick`.
-    pub measured: bool,
-    /// More than this many nominal ticks between two stamps are a gap; `None`: there are no gaps.
-    pub gap_after_ticks: Option<f64>,
-    /// Added to every stamp; without a stamp column, start of the first row's tick (ns).
-    pub origin_ns: i64,
 }
 
 /// Conversion of a cell: `(cell − mid_scale) · factor`.
@@ -211,26 +101,47 @@ impl Conversion {
 }
 
 /// One sensor's column.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SensorMapping {
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct SensorMapping<U: SensorUnit> {
     /// Which column.
     pub column: Column,
-    /// To counts, rad/s, or m/s² (V or raw for a calibration that takes these).
-    pub conversion: Conversion,
+    /// Its unit.
+    #[serde(default)]
+    pub unit: U,
+    /// Direction of the sensor: 1 or −1.
+    #[serde(default = "SensorMapping::<U>::along")]
+    #[schemars(range(min = -1, max = 1), extend("not" = { "const": 0 }), extend("x-must-be" = "1 or -1"))]
+    pub sign: i8,
+    /// Units per unit of the column.
+    #[serde(default = "SensorMapping::<U>::whole")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: f64,
+    /// Raw reading that stands for zero.
+    #[serde(default)]
+    pub mid_scale: f64,
 }
 
 /// Sensors of one kind.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TickMapping {
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct TickMapping<U: SensorUnit> {
     /// What the readings stand for.
+    #[serde(with = "Output")]
+    #[schemars(with = "Output")]
     pub output: OutputKind,
     /// One to eight sensors, in the order of the calibration document.
-    pub sensors: Vec<SensorMapping>,
+    #[schemars(length(min = 1, max = 8))]
+    pub sensors: Vec<SensorMapping<U>>,
     /// Column of sequence numbers; without one, rows are counted.
+    #[serde(rename = "sequence_column")]
     pub sequence: Option<Column>,
     /// Column of durations; overrides the file's rule.
-    pub duration: Option<TimeColumn>,
+    pub duration_column: Option<Column>,
+    /// Its unit.
+    pub duration_unit: Option<TimeUnit>,
     /// A row whose cells of these sensors are all empty has no tick of them.
+    #[serde(default)]
     pub may_be_empty: bool,
 }
 
@@ -265,20 +176,32 @@ pub struct StatusMapping {
     pub bad_bits: Option<u64>,
 }
 
-/// Where mode-switch commands come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SwitchMapping {
-    /// A column: `1` in the tick at whose start the switch was commanded, else `0`.
-    Column(Column),
+/// Where mode-switch commands come from: either of them.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct SwitchMapping {
+    /// A column: 1 in the tick at whose start the switch was commanded, else 0.
+    pub column: Option<Column>,
+    /// The first tick of the other mode.
+    pub from: Option<SwitchFrom>,
+}
+
+/// What a switch is known by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(inline)]
+pub enum SwitchFrom {
     /// A tick whose mode differs from the last one's.
     ModeChange,
 }
 
 /// The gyros of a file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct GyroMapping {
     /// Sensors and their ticks.
-    pub ticks: TickMapping,
+    #[serde(flatten)]
+    pub ticks: TickMapping<GyroUnit>,
     /// Lasing mode.
     pub mode: Option<ModeMapping>,
     /// Switch commands.
@@ -286,6 +209,7 @@ pub struct GyroMapping {
     /// Phase of the slow meander.
     pub meander: Option<ModeMapping>,
     /// Half-period counts, positive and negative, one pair per sensor, or none.
+    #[serde(default)]
     pub half_periods: Vec<HalfPeriodMapping>,
 }
 
@@ -330,6 +254,37 @@ impl TemperatureMapping {
     }
 }
 
+impl<U: SensorUnit> SensorMapping<U> {
+    fn along() -> i8 {
+        1
+    }
+
+    fn whole() -> f64 {
+        1.0
+    }
+
+    /// To counts, rad/s, or m/s² (V or raw for a calibration that takes these).
+    #[must_use]
+    pub fn conversion(&self) -> Conversion {
+        let (unit, per_tick) = self.unit.in_si().unwrap_or((1.0, false));
+        Conversion { mid_scale: self.mid_scale, factor: f64::from(self.sign) * self.scale * unit, per_tick }
+    }
+}
+
+impl<U: SensorUnit> TickMapping<U> {
+    /// Column of durations; overrides the file's rule.
+    #[must_use]
+    pub fn duration(&self) -> Option<TimeColumn> {
+        let (column, unit) = self.duration_column.clone().zip(self.duration_unit)?;
+        Some(TimeColumn { column, unit })
+    }
+
+    fn columns(&self) -> impl Iterator<Item = &Column> {
+        let sensors = self.sensors.iter().map(|sensor| &sensor.column);
+        sensors.chain(&self.sequence).chain(&self.duration_column)
+    }
+}
+
 impl Mapping {
     /// Reads a mapping from a file.
     ///
@@ -345,7 +300,10 @@ impl Mapping {
     /// # Errors
     /// Every problem that the mapping has, in the order of its lines.
     pub fn parse(text: &str, file: &str) -> Result<Self, Vec<Problem>> {
-        meaning::parse(text, file)
+        let mut reader = Reader::new(text, Some(file));
+        let mapping = reader.read(&FORM);
+        mapping.iter().for_each(|mapping| check::check(&mut reader, mapping));
+        reader.finish(mapping)
     }
 
     /// Where the mapping of a log stands by default: `zeeman.csv.gz` has `zeeman.mapping.toml` beside it.
@@ -379,30 +337,6 @@ impl ModeMapping {
     }
 }
 
-/// A delimiter by its word.
-#[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(inline)]
-enum DelimiterWord {
-    Comma,
-    Semicolon,
-    Tab,
-    Pipe,
-    Whitespace,
-}
-
-impl From<DelimiterWord> for Delimiter {
-    fn from(word: DelimiterWord) -> Self {
-        Self::Character(match word {
-            DelimiterWord::Comma => b',',
-            DelimiterWord::Semicolon => b';',
-            DelimiterWord::Tab => b'\t',
-            DelimiterWord::Pipe => b'|',
-            DelimiterWord::Whitespace => return Self::Whitespace,
-        })
-    }
-}
-
 /// A column by its name in the header, or by its number from 1.
 #[derive(Deserialize, JsonSchema)]
 #[serde(untagged)]
@@ -430,31 +364,16 @@ impl From<ColumnWord> for Column {
 impl FileMapping {
     /// All columns that the file must have.
     pub(crate) fn columns(&self) -> impl Iterator<Item = &Column> {
-        let gyro = self.gyro.as_ref();
-        let ticks = gyro.map(|gyro| &gyro.ticks).into_iter().chain(&self.accel);
-        let sensors = ticks.clone().flat_map(|ticks| ticks.sensors.iter().map(|sensor| &sensor.column));
-        let numbering =
-            ticks.flat_map(|ticks| ticks.sequence.iter().chain(ticks.duration.as_ref().map(|d| &d.column)));
-        let modes =
-            gyro.into_iter().flat_map(|gyro| gyro.mode.iter().chain(&gyro.meander).map(|mode| &mode.column));
-        let switch = gyro.and_then(|gyro| match &gyro.switch {
-            Some(SwitchMapping::Column(column)) => Some(column),
-            _ => None,
+        let stamps = self.time.stamps.iter().map(|stamps| &stamps.column);
+        let gyro = self.gyro.iter().flat_map(|gyro| {
+            let modes = gyro.mode.iter().chain(&gyro.meander).map(|mode| &mode.column);
+            let switch = gyro.switch.iter().filter_map(|switch| switch.column.as_ref());
+            let halves = gyro.half_periods.iter().flat_map(|half| [&half.positive, &half.negative]);
+            gyro.ticks.columns().chain(modes).chain(switch).chain(halves)
         });
-        let halves = gyro
-            .into_iter()
-            .flat_map(|gyro| gyro.half_periods.iter().flat_map(|half| [&half.positive, &half.negative]));
-        let stamps = self.time.stamps.as_ref().map(|stamps| &stamps.column);
+        let accel = self.accel.iter().flat_map(TickMapping::columns);
         let temperatures = self.temperatures.iter().map(|temperature| &temperature.column);
         let status = self.status.iter().map(|status| &status.column);
-        stamps
-            .into_iter()
-            .chain(sensors)
-            .chain(numbering)
-            .chain(modes)
-            .chain(switch)
-            .chain(halves)
-            .chain(temperatures)
-            .chain(status)
+        stamps.chain(gyro).chain(accel).chain(temperatures).chain(status)
     }
 }

@@ -1,169 +1,28 @@
-//! The mapping as types: key for key what stands in the file.
+//! Words and units of a mapping.
+
+use std::f64::consts::PI;
 
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{
-    Column, HalfPeriodMapping, Layout, Marks, ModeMapping, StatusMapping, TemperatureMapping, TimeUnit,
-};
-
-/// How a text log is read.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields, title = "Isotherm column mapping")]
-pub(super) struct MappingKeys {
-    /// Version of the mapping's form.
-    #[schemars(range(min = 1))]
-    #[expect(dead_code, reason = "checked before anything else is read")]
-    pub(super) version: u32,
-    /// Free text for readers.
-    #[expect(dead_code, reason = "for readers only")]
-    pub(super) description: Option<String>,
-    /// The files of the log; exactly one has gyros.
-    #[schemars(length(min = 1, max = 16))]
-    pub(super) file: Vec<FileKeys>,
-}
-
-/// One file.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct FileKeys {
-    /// Its name inside the log's folder, where the log is a folder.
-    pub(super) name: Option<String>,
-    #[serde(flatten)]
-    pub(super) layout: Layout,
-    /// Where the time of a row comes from.
-    pub(super) time: TimeKeys,
-    /// The gyros.
-    pub(super) gyro: Option<GyroKeys>,
-    /// The accelerometers.
-    pub(super) accel: Option<TickKeys<AccelUnit>>,
-    /// Temperature channels.
-    #[serde(default)]
-    pub(super) temperature: Vec<TemperatureMapping>,
-    /// What says of each row whether it holds.
-    pub(super) status: Option<StatusMapping>,
-}
-
-/// Where the time of a row comes from.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct TimeKeys {
-    /// Column of stamps.
-    pub(super) column: Option<Column>,
-    /// Unit of the stamps.
-    pub(super) unit: Option<TimeUnit>,
-    /// Which end of the tick a stamp marks.
-    pub(super) marks: Option<Marks>,
-    /// Where a tick's duration comes from: the difference of stamps, or the nominal tick.
-    pub(super) duration: Option<DurationRule>,
-    /// More than this many nominal ticks between two stamps are a gap.
-    #[schemars(range(min = 1.25), extend("x-must-be" = "1.25 or more, or jitter would count as a gap"))]
-    pub(super) gap_after_ticks: Option<f64>,
-    /// Added to every stamp; without stamps, start of the first tick (ns).
-    #[serde(default)]
-    #[schemars(range(min = -2_305_843_009_213_693_952_i64, max = 2_305_843_009_213_693_951_i64))]
-    pub(super) origin_ns: i64,
-    /// Nominal tick (ns).
-    #[schemars(range(min = 1.0, max = 3.6e12))]
-    pub(super) tick_ns: Option<f64>,
-    /// Nominal tick (µs).
-    #[schemars(range(min = 1e-3, max = 3.6e9))]
-    pub(super) tick_us: Option<f64>,
-    /// Nominal tick (ms).
-    #[schemars(range(min = 1e-6, max = 3.6e6))]
-    pub(super) tick_ms: Option<f64>,
-    /// Nominal tick (s).
-    #[schemars(range(min = 1e-9, max = 3600.0))]
-    pub(super) tick_s: Option<f64>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(inline)]
-pub(super) enum DurationRule {
-    Measured,
-    Nominal,
-}
-
-/// The sensors of one kind.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct TickKeys<U> {
-    /// What the readings stand for.
-    pub(super) output: Output,
-    /// One to eight sensors, in the order of the calibration document.
-    #[schemars(length(min = 1, max = 8))]
-    pub(super) sensors: Vec<SensorKeys<U>>,
-    /// Column of sequence numbers.
-    pub(super) sequence_column: Option<Column>,
-    /// Column of durations.
-    pub(super) duration_column: Option<Column>,
-    /// Its unit.
-    pub(super) duration_unit: Option<TimeUnit>,
-    /// A row whose cells of these sensors are all empty has no tick of them.
-    #[serde(default)]
-    pub(super) may_be_empty: bool,
-}
-
-/// The gyros of a file.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct GyroKeys {
-    #[serde(flatten)]
-    pub(super) ticks: TickKeys<GyroUnit>,
-    /// Lasing mode.
-    pub(super) mode: Option<ModeMapping>,
-    /// Switch commands.
-    pub(super) switch: Option<SwitchKeys>,
-    /// Phase of the slow meander.
-    pub(super) meander: Option<ModeMapping>,
-    /// Half-period counts, one pair per gyro.
-    #[serde(default)]
-    pub(super) half_periods: Vec<HalfPeriodMapping>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
+/// What readings stand for.
+#[derive(Deserialize, JsonSchema)]
+#[serde(remote = "OutputKind", rename_all = "snake_case")]
 #[schemars(inline)]
 pub(super) enum Output {
     Counts,
     Mean,
 }
 
-impl From<Output> for OutputKind {
-    fn from(output: Output) -> Self {
-        match output {
-            Output::Counts => Self::Counts,
-            Output::Mean => Self::Mean,
-        }
-    }
-}
-
-/// One sensor's column.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct SensorKeys<U> {
-    /// Which column.
-    pub(super) column: Column,
-    /// Its unit.
-    pub(super) unit: Option<U>,
-    /// Direction of the sensor: 1 or −1.
-    #[schemars(range(min = -1, max = 1), extend("not" = { "const": 0 }), extend("x-must-be" = "1 or -1"))]
-    pub(super) sign: Option<i8>,
-    /// Units per unit of the column.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) scale: Option<f64>,
-    /// Raw reading that stands for zero.
-    pub(super) mid_scale: Option<f64>,
-}
-
 /// Unit of a gyro's readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(inline)]
 pub enum GyroUnit {
     /// Counts of the tick.
+    #[default]
     Counts,
     /// rad/s.
     RadPerS,
@@ -184,10 +43,11 @@ pub enum GyroUnit {
 }
 
 /// Unit of an accelerometer's readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[schemars(inline)]
 pub enum AccelUnit {
     /// Counts of the tick.
+    #[default]
     #[serde(rename = "counts")]
     Counts,
     /// m/s².
@@ -213,21 +73,36 @@ pub enum AccelUnit {
     RawPerTick,
 }
 
-/// Where mode-switch commands come from.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct SwitchKeys {
-    /// A column: 1 in the tick at whose start the switch was commanded, else 0.
-    pub(super) column: Option<Column>,
-    /// The first tick of the other mode.
-    pub(super) from: Option<SwitchFrom>,
+/// The unit of a sensor's column.
+pub trait SensorUnit: Copy + Default {
+    /// How much it is in SI, and whether it is an increment over the tick; `None` for counts.
+    fn in_si(self) -> Option<(f64, bool)>;
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(inline)]
-pub(super) enum SwitchFrom {
-    ModeChange,
+impl SensorUnit for GyroUnit {
+    fn in_si(self) -> Option<(f64, bool)> {
+        Some(match self {
+            Self::Counts => return None,
+            Self::RadPerS | Self::Raw => (1.0, false),
+            Self::DegPerS => (AngularRate::from_deg_per_s(1.0).as_rad_per_s(), false),
+            Self::DegPerH => (AngularRate::from_deg_per_h(1.0).as_rad_per_s(), false),
+            Self::Rad | Self::RawPerTick => (1.0, true),
+            Self::Deg => (PI / 180.0, true),
+            Self::Arcsec => (Angle::from_arcsec(1.0).as_rad(), true),
+        })
+    }
+}
+
+impl SensorUnit for AccelUnit {
+    fn in_si(self) -> Option<(f64, bool)> {
+        Some(match self {
+            Self::Counts => return None,
+            Self::MPerS2 | Self::Volt | Self::Raw => (1.0, false),
+            Self::G => (SpecificForce::from_g(1.0).as_m_per_s2(), false),
+            Self::Mg => (SpecificForce::from_g(0.001).as_m_per_s2(), false),
+            Self::MPerS | Self::RawPerTick => (1.0, true),
+        })
+    }
 }
 
 /// Unit of a temperature channel's readings.

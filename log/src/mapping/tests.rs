@@ -1,5 +1,7 @@
 //! Mappings that hold, and every kind of mapping that does not.
 
+use isotherm_correction::units::Span;
+
 use super::*;
 
 /// A small mapping that holds; the tests break it line by line.
@@ -45,12 +47,12 @@ fn a_sound_mapping_says_what_it_says() {
     assert!(file.time.measured);
     let gyro = file.gyro.as_ref().unwrap();
     assert_eq!(gyro.ticks.output, OutputKind::Mean);
-    let conversions: Vec<_> = gyro.ticks.sensors.iter().map(|sensor| sensor.conversion).collect();
+    let conversions: Vec<_> = gyro.ticks.sensors.iter().map(SensorMapping::conversion).collect();
     let rad_per_deg = std::f64::consts::PI / 180.0;
     assert_eq!(conversions[0].factor.to_bits(), rad_per_deg.to_bits());
     assert_eq!(conversions[1].factor.to_bits(), (-rad_per_deg).to_bits());
     assert_eq!((conversions[2].mid_scale, conversions[2].factor), (32768.0, 0.5));
-    assert_eq!(gyro.switch, Some(SwitchMapping::ModeChange));
+    assert_eq!(gyro.switch.as_ref().unwrap().from, Some(SwitchFrom::ModeChange));
     assert_eq!(file.accel.as_ref().unwrap().sensors[0].column, Column::Index(4));
     assert_eq!((file.temperatures[0].unit.shift(), file.temperatures[0].every_rows), (-273.15, 3));
 }

@@ -5,8 +5,8 @@ use isotherm_document::escape::clipped;
 
 use super::error::Reason;
 use crate::mapping::{
-    Column, Conversion, FileMapping, ModeMapping, StatusMapping, SwitchMapping, TickMapping, TimeColumn,
-    TimeUnit,
+    Column, Conversion, FileMapping, ModeMapping, SensorUnit, StatusMapping, SwitchMapping, TickMapping,
+    TimeColumn, TimeUnit,
 };
 
 /// What of a header is shown, in characters.
@@ -158,8 +158,8 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
                 mode: gyro.mode.as_ref().map(|mode| state(mode, header)).transpose()?,
                 switch: match &gyro.switch {
                     None => SwitchCells::None,
-                    Some(SwitchMapping::ModeChange) => SwitchCells::ModeChange,
-                    Some(SwitchMapping::Column(column)) => SwitchCells::Cell(StateCell {
+                    Some(SwitchMapping { column: None, .. }) => SwitchCells::ModeChange,
+                    Some(SwitchMapping { column: Some(column), .. }) => SwitchCells::Cell(StateCell {
                         cell: find(column)?,
                         plus: "1".into(),
                         minus: "0".into(),
@@ -190,16 +190,16 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
 }
 
 /// Sensors of one kind.
-fn ticks(mapping: &TickMapping, header: &[String]) -> Result<TickCells, Reason> {
+fn ticks<U: SensorUnit>(mapping: &TickMapping<U>, header: &[String]) -> Result<TickCells, Reason> {
     let mut sensors = Sensors::new();
     for sensor in &mapping.sensors {
-        sensors.push((find(&sensor.column, header)?, sensor.conversion));
+        sensors.push((find(&sensor.column, header)?, sensor.conversion()));
     }
     Ok(TickCells {
         output: mapping.output,
         sensors,
         sequence: mapping.sequence.as_ref().map(|column| find(column, header)).transpose()?,
-        duration: mapping.duration.as_ref().map(|duration| time(duration, header)).transpose()?,
+        duration: mapping.duration().map(|duration| time(&duration, header)).transpose()?,
         may_be_empty: mapping.may_be_empty,
     })
 }
@@ -213,8 +213,8 @@ fn time(mapping: &TimeColumn, header: &[String]) -> Result<TimeCell, Reason> {
 fn state(mapping: &ModeMapping, header: &[String]) -> Result<StateCell, Reason> {
     Ok(StateCell {
         cell: find(&mapping.column, header)?,
-        plus: mapping.plus.clone(),
-        minus: mapping.minus.clone(),
+        plus: mapping.plus.trim().to_owned(),
+        minus: mapping.minus.trim().to_owned(),
         may_be_empty: mapping.may_be_empty,
     })
 }

@@ -160,7 +160,7 @@ impl<'a> Row<'a> {
     pub(super) fn check_status(&self, cell: usize, status: &StatusMapping) -> Result<(), Fault> {
         let text = self.filled(cell)?;
         let holds = match status.bad_bits {
-            None => status.good.iter().any(|good| good.as_bytes() == text),
+            None => status.good.iter().any(|good| good.trim().as_bytes() == text),
             Some(bits) => {
                 let word = number::word(text).ok_or(Fault { cell: Some(cell), reason: Reason::NotAWord })?;
                 word & bits == 0

@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::*;
-use crate::mapping::{Column, FileMapping};
+use crate::mapping::Column;
 
 /// A mapping for `t;x;y;z;T` with these keys of the file and of its time.
 fn mapping(file: &str, time: &str) -> Mapping {
@@ -421,13 +421,12 @@ fn modes_switches_order_sign_half_periods_and_increments() {
 
 #[test]
 fn files_are_merged_in_time() {
-    let mut both = mapping("delimiter = \"comma\"\nname = \"a\"", STAMPS);
-    let mut second: FileMapping = both.files[0].clone();
-    let gyro = second.gyro.take().unwrap();
-    second.accel = Some(gyro.ticks);
-    second.temperatures.clear();
-    second.name = Some("b".into());
-    both.files.push(second);
+    let both = "version = 1\n[[file]]\ndelimiter = \"comma\"\nname = \"a\"\ntime = { column = 1, unit = \"ms\", tick_ms = 10 }\n\
+        gyro = { output = \"mean\", sensors = [{ column = 2, unit = \"rad_per_s\" }, { column = 3, unit = \"rad_per_s\" }] }\n\
+        temperature = [{ channel = \"case\", column = 4, unit = \"deg_c\" }]\n\
+        [[file]]\ndelimiter = \"comma\"\nname = \"b\"\ntime = { column = 1, unit = \"ms\", tick_ms = 10 }\n\
+        accel = { output = \"mean\", sensors = [{ column = 2, unit = \"m_per_s2\" }, { column = 3, unit = \"m_per_s2\" }] }\n";
+    let both = Mapping::parse(both, "m.toml").unwrap();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a"), "10,1,7,20\n20,2,7,20\n").unwrap();
     std::fs::write(folder.path().join("b"), "5,1,7\n10,1,7\n25,1,7\n").unwrap();
