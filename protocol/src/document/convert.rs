@@ -38,10 +38,17 @@ impl Document {
     pub fn to_parts(&self) -> CalibrationParts {
         let temperature = &self.temperature;
         let accel = self.accel.as_ref();
-        let gyro_thermal = self.gyro.orientation.thermal.as_ref();
-        let accel_thermal = accel.and_then(|accel| accel.orientation.thermal.as_ref());
-        let following =
-            |channels: &Vec<String>| channels.iter().map(|name| self.channel_index(name)).collect();
+        let gyro_parity = self.gyro.orientation.parity.as_ref();
+        let gyro_parity =
+            gyro_parity.map(|parity| (parity.limit_deg_per_h * DEG_PER_H, parity.confirm_ticks));
+        let (gyro_orientation, gyro_orientation_channels) =
+            self.orientation(&self.gyro.orientation, gyro_parity);
+        let accel_orientation = accel.map(|accel| {
+            let parity = accel.orientation.parity.as_ref();
+            let parity = parity.map(|parity| (parity.limit_m_per_s2, parity.confirm_ticks));
+            self.orientation(&accel.orientation, parity)
+        });
+        let (accel_orientation, accel_orientation_channels) = accel_orientation.unzip();
         CalibrationParts {
             filter: temperature.to_parts(),
             channels: temperature.channel.iter().map(Channel::to_parts).collect(),
@@ -51,33 +58,16 @@ impl Document {
                 GyroOutput::Mean => OutputKind::Mean,
             },
             gyros: self.gyro.sensor.iter().map(|sensor| self.gyro_parts(sensor)).collect(),
-            gyro_orientation: orientation(
-                &self.gyro.orientation,
-                self.gyro
-                    .orientation
-                    .parity
-                    .as_ref()
-                    .map(|parity| (parity.limit_deg_per_h * DEG_PER_H, parity.confirm_ticks)),
-            ),
-            gyro_orientation_channels: gyro_thermal
-                .map(|thermal| following(&thermal.channels))
-                .unwrap_or_default(),
+            gyro_orientation,
+            gyro_orientation_channels,
             accel_output: match accel.map(|accel| accel.output) {
                 Some(AccelOutput::Counts) => OutputKind::Counts,
                 _ => OutputKind::Mean,
             },
             accels: accel
                 .map_or_else(Vec::new, |accel| accel.sensor.iter().map(|s| self.accel_parts(s)).collect()),
-            accel_orientation: accel.map(|accel| {
-                let parity = accel.orientation.parity.as_ref();
-                orientation(
-                    &accel.orientation,
-                    parity.map(|parity| (parity.limit_m_per_s2, parity.confirm_ticks)),
-                )
-            }),
-            accel_orientation_channels: accel_thermal
-                .map(|thermal| following(&thermal.channels))
-                .unwrap_or_default(),
+            accel_orientation,
+            accel_orientation_channels: accel_orientation_channels.unwrap_or_default(),
             reversal: self.mode_reversal.as_ref().map(reversal),
             self_test: self.self_test.as_ref().map(self_test).unwrap_or_default(),
         }
@@ -86,6 +76,28 @@ impl Document {
     /// Index of a channel by its name; one that is too large where there is none of the name.
     fn channel_index(&self, name: &str) -> usize {
         self.temperature.channel.iter().position(|channel| channel.name == name).unwrap_or(usize::MAX)
+    }
+
+    /// The core's parts of an orientation with this limit and number of ticks for parity, and the channels that it follows.
+    fn orientation<P>(
+        &self,
+        Orientation { rows, weights, thermal, .. }: &Orientation<P>,
+        parity: Option<(f64, u32)>,
+    ) -> (OrientationParts, Vec<usize>) {
+        let thermal = thermal.as_ref();
+        let each = || thermal.into_iter();
+        let slopes = each().flat_map(|thermal| &thermal.slopes_arcsec_per_deg_c);
+        let parts = OrientationParts {
+            reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
+            rows: rows.clone(),
+            slopes_per_deg_c: slopes.map(|row| row.map(|slope| slope * ARCSEC)).collect(),
+            plays: each().flat_map(|thermal| &thermal.hysteresis).map(play).collect(),
+            weights: weights.clone().unwrap_or_default(),
+            range_deg_c: thermal.map_or(EVERYWHERE_DEG_C, |thermal| thermal.range_deg_c),
+            parity_limit: parity.map(|(limit, _)| limit),
+            parity_confirm_ticks: parity.map_or(1, |(_, ticks)| ticks),
+        };
+        (parts, each().flat_map(|thermal| &thermal.channels).map(|name| self.channel_index(name)).collect())
     }
 
     fn term_parts<K: SensorKind>(&self, terms: &Terms<K>) -> Vec<TermParts> {
@@ -197,22 +209,6 @@ fn auxiliary(channel: &Auxiliary) -> ChannelParts {
         conversion: channel.conversion.clone(),
         range_deg_c: channel.range,
         spike_limit_deg_c: channel.spike_limit,
-    }
-}
-
-fn orientation<P>(orientation: &Orientation<P>, parity: Option<(f64, u32)>) -> OrientationParts {
-    let thermal = orientation.thermal.as_ref();
-    let slopes = thermal
-        .map(|thermal| thermal.slopes_arcsec_per_deg_c.iter().map(|row| row.map(|slope| slope * ARCSEC)));
-    OrientationParts {
-        reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
-        rows: orientation.rows.clone(),
-        slopes_per_deg_c: slopes.map(Iterator::collect).unwrap_or_default(),
-        plays: thermal.map(|thermal| thermal.hysteresis.iter().map(play).collect()).unwrap_or_default(),
-        weights: orientation.weights.clone().unwrap_or_default(),
-        range_deg_c: thermal.map_or(EVERYWHERE_DEG_C, |thermal| thermal.range_deg_c),
-        parity_limit: parity.map(|(limit, _)| limit),
-        parity_confirm_ticks: parity.map_or(1, |(_, ticks)| ticks),
     }
 }
 

@@ -1,16 +1,13 @@
 //! What differs between the corrections of two documents at one thermal state.
 
-use isotherm_correction::calibration::Calibration;
+use isotherm_correction::calibration::{Calibration, Steady};
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::{ChannelName, LasingMode};
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 
 use super::measure::ARCSEC;
-use super::types::{Accel, Document, GyroOutput};
+use super::types::{Document, GyroOutput};
 use crate::control::CorrectionChange;
-
-/// Names of the case axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A document with its calibration: one side of a comparison.
 #[derive(Debug, Clone, Copy)]
@@ -35,86 +32,70 @@ pub fn correction_change(
     thermal: impl Fn(&ChannelName) -> Option<ThermalState>,
     mode: Option<LasingMode>,
 ) -> Vec<CorrectionChange> {
-    let old = before.calibration.steady(&thermal, mode);
-    let new = after.calibration.steady(&thermal, mode);
-    let mut changes = Changes(Vec::new());
-    let (first, second) = (before.document, after.document);
-    let same = first.gyro.output == second.gyro.output;
-    let (weight, size) = match second.gyro.output {
+    let [old, new] =
+        [before, after].map(|side| stated(side.document, &side.calibration.steady(&thermal, mode)));
+    let mut changes = Vec::new();
+    for (quantity, unit, now) in new {
+        let Some((.., then)) = old.iter().find(|(of, in_unit, _)| *of == quantity && *in_unit == unit) else {
+            continue;
+        };
+        let (before, after) = match (then, now) {
+            (Value::Axis(old), Value::Axis(new)) => (0.0, turned_arcsec(*old, new)),
+            (Value::Number(old), Value::Number(new)) => (*old, new),
+            _ => continue,
+        };
+        if before.to_bits() != after.to_bits() {
+            changes.push(CorrectionChange { quantity, unit, before, after });
+        }
+    }
+    changes
+}
+
+/// What a correction does, and in which unit.
+type Quantity = (String, String, Value);
+
+enum Value {
+    Number(f64),
+    Axis([f64; 3]),
+}
+
+/// What a document's correction does in a steady state, sensor by sensor and then in case axes.
+fn stated(document: &Document, steady: &Steady) -> Vec<Quantity> {
+    let number = |quantity, unit: &str, value| (quantity, unit.to_owned(), Value::Number(value));
+    let turn = |sensor: &str, axis: &[f64; 3]| {
+        (format!("{sensor} input axis turns"), "″".to_owned(), Value::Axis(*axis))
+    };
+    let (unit, size) = match document.gyro.output {
         GyroOutput::Counts => ("″/count", ARCSEC),
         GyroOutput::Mean => ("rad/rad", 1.0),
     };
-    let names = |document: &Document| -> Vec<String> {
-        document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect()
-    };
-    for (name, i, j) in matched(&names(first), &names(second)) {
-        let sensor = format!("gyro {name}");
-        changes.pair(&sensor, "bias", ("°/h", deg_per_h), pair(&old.gyro_bias, &new.gyro_bias, i, j));
-        let weights = pair(&old.gyro_weight, &new.gyro_weight, i, j).filter(|_| same);
-        changes.pair(&sensor, "increment weight", (weight, |weight| weight / size), weights);
-        changes.turn(&sensor, pair(&old.gyro_axes, &new.gyro_axes, i, j));
+    let mut all = Vec::new();
+    let values = steady.gyro_bias.iter().zip(&steady.gyro_weight).zip(&steady.gyro_axes);
+    for (sensor, ((bias, weight), axis)) in document.gyro.sensor.iter().zip(values) {
+        let of = format!("gyro {}", sensor.name);
+        all.push(number(format!("{of} bias"), "°/h", deg_per_h(*bias)));
+        all.push(number(format!("{of} increment weight"), unit, weight / size));
+        all.push(turn(&of, axis));
     }
-    if let (Some(first), Some(second)) = (&first.accel, &second.accel) {
-        let same = first.output == second.output;
-        let unit = second.output.scale_unit().symbol();
-        let names = |accel: &Accel| -> Vec<String> {
-            accel.sensor.iter().map(|sensor| sensor.name.clone()).collect()
-        };
-        for (name, i, j) in matched(&names(first), &names(second)) {
-            let sensor = format!("accelerometer {name}");
-            changes.pair(&sensor, "bias", ("mg", milli_g), pair(&old.accel_bias, &new.accel_bias, i, j));
-            let scales = pair(&old.accel_scale, &new.accel_scale, i, j).filter(|_| same);
-            changes.pair(&sensor, "scale factor", (&unit, |scale| scale), scales);
-            changes.turn(&sensor, pair(&old.accel_axes, &new.accel_axes, i, j));
-        }
+    let values = steady.accel_bias.iter().zip(&steady.accel_scale).zip(&steady.accel_axes);
+    let sensors =
+        document.accel.iter().flat_map(|accel| accel.sensor.iter().map(|sensor| (accel.output, sensor)));
+    for ((output, sensor), ((bias, scale), axis)) in sensors.zip(values) {
+        let of = format!("accelerometer {}", sensor.name);
+        all.push(number(format!("{of} bias"), "mg", milli_g(*bias)));
+        all.push(number(format!("{of} scale factor"), &output.scale_unit().symbol(), *scale));
+        all.push(turn(&of, axis));
     }
-    for ((axis, old), new) in AXES.iter().zip(old.gyro_rate_in_case).zip(new.gyro_rate_in_case) {
-        changes.add(format!("angular rate about {axis}"), "°/h", deg_per_h(old), deg_per_h(new));
-    }
-    for ((axis, old), new) in AXES.iter().zip(old.accel_force_in_case).zip(new.accel_force_in_case) {
-        changes.add(format!("specific force along {axis}"), "mg", milli_g(old), milli_g(new));
-    }
-    changes.0
-}
-
-/// The changes found so far.
-struct Changes(Vec<CorrectionChange>);
-
-impl Changes {
-    fn add(&mut self, quantity: String, unit: &str, before: f64, after: f64) {
-        if before.to_bits() != after.to_bits() {
-            self.0.push(CorrectionChange { quantity, unit: unit.to_owned(), before, after });
-        }
-    }
-
-    fn pair(
-        &mut self,
-        sensor: &str,
-        quantity: &str,
-        (unit, stated): (&str, impl Fn(f64) -> f64),
-        values: Option<(f64, f64)>,
-    ) {
-        if let Some((old, new)) = values {
-            self.add(format!("{sensor} {quantity}"), unit, stated(old), stated(new));
-        }
-    }
-
-    fn turn(&mut self, sensor: &str, axes: Option<([f64; 3], [f64; 3])>) {
-        if let Some((old, new)) = axes {
-            self.add(format!("{sensor} input axis turns"), "″", 0.0, turned_arcsec(old, new));
-        }
-    }
-}
-
-/// Names that both have, with the index in either, in the order of the second.
-fn matched(before: &[String], after: &[String]) -> Vec<(String, usize, usize)> {
-    let later = after.iter().enumerate();
-    let both = later.filter_map(|(j, name)| Some((name.clone(), before.iter().position(|n| n == name)?, j)));
-    both.collect()
-}
-
-fn pair<T: Copy>(before: &[T], after: &[T], i: usize, j: usize) -> Option<(T, T)> {
-    Some((*before.get(i)?, *after.get(j)?))
+    let axes = || ["x", "y", "z"].into_iter();
+    let rates = axes().zip(steady.gyro_rate_in_case);
+    all.extend(
+        rates.map(|(axis, rate)| number(format!("angular rate about {axis}"), "°/h", deg_per_h(rate))),
+    );
+    let forces = axes().zip(steady.accel_force_in_case);
+    all.extend(
+        forces.map(|(axis, force)| number(format!("specific force along {axis}"), "mg", milli_g(force))),
+    );
+    all
 }
 
 /// °/h from rad/s.

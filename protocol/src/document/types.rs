@@ -20,7 +20,7 @@ pub use sigma::{AccelBiasSigma, AccelSigma, GyroBiasSigma, GyroSigma};
 
 use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::units::Span;
-use isotherm_document::element;
+use isotherm_document::{element, join};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +66,9 @@ pub struct Document {
 pub(super) struct Sensor<'d> {
     /// Path of its table.
     pub(super) path: String,
+    pub(super) name: &'d str,
     pub(super) channel: Option<&'d str>,
+    pub(super) board: Option<&'d str>,
     pub(super) terms: Vec<KeyedTerm<'d>>,
 }
 
@@ -75,13 +77,40 @@ impl Document {
     pub(super) fn sensors(&self) -> Vec<Sensor<'_>> {
         let gyros = self.gyro.sensor.iter().enumerate().map(|(i, sensor)| {
             let path = element("gyro.sensor", i);
-            Sensor { channel: sensor.channel.as_deref(), terms: sensor.terms.keyed(&path), path }
+            let (name, channel) = (sensor.name.as_str(), sensor.channel.as_deref());
+            Sensor { name, channel, board: None, terms: sensor.terms.keyed(&path), path }
         });
         let accels = self.accel.iter().flat_map(|accel| &accel.sensor).enumerate().map(|(i, sensor)| {
             let path = element("accel.sensor", i);
-            Sensor { channel: sensor.channel.as_deref(), terms: sensor.terms.keyed(&path), path }
+            let (name, channel) = (sensor.name.as_str(), sensor.channel.as_deref());
+            let board = sensor.board_channel.as_deref();
+            Sensor { name, channel, board, terms: sensor.terms.keyed(&path), path }
         });
         gyros.chain(accels).collect()
+    }
+
+    /// Whatever names a channel: its path, the name, and whether that may be of an auxiliary channel.
+    pub(super) fn channels_named(&self) -> Vec<(String, &str, bool)> {
+        let mut named = Vec::new();
+        for sensor in self.sensors() {
+            let mut name = |path: &str, key, name: Option<_>, any| {
+                named.extend(name.map(|name| (join(path, key), name, any)));
+            };
+            name(&sensor.path, "channel", sensor.channel, false);
+            name(&sensor.path, "board_channel", sensor.board, false);
+            for term in sensor.terms {
+                let Some(regressor) = &term.stated.regressor else { continue };
+                name(&term.path, "channel", Some(&regressor.channel), true);
+                name(&term.path, "minus", regressor.minus.as_deref(), true);
+            }
+        }
+        let accel = self.accel.as_ref().and_then(|accel| accel.orientation.thermal.as_ref());
+        for (kind, thermal) in [("gyro", self.gyro.orientation.thermal.as_ref()), ("accel", accel)] {
+            let path = format!("{kind}.orientation.thermal.channels");
+            let names = thermal.into_iter().flat_map(|thermal| &thermal.channels).enumerate();
+            named.extend(names.map(|(i, name)| (element(&path, i), name.as_str(), false)));
+        }
+        named
     }
 }
 

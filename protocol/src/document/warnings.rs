@@ -65,18 +65,7 @@ fn grid(r: &Reader<'_>, filter: &Filter, found: &mut Vec<Problem>) {
 
 /// A channel that nothing follows.
 fn unused_channels(r: &Reader<'_>, document: &Document, found: &mut Vec<Problem>) {
-    let sensors = document.sensors();
-    let accel = document.accel.as_ref();
-    let gyro_thermal = document.gyro.orientation.thermal.as_ref();
-    let accel_thermal = accel.and_then(|accel| accel.orientation.thermal.as_ref());
-    let axes = gyro_thermal.into_iter().chain(accel_thermal).flat_map(|thermal| &thermal.channels);
-    let boards =
-        accel.into_iter().flat_map(|accel| &accel.sensor).filter_map(|sensor| sensor.board_channel.as_ref());
-    let regressors =
-        sensors.iter().flat_map(|sensor| &sensor.terms).filter_map(|term| term.stated.regressor.as_ref());
-    let regressors = regressors.flat_map(|regressor| regressor.minus.iter().chain([&regressor.channel]));
-    let own = sensors.iter().filter_map(|sensor| sensor.channel);
-    let used: BTreeSet<&str> = axes.chain(boards).chain(regressors).map(String::as_str).chain(own).collect();
+    let used: BTreeSet<&str> = document.channels_named().into_iter().map(|(_, name, _)| name).collect();
     let temperatures = document.temperature.channel.iter().map(|channel| &channel.name).enumerate();
     let temperatures = temperatures.map(|(i, name)| (element("temperature.channel", i), name));
     let auxiliaries = document.auxiliary.iter().map(|channel| &channel.name).enumerate();
