@@ -22,6 +22,11 @@ pub const MAX_KNOTS: usize = 64;
 /// A curve as the calibration document states it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CurveParts {
+    /// The same value everywhere.
+    Constant {
+        /// The value (finite).
+        value: f64,
+    },
     /// `Σ c_k·(x − reference)^k`.
     Polynomial {
         /// Point about which the powers are taken (argument's unit, finite).
@@ -41,6 +46,38 @@ pub enum CurveParts {
         /// [argument, value] pairs (2…64, arguments strictly increasing, finite).
         knots: Vec<[f64; 2]>,
     },
+}
+
+/// Range of a constant: wider than any temperature or rate.
+const ANYWHERE: [f64; 2] = [-1e9, 1e9];
+
+impl CurveParts {
+    /// The value at an argument, clamped to the fitted range; `None` where the numbers make no curve.
+    #[must_use]
+    pub fn at(&self, x: f64) -> Option<f64> {
+        Curve::new(self).ok().map(|curve| curve.at(x).value)
+    }
+
+    /// The curve in other units: arguments times `over`, values times `factor`, `plus` a constant.
+    #[must_use]
+    pub fn scaled(&self, over: f64, factor: f64, plus: f64) -> Self {
+        let convert = |knots: &[[f64; 2]]| knots.iter().map(|[x, y]| [x * over, y * factor + plus]).collect();
+        match self {
+            Self::Constant { value } => Self::Constant { value: value * factor + plus },
+            Self::Polynomial { reference, coefficients, range } => {
+                let factors = core::iter::successors(Some(factor), |factor| Some(factor / over));
+                let mut coefficients: Vec<f64> =
+                    coefficients.iter().zip(factors).map(|(c, f)| c * f).collect();
+                if let Some(first) = coefficients.first_mut() {
+                    *first += plus;
+                }
+                let (reference, range) = (reference * over, range.map(|end| end * over));
+                Self::Polynomial { reference, coefficients, range }
+            }
+            Self::PiecewiseLinear { knots } => Self::PiecewiseLinear { knots: convert(knots) },
+            Self::Spline { knots } => Self::Spline { knots: convert(knots) },
+        }
+    }
 }
 
 /// What is wrong with a stated curve.
@@ -145,6 +182,7 @@ impl Curve {
     /// The first thing that is wrong with it.
     pub fn new(parts: &CurveParts) -> Result<Self, CurveError> {
         match parts {
+            CurveParts::Constant { value } => polynomial(0.0, &[*value], ANYWHERE),
             CurveParts::Polynomial { reference, coefficients, range } => {
                 polynomial(*reference, coefficients, *range)
             }

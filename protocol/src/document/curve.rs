@@ -4,7 +4,7 @@ mod schema;
 
 pub(super) use schema::{definition, frequency, relative, relative_over_rate, scale_factor};
 
-use isotherm_correction::curve::{Curve as CoreCurve, CurveParts};
+pub use isotherm_correction::curve::CurveParts as Shape;
 use serde::de::{Deserialize, Deserializer, Error as _};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -18,87 +18,15 @@ pub struct Curve {
     shape: Shape,
 }
 
-/// Form of a curve.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Shape {
-    /// The same value everywhere.
-    Constant {
-        /// The value.
-        value: f64,
-    },
-    /// Σ cⱼ·(x − reference)ʲ.
-    Polynomial {
-        /// Point about which the powers are taken.
-        reference: f64,
-        /// c₀, c₁, …
-        coefficients: Vec<f64>,
-        /// Fitted range; outside it the argument is clamped.
-        range: [f64; 2],
-    },
-    /// Straight lines between knots.
-    PiecewiseLinear {
-        /// [argument, value] pairs.
-        knots: Vec<[f64; 2]>,
-    },
-    /// Natural cubic spline through the knots.
-    Spline {
-        /// [argument, value] pairs.
-        knots: Vec<[f64; 2]>,
-    },
-}
-
-impl Shape {
-    /// Value of the `kind` key.
-    const fn kind(&self) -> &'static str {
-        match self {
-            Self::Constant { .. } => "constant",
-            Self::Polynomial { .. } => "polynomial",
-            Self::PiecewiseLinear { .. } => "piecewise-linear",
-            Self::Spline { .. } => "spline",
-        }
-    }
-
-    /// The value at an argument, as the core evaluates it: outside its range the curve is held. `None` where the numbers make no
-    /// curve.
-    #[must_use]
-    pub fn at(&self, argument: f64) -> Option<f64> {
-        match self {
-            Self::Constant { value } => Some(*value),
-            _ => CoreCurve::new(&self.to_parts(1.0, 1.0, 0.0)).ok().map(|curve| curve.at(argument).value),
-        }
-    }
-
-    /// The core's parts, arguments times `over`, values times `factor`, `plus` a constant.
-    fn to_parts(&self, over: f64, factor: f64, plus: f64) -> CurveParts {
-        let convert =
-            |knots: &[[f64; 2]]| knots.iter().map(|[x, value]| [x * over, value * factor + plus]).collect();
-        match self {
-            Self::Constant { value } => CurveParts::Polynomial {
-                reference: 0.0,
-                coefficients: vec![value * factor + plus],
-                range: EVERYWHERE,
-            },
-            Self::Polynomial { reference, coefficients, range } => {
-                let factors = std::iter::successors(Some(factor), |factor| Some(factor / over));
-                let mut coefficients: Vec<f64> =
-                    coefficients.iter().zip(factors).map(|(c, f)| c * f).collect();
-                if let Some(first) = coefficients.first_mut() {
-                    *first += plus;
-                }
-                CurveParts::Polynomial {
-                    reference: *reference * over,
-                    coefficients,
-                    range: range.map(|end| end * over),
-                }
-            }
-            Self::PiecewiseLinear { knots } => CurveParts::PiecewiseLinear { knots: convert(knots) },
-            Self::Spline { knots } => CurveParts::Spline { knots: convert(knots) },
-        }
+/// Value of the `kind` key.
+const fn kind(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Constant { .. } => "constant",
+        Shape::Polynomial { .. } => "polynomial",
+        Shape::PiecewiseLinear { .. } => "piecewise-linear",
+        Shape::Spline { .. } => "spline",
     }
 }
-
-/// Argument range of a constant in the core, which has no form for it: wider than any temperature or rate.
-const EVERYWHERE: [f64; 2] = [-1e9, 1e9];
 
 impl Default for Curve {
     fn default() -> Self {
@@ -136,20 +64,7 @@ impl Curve {
     /// The same curve with a constant (in the unit of its values) added to all of it.
     #[must_use]
     pub fn plus(&self, change: f64) -> Self {
-        let mut curve = self.clone();
-        match &mut curve.shape {
-            Shape::Constant { value } => *value += change,
-            Shape::Polynomial { coefficients, .. } => match coefficients.first_mut() {
-                Some(first) => *first += change,
-                None => coefficients.push(change),
-            },
-            Shape::PiecewiseLinear { knots } | Shape::Spline { knots } => {
-                for [_, value] in knots {
-                    *value += change;
-                }
-            }
-        }
-        curve
+        Self { shape: self.shape.scaled(1.0, 1.0, change), ..*self }
     }
 
     /// The same curve held at its value at one argument; one that does not hold stays as it is.
@@ -192,8 +107,8 @@ impl Curve {
     }
 
     /// The core's parts, `plus` a constant in its units.
-    pub(super) fn to_parts(&self, plus: f64) -> CurveParts {
-        self.shape.to_parts(self.argument.in_core_units(), self.unit.in_core_units(), plus)
+    pub(super) fn to_parts(&self, plus: f64) -> Shape {
+        self.shape.scaled(self.argument.in_core_units(), self.unit.in_core_units(), plus)
     }
 
     /// Keys of the numbers of this curve.
@@ -237,7 +152,7 @@ impl Serialize for Curve {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let keys = self.keys();
         let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("kind", self.shape.kind())?;
+        map.serialize_entry("kind", kind(&self.shape))?;
         match &self.shape {
             Shape::Constant { value } => map.serialize_entry(&keys.value, value)?,
             Shape::Polynomial { reference, coefficients, range } => {

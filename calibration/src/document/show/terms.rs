@@ -4,8 +4,8 @@
 
 use std::fmt::Write;
 
-use isotherm_correction::curve::{Curve, CurveParts};
-use isotherm_protocol::document::{Argument, Document, Unit};
+use isotherm_correction::curve::Curve;
+use isotherm_protocol::document::{Argument, Curve as StatedCurve, Document, Shape};
 use toml::{Table, Value};
 
 use crate::error::Error;
@@ -97,63 +97,24 @@ fn gather(of: (&'static str, &str), path: &str, value: &Value, terms: &mut Vec<T
 
 /// A curve, where the table is one.
 fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Option<Term> {
-    let form = table.get("kind")?.as_str()?;
-    let find = |prefix: &str| table.iter().find_map(|(key, value)| Some((key.strip_prefix(prefix)?, value)));
-    let numbers = |value: &Value| value.as_array()?.iter().map(number).collect::<Option<Vec<f64>>>();
-    let argument_of = |suffix: &str| match suffix {
-        _ if suffix.ends_with(Argument::DegCPerS2.suffix()) => Argument::DegCPerS2,
-        _ if suffix.ends_with(Argument::DegCPerS.suffix()) => Argument::DegCPerS,
-        _ if suffix.ends_with(Argument::DegPerS.suffix()) => Argument::DegPerS,
-        _ => Argument::DegC,
+    table.get("kind")?;
+    let stated: StatedCurve = Value::Table(table.clone()).try_into().ok()?;
+    let argument = stated.argument().unwrap_or(Argument::DegC);
+    let words = match stated.shape() {
+        Shape::Constant { value } => six(*value),
+        Shape::Polynomial { reference, coefficients, .. } => polynomial(coefficients, *reference, argument),
+        Shape::PiecewiseLinear { knots } => format!("piecewise-linear, {} knots", knots.len()),
+        Shape::Spline { knots } => format!("spline, {} knots", knots.len()),
     };
-    let symbol = |suffix: &str| {
-        let known = Unit::of_suffix(suffix);
-        known.map_or_else(|| suffix.replace("_per_", "/").replace('_', " "), Unit::symbol)
-    };
-    let (unit, argument, range, words, parts);
-    match form {
-        "constant" => {
-            let (suffix, value) = find("value_")?;
-            let value = number(value)?;
-            (unit, argument, range) = (symbol(suffix), Argument::DegC, None);
-            words = six(value);
-            let everywhere = [-1e9, 1e9];
-            parts = CurveParts::Polynomial { reference: 0.0, coefficients: vec![value], range: everywhere };
-        }
-        "polynomial" => {
-            let (suffix, coefficients) = find("coefficients_")?;
-            let (over, reference) = find("reference_")?;
-            let (coefficients, reference) = (numbers(coefficients)?, number(reference)?);
-            let [low, high]: [f64; 2] = numbers(find("range_")?.1)?.try_into().ok()?;
-            (unit, argument, range) = (symbol(suffix), argument_of(over), Some([low, high]));
-            words = polynomial(&coefficients, reference, argument);
-            parts = CurveParts::Polynomial { reference, coefficients, range: [low, high] };
-        }
-        "piecewise-linear" | "spline" => {
-            let (suffix, knots) = find("knots_")?;
-            let (of, over) = suffix.split_once("_over_").unwrap_or((suffix, "deg_c"));
-            let pair = |knot: &Value| -> Option<[f64; 2]> { numbers(knot)?.try_into().ok() };
-            let knots = knots.as_array()?.iter().map(pair).collect::<Option<Vec<_>>>()?;
-            (unit, argument) = (symbol(of), argument_of(over));
-            range = Some([knots.first()?[0], knots.last()?[0]]);
-            words = format!("{form}, {} knots", knots.len());
-            parts = if form == "spline" {
-                CurveParts::Spline { knots }
-            } else {
-                CurveParts::PiecewiseLinear { knots }
-            };
-        }
-        _ => return None,
-    }
     Some(Term {
         kind,
         sensor: sensor.to_owned(),
         name: name.to_owned(),
-        unit,
+        unit: stated.unit().symbol(),
         argument: argument.symbol(),
-        range,
+        range: stated.range(),
         words,
-        curve: Curve::new(&parts).ok()?,
+        curve: Curve::new(stated.shape()).ok()?,
     })
 }
 
