@@ -236,16 +236,11 @@ impl Orientation {
         rows.iter().take(self.sensors).map(|row| dot(row, &v)).collect()
     }
 
-    /// What each sensor reads for a vector of its own, whose axes are lanes, as [`forward`](Self::forward); 0 where there is none.
+    /// Direction cosines of the input axes, by case axis and sensor.
     #[inline]
-    pub(crate) fn along<const N: usize>(&self, temperature_deg_c: f64, v: &[[f64; N]; 3]) -> [f64; N] {
+    pub(crate) fn axes_at(&self, temperature_deg_c: f64) -> impl Fn(usize, usize) -> f64 {
         let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
-        let (rows, slopes) = (&self.rows, &self.slopes_per_deg_c);
-        let axis = |axis: usize| -> [f64; N] {
-            array::from_fn(|lane| (rows[lane][axis] + slopes[lane][axis] * excess) * v[axis][lane])
-        };
-        let [x, y, z] = [axis(0), axis(1), axis(2)];
-        array::from_fn(|lane| x[lane] + y[lane] + z[lane])
+        move |axis, sensor| self.rows[sensor][axis] + self.slopes_per_deg_c[sensor][axis] * excess
     }
 
     /// C(T), with T clamped to the fitted range and NaN standing for the reference.

@@ -74,13 +74,16 @@ impl Corrector {
         let scale =
             Scale { weight, times_s: (calibration.gyro_output == OutputKind::Mean).then_some(duration_s) };
         let mut clamped = SensorMask::NONE;
-        if self.calm.follows.any {
-            let limits = narrow::<N>(&calibration.gyro_limits);
-            let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
-            let rates = scale.angles(within).map(|angle| angle / duration_s);
-            let mut moved = bias;
-            clamped = self.gyros_in_motion::<N>(calibration, shares, &rates, &mut moved);
-            bias = moved;
+        if self.calm.follows.force | self.calm.follows.rates {
+            let mut drift =
+                if self.calm.follows.force { self.drift_with_force::<N>(shares) } else { [0.0; N] };
+            if self.calm.follows.rates {
+                let limits = narrow::<N>(&calibration.gyro_limits);
+                let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
+                let rates = scale.angles(within).map(|angle| angle / duration_s);
+                clamped = self.weigh_over_rate::<N>(calibration, shares, &rates, &mut drift);
+            }
+            bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
         self.servo.advance(lost, time, raw.duration);
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)

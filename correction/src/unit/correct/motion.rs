@@ -12,10 +12,13 @@ use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow};
 use crate::orientation::SensorMask;
 use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
-use crate::thermal::{Bank, Motion, Shares};
+use crate::thermal::{Bank, Motion, MotionBanks, Shares};
 use crate::unit::slew::between;
 use crate::units::{Span, Timestamp};
 use crate::vector::{cross_lanes, minus, plus};
+
+/// Place of the asymmetry among the lines of a gyro's terms that follow motion.
+const ASYMMETRY: usize = 3;
 
 /// What was in use when a swap took effect, for a slew away from it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -30,8 +33,10 @@ pub(in crate::unit) struct MotionInUse {
 pub(super) struct MotionMemory {
     /// Last specific force to be trusted (m/s²).
     force: [f64; 3],
-    /// Angular rates of the last two ticks without a gap (rad/s), the latest first, with the middles of the ticks.
-    rates: [Option<([f64; 3], Timestamp)>; 2],
+    /// Angular rate of the last tick without a gap (rad/s), with the middle of the tick.
+    rate: Option<([f64; 3], Timestamp)>,
+    /// Its slope from the one before (rad/s²), and the time between them (s).
+    slope: Option<([f64; 3], f64)>,
     /// What is held back; `None` where nothing is.
     pub(super) held: Option<Box<HeldBack>>,
 }
@@ -46,9 +51,11 @@ pub(super) struct Follows {
     /// Any of these, or what is still held back.
     pub(super) any: bool,
     /// Drift with the specific force.
-    force: bool,
+    pub(super) force: bool,
     /// Weights of gyros over their rate.
     curves: bool,
+    /// Any weights of gyros that are not the same at every rate.
+    pub(super) rates: bool,
     /// Second-order terms of accelerometers.
     squares: bool,
     /// Accelerometers away from the reference point.
@@ -62,26 +69,17 @@ impl MotionMemory {
     /// parabola through the three, of the line through two, zero without.
     ///
     /// With equal ticks it is (3ω₀ − 4ω₁ + ω₂)/2Δt: white noise of the rate of standard deviation σ gives it √26/2 ≈ 2.55 σ/Δt.
-    fn acceleration(&self, rate: [f64; 3], middle: Timestamp) -> [f64; 3] {
-        let slope = |(later, at): ([f64; 3], Timestamp), (earlier, before): ([f64; 3], Timestamp)| {
-            let over_s = at.seconds_from(before);
-            (minus(later, earlier).map(|step| step / over_s), over_s)
-        };
-        let Some(last) = self.rates[0] else { return [0.0; 3] };
-        let (here, over_s) = slope((rate, middle), last);
-        let Some(earlier) = self.rates[1] else { return here };
-        let (there, before_s) = slope(last, earlier);
+    fn acceleration(&mut self, rate: [f64; 3], middle: Timestamp) -> [f64; 3] {
+        let Some((last, before)) = self.rate.replace((rate, middle)) else { return [0.0; 3] };
+        let over_s = middle.seconds_from(before);
+        let here = minus(rate, last).map(|step| step / over_s);
+        let Some((there, before_s)) = self.slope.replace((here, over_s)) else { return here };
         plus(here, minus(here, there).map(|bend| bend * over_s / (over_s + before_s)))
-    }
-
-    /// Puts a tick's rate before the others.
-    fn push(&mut self, rate: [f64; 3], middle: Timestamp) {
-        self.rates = [Some((rate, middle)), self.rates[0]];
     }
 
     /// Forgets rates: what comes next does not follow them without a gap.
     fn interrupt(&mut self) {
-        self.rates = [None; 2];
+        (self.rate, self.slope) = (None, None);
     }
 
     /// Forgets what came before: another series begins.
@@ -133,10 +131,13 @@ impl Corrector {
     pub(super) fn follow_motion(&self, calibration: &Calibration) -> Follows {
         let old = self.slew_from_motion().map(|old| &old.motion);
         let motions = || calibration.motion.as_deref().into_iter().chain(old);
+        let curves = motions().any(Motion::has_curves);
+        let is_asymmetric = |banks: &MotionBanks| banks.gyros.has_any([ASYMMETRY; 2]);
         Follows {
             any: motions().next().is_some() || self.motion.held.is_some(),
             force: motions().any(|motion| motion.feels_force),
-            curves: motions().any(Motion::has_curves),
+            curves,
+            rates: curves || old.is_some() || self.thermal.motion.as_deref().is_some_and(is_asymmetric),
             squares: motions().any(Motion::has_squares),
             positions: motions().any(|motion| motion.has_positions),
             delays: motions().any(|motion| motion.holds_back),
@@ -157,25 +158,31 @@ impl Corrector {
         })
     }
 
-    /// Adds to the gyros' biases (rad/s) what follows motion; `rates` are those that the gyros read (rad/s), before any bias is
-    /// subtracted. Gives the gyros whose rate is outside the range of its curve.
+    /// Drift of the gyros with the specific force (rad/s).
     #[inline(never)]
-    pub(super) fn gyros_in_motion<const N: usize>(
+    pub(super) fn drift_with_force<const N: usize>(&self, shares: Shares<'_>) -> [f64; N] {
+        let ([x, y, z, _], force) = (self.gyro_motion::<N>(shares), self.motion.force);
+        array::from_fn(|lane| x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2])
+    }
+
+    /// Takes from the gyros' drift (rad/s) what their weights miss at the rates that they read (rad/s), before any bias is subtracted. Gives
+    /// the gyros whose rate is outside the range of its curve.
+    #[inline(never)]
+    pub(super) fn weigh_over_rate<const N: usize>(
         &self,
         calibration: &Calibration,
         shares: Shares<'_>,
         rates: &[f64; N],
-        bias: &mut [f64; N],
+        drift: &mut [f64; N],
     ) -> SensorMask {
-        let [x, y, z, asymmetry] = self.gyro_motion::<N>(shares);
-        let (force, mut clamped, mut errors) = (self.motion.force, SensorMask::NONE, [0.0; N]);
+        let asymmetry = self.gyro_motion::<N>(shares)[ASYMMETRY];
+        let (mut clamped, mut errors) = (SensorMask::NONE, [0.0; N]);
         if self.calm.follows.curves {
             clamped = self.errors_over_rate(calibration, rates, &mut errors);
         }
-        *bias = array::from_fn(|lane| {
-            let by_force = x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2];
+        *drift = array::from_fn(|lane| {
             let rate = rates[lane];
-            bias[lane] + (by_force - asymmetry[lane] * rate.abs() - errors[lane] * rate)
+            drift[lane] - asymmetry[lane] * rate.abs() - errors[lane] * rate
         });
         clamped
     }
@@ -244,44 +251,56 @@ impl Corrector {
     pub(super) fn remove_size_effect<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        missed: u64,
+        (missed, rate): (u64, [f64; 3]),
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
         if !self.calm.follows.positions {
             return;
         }
-        let positions: [[f64; N]; 3] =
-            array::from_fn(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]));
-        let (rate, acceleration) = self.turning(missed, out);
+        let slewed;
+        let positions = match (self.slewing(), calibration.motion.as_deref()) {
+            (None, Some(motion)) => &motion.positions_m,
+            _ => {
+                slewed =
+                    [0, 1, 2].map(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]));
+                &slewed
+            }
+        };
+        let (rate, acceleration) = self.turning(missed, rate, out);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
         else {
             return;
         };
-        let turned = cross_lanes(rate, &cross_lanes(rate, &positions));
-        let hastened = cross_lanes(acceleration, &positions);
-        let felt: [[f64; N]; 3] =
-            array::from_fn(|axis| array::from_fn(|lane| turned[axis][lane] + hastened[axis][lane]));
-        let along = orientation.along(axes.temperature_deg_c(out.end_time), &felt);
-        *forces = array::from_fn(|lane| forces[lane] - along[lane]);
+        let axes = orientation.axes_at(axes.temperature_deg_c(out.end_time));
+        // Two lanes at a time, so that all of it stays in registers.
+        for (pair, forces) in forces.chunks_exact_mut(2).enumerate() {
+            let of = |lanes: &Lanes| [lanes[2 * pair], lanes[2 * pair + 1]];
+            let at = positions.each_ref().map(of);
+            let turned = cross_lanes(rate, &cross_lanes(rate, &at));
+            let hastened = cross_lanes(acceleration, &at);
+            let along = |axis: usize, lane: usize| {
+                axes(axis, 2 * pair + lane) * (turned[axis][lane] + hastened[axis][lane])
+            };
+            for (lane, force) in forces.iter_mut().enumerate() {
+                *force -= along(0, lane) + along(1, lane) + along(2, lane);
+            }
+        }
     }
 
-    /// Angular rate (rad/s) and acceleration (rad/s²) of a tick, in case axes. A tick that carries the restored angle of a mode switch
-    /// turns as the one before it.
-    fn turning(&mut self, missed: u64, out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
-        let middle = out.end_time - Span::from_ns(out.duration.as_ns() / 2);
+    /// Angular rate (rad/s) and acceleration (rad/s²) of a tick that turned at a `rate`, in case axes. One that carries the restored angle of
+    /// a mode switch turns as the one before it.
+    #[inline]
+    fn turning(&mut self, missed: u64, rate: [f64; 3], out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
         if missed > 0 {
             self.motion.interrupt();
         }
         if out.flags.intersects(TickFlags::ANGLE_RESTORED | TickFlags::ANGLE_INVALID) {
-            let rate = self.motion.rates[0].map_or([0.0; 3], |(rate, _)| rate);
+            let rate = self.motion.rate.map_or([0.0; 3], |(rate, _)| rate);
             self.motion.interrupt();
             return (rate, [0.0; 3]);
         }
-        let per_second = 1.0 / out.duration.as_s();
-        let rate = out.delta_angle.map(|angle| angle * per_second);
-        let acceleration = self.motion.acceleration(rate, middle);
-        self.motion.push(rate, middle);
-        (rate, acceleration)
+        let middle = out.end_time - Span::from_ns(out.duration.as_ns() / 2);
+        (rate, self.motion.acceleration(rate, middle))
     }
 }
