@@ -259,7 +259,9 @@ impl Orientation {
     fn clamped(&self, temperature_deg_c: f64) -> f64 {
         let [first, last] = self.range_deg_c;
         let stated = if temperature_deg_c.is_nan() { self.reference_deg_c } else { temperature_deg_c };
-        stated.max(first).min(last)
+        // Not `max` and `min`, which look for NaN again.
+        let stated = if stated > first { stated } else { first };
+        if stated < last { stated } else { last }
     }
 
     /// √W·C.

@@ -294,19 +294,18 @@ impl Corrector {
             self.note_force(calibration, &forces, raw.end_time);
         }
         self.gyros::<N>(calibration, tick, shares, counters, out);
-        let per_second = 1.0 / raw.duration.as_s();
-        let rate = out.delta_angle.map(|angle| angle * per_second);
         if let Some(felt) = felt {
-            self.resolve_force(calibration, felt, (missed, rate), counters, out);
+            self.resolve_force(calibration, felt, missed, counters, out);
         }
 
+        let per_second = 1.0 / raw.duration.as_s();
         let seen = &mut self.seen;
         seen.sequence = raw.sequence;
         seen.end_time = raw.end_time;
         seen.duration = raw.duration;
         seen.missed = missed;
         seen.mode = raw.mode;
-        seen.angular_rate = rate;
+        seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
         seen.flags = out.flags;
         if restart {
             seen.flags |= TickFlags::RESTART;

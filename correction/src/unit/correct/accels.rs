@@ -124,22 +124,21 @@ impl Corrector {
         Some(Felt { forces, usable, within, duration_s })
     }
 
-    /// Resolves what the accelerometers feel in case axes, and watches its parity; ticks that were `missed` before, and the `rate` at which the
-    /// unit turns (rad/s, case axes).
+    /// Resolves what the accelerometers feel in case axes, and watches its parity.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     pub(super) fn resolve_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
         felt: Felt<N>,
-        (missed, rate): (u64, [f64; 3]),
+        missed: u64,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
         let Felt { mut forces, usable, duration_s, .. } = felt;
         if self.calm.follows.any {
             let mut left = forces;
-            self.remove_size_effect(calibration, (missed, rate), out, &mut left);
+            self.remove_size_effect(calibration, missed, out, &mut left);
             forces = left;
         }
         let time = out.end_time;

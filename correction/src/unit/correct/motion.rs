@@ -102,6 +102,8 @@ impl Corrector {
     }
 
     /// Coefficients of the gyros' terms that follow motion.
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
     fn gyro_motion<const N: usize>(&self, shares: Shares<'_>) -> [[f64; N]; 4] {
         let bank = self.thermal.motion.as_deref().map(|banks| &banks.gyros);
         self.coefficients(bank, self.slew_from_motion().map(|old| &old.gyros), shares)
@@ -114,17 +116,20 @@ impl Corrector {
     }
 
     /// Coefficients of a bank, on their way from the old ones; zero where there are none.
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
     fn coefficients<const N: usize, const T: usize>(
         &self,
         bank: Option<&Bank<T>>,
         old: Option<&[Lanes; T]>,
         shares: Shares<'_>,
     ) -> [[f64; N]; T] {
-        let mut terms = bank.map_or([[0.0; N]; T], |bank| bank.at(shares));
-        if let Some(slewing) = self.slewing() {
-            slewing.terms(&mut terms, old.unwrap_or(&[[0.0; MAX_SENSORS]; T]));
-        }
-        terms
+        let terms = bank.map_or([[0.0; N]; T], |bank| bank.at(shares));
+        let Some(slewing) = self.slewing() else { return terms };
+        // A copy: lanes of which nobody has the address stay in registers.
+        let mut slewed = terms;
+        slewing.terms(&mut slewed, old.unwrap_or(&[[0.0; MAX_SENSORS]; T]));
+        slewed
     }
 
     /// What follows motion, or did before a swap that is on its way.
@@ -159,7 +164,8 @@ impl Corrector {
     }
 
     /// Drift of the gyros with the specific force (rad/s).
-    #[inline(never)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
     pub(super) fn drift_with_force<const N: usize>(&self, shares: Shares<'_>) -> [f64; N] {
         let ([x, y, z, _], force) = (self.gyro_motion::<N>(shares), self.motion.force);
         array::from_fn(|lane| x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2])
@@ -251,7 +257,7 @@ impl Corrector {
     pub(super) fn remove_size_effect<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        (missed, rate): (u64, [f64; 3]),
+        missed: u64,
         out: &CorrectedTick,
         forces: &mut [f64; N],
     ) {
@@ -267,7 +273,7 @@ impl Corrector {
                 &slewed
             }
         };
-        let (rate, acceleration) = self.turning(missed, rate, out);
+        let (rate, acceleration) = self.turning(missed, out);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
         else {
             return;
@@ -288,10 +294,10 @@ impl Corrector {
         }
     }
 
-    /// Angular rate (rad/s) and acceleration (rad/s²) of a tick that turned at a `rate`, in case axes. One that carries the restored angle of
-    /// a mode switch turns as the one before it.
+    /// Angular rate (rad/s) and acceleration (rad/s²) of a tick, in case axes. A tick that carries the restored angle of a mode switch
+    /// turns as the one before it.
     #[inline]
-    fn turning(&mut self, missed: u64, rate: [f64; 3], out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
+    fn turning(&mut self, missed: u64, out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
         if missed > 0 {
             self.motion.interrupt();
         }
@@ -300,6 +306,8 @@ impl Corrector {
             self.motion.interrupt();
             return (rate, [0.0; 3]);
         }
+        let per_second = 1.0 / out.duration.as_s();
+        let rate = out.delta_angle.map(|angle| angle * per_second);
         let middle = out.end_time - Span::from_ns(out.duration.as_ns() / 2);
         (rate, self.motion.acceleration(rate, middle))
     }
