@@ -59,6 +59,8 @@ pub(super) fn schema(topic: &Topic) -> Option<(&'static str, String)> {
             json!({ "raw": {
                 "type": "object",
                 "description": "By channel: V, counts or °C, whatever the document's conversion takes",
+                // Its channels are not known, but Foxglove refuses an object without the key.
+                "properties": {},
                 "additionalProperties": { "type": "number" },
             } }),
         ),
@@ -249,4 +251,38 @@ fn shown<T: Serialize>(received_ns: u64, readings: impl Iterator<Item = (Timesta
         })
     };
     readings.into_iter().filter_map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use isotherm_protocol::key::UnitId;
+
+    use super::*;
+
+    /// Foxglove's parser of JSON Schemas takes these types, with the properties of an object and the items of a list, and no others.
+    fn assert_foxglove_takes(schema: &Value, at: &str) {
+        match schema["type"].as_str() {
+            Some("object") => {
+                let properties = schema["properties"].as_object();
+                let properties = properties.unwrap_or_else(|| panic!("{at} has no properties"));
+                properties.iter().for_each(|(name, of)| assert_foxglove_takes(of, &format!("{at}.{name}")));
+            }
+            Some("array") => assert_foxglove_takes(&schema["items"], &format!("{at}[]")),
+            kind => {
+                let plain = ["boolean", "string", "number", "integer"];
+                assert!(kind.is_some_and(|kind| plain.contains(&kind)), "{at}: {kind:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_schema_is_one_that_foxglove_takes() {
+        let unit = UnitId::new("ZLG-1").unwrap();
+        let raw = [RawStream::Gyro, RawStream::Accel, RawStream::Temperature];
+        let raw = raw.map(|stream| Topic::Raw(unit.clone(), stream));
+        for topic in raw.iter().chain([&Topic::Corrected(unit.clone())]) {
+            let (name, text) = schema(topic).unwrap();
+            assert_foxglove_takes(&serde_json::from_str(&text).unwrap(), name);
+        }
+    }
 }
