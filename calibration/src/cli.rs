@@ -107,6 +107,18 @@ mod tests {
     }
 
     #[test]
+    fn every_option_is_explained() {
+        let mut all = Cli::command();
+        all.build();
+        for part in all.get_subcommands() {
+            for argument in part.get_arguments() {
+                let explained = argument.get_help().is_some() || argument.get_long_help().is_some();
+                assert!(explained, "{} {}", part.get_name(), argument.get_id());
+            }
+        }
+    }
+
+    #[test]
     fn the_full_example_names_a_command_and_files_that_there_are() {
         let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
         let text = std::fs::read_to_string(root.join("config/calibration/example-full.toml")).unwrap();
