@@ -1,5 +1,7 @@
 //! "Did you mean": the known word that an unknown one was probably meant to be.
 
+use strsim::osa_distance;
+
 /// Words longer than this are no slips of the pen.
 const LONGEST: usize = 64;
 
@@ -10,7 +12,7 @@ pub(crate) fn closest<'k>(unknown: &str, known: impl Iterator<Item = &'k str> + 
     }
     let allowed = (unknown.chars().count() / 3).max(1);
     let nearest =
-        known.clone().map(|word| (distance(unknown, word), word)).min_by_key(|(distance, _)| *distance);
+        known.clone().map(|word| (osa_distance(unknown, word), word)).min_by_key(|(distance, _)| *distance);
     if let Some((distance, word)) = nearest
         && distance <= allowed
     {
@@ -22,32 +24,10 @@ pub(crate) fn closest<'k>(unknown: &str, known: impl Iterator<Item = &'k str> + 
     same.next().filter(|_| same.next().is_none())
 }
 
-/// Edits from a word to the nearest of the known ones.
+/// Edits (insert, delete, replace, swap of neighbours) from a word to the nearest of the known ones.
 pub(crate) fn nearest<'k>(unknown: &str, known: impl Iterator<Item = &'k str>) -> usize {
     let unknown: String = unknown.chars().take(LONGEST).collect();
-    known.map(|word| distance(&unknown, word)).min().unwrap_or_default()
-}
-
-/// Edits (insert, delete, replace, swap of neighbours) from one word to another.
-fn distance(a: &str, b: &str) -> usize {
-    let a: Vec<char> = a.chars().collect();
-    let b: Vec<char> = b.chars().collect();
-    let mut rows = vec![vec![0_usize; b.len() + 1]; a.len() + 1];
-    for i in 0..=a.len() {
-        for j in 0..=b.len() {
-            rows[i][j] = if i == 0 || j == 0 {
-                i.max(j)
-            } else {
-                let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
-                let mut least = replaced.min(rows[i - 1][j] + 1).min(rows[i][j - 1] + 1);
-                if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                    least = least.min(rows[i - 2][j - 2] + 1);
-                }
-                least
-            };
-        }
-    }
-    rows[a.len()][b.len()]
+    known.map(|word| osa_distance(&unknown, word)).min().unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -17,7 +17,6 @@ pub struct PairSettings {
     /// Name of this instance; `None`: the first characters of its Zenoh id.
     pub name: Option<String>,
     /// What it does while another one speaks.
-    #[schemars(with = "ModeKey")]
     pub mode: Mode,
     /// Of two that speak the one with the lower priority yields.
     pub priority: u8,
@@ -30,15 +29,6 @@ pub struct PairSettings {
     #[serde(rename = "lease_ms", with = "As::<Ms>")]
     #[schemars(with = "Option<u32>", range(min = 100, max = 60_000))]
     pub lease: Option<Duration>,
-}
-
-/// The modes of [`Mode`], as they are spelled.
-#[derive(JsonSchema)]
-#[schemars(inline, rename_all = "kebab-case")]
-#[expect(dead_code, reason = "read by the derived schema alone")]
-enum ModeKey {
-    Standby,
-    Active,
 }
 
 impl Default for PairSettings {
