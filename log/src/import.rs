@@ -96,6 +96,8 @@ pub enum Question {
     Rate {
         /// The file.
         file: String,
+        /// Why its time cannot be used, where it has one.
+        why: Option<String>,
     },
 }
 
@@ -166,8 +168,9 @@ impl fmt::Display for Question {
             Self::TimeUnit { column, step } => {
                 write!(f, "what is the unit of the time {column}? It usually grows by {step}")
             }
-            Self::Rate { file } => {
-                write!(f, "{file} has no usable time: how many rows per second?")
+            Self::Rate { file, why } => {
+                let why = why.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
+                write!(f, "{file} has no usable time{why}: how many rows per second?")
             }
         }
     }

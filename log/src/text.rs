@@ -27,6 +27,7 @@ use crate::progress::Progress;
 use file::FileReader;
 
 pub(crate) use input::open as open_raw;
+pub(crate) use number::date_time_ns;
 
 pub use error::{LogError, LogFault, Reason};
 pub use window::Window;

@@ -12,7 +12,8 @@ pub(super) fn rate_in(lines: &[String]) -> Option<f64> {
     lines.iter().find_map(|line| {
         let line = line.to_lowercase();
         let (head, rest) = line.split_once("rate")?;
-        let begins = head.ends_with(|c: char| !c.is_alphabetic()) || head.is_empty();
+        let begins =
+            head.ends_with(|c: char| !c.is_alphabetic()) || head.is_empty() || head.ends_with("output");
         let number: String = rest
             .trim_start_matches([':', '=', ' ', ',', ';', '\t', '(', ')'])
             .trim_start_matches("hz")
@@ -62,6 +63,7 @@ mod tests {
             ("// Update Rate: 100.0Hz", Some(100.0)),
             ("# Config: data_rate = 2000.0 Hz, filter = 488 Hz", Some(2000.0)),
             ("Sample Rate (Hz),125", Some(125.0)),
+            ("OutputRate:,60 Hz", Some(60.0)),
             ("# calibrated at 20 Hz", None),
         ] {
             assert_eq!(rate_in(&[line.to_owned()]), expected, "{line}");

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::layout::{Found, cells};
 use crate::error::Error;
-use crate::text::{open_decoded, parse_float};
+use crate::text::{date_time_ns, open_decoded, parse_float};
 
 /// Rows by which the usual step, and gravity, are told.
 const SAMPLE: usize = 4096;
@@ -20,6 +20,8 @@ pub(super) struct Column {
     pub(super) empty: u64,
     /// Cells with anything else.
     pub(super) other: u64,
+    /// Cells with a date and time; they count as numbers of ns too.
+    pub(super) date_times: u64,
     /// Cells whose number has a fraction.
     pub(super) fractions: u64,
     /// Largest size of a number.
@@ -82,9 +84,22 @@ impl Column {
             self.empty += 1;
             return;
         }
-        let Some(number) = parse_float(cell, mark).filter(|number| number.is_finite()) else {
-            self.other += 1;
-            return;
+        let (number, parts) = match parse_float(cell, mark).filter(|number| number.is_finite()) {
+            Some(number) => (number, parts(cell, mark).unwrap_or((0, number))),
+            None => match date_time_ns(cell.as_bytes()) {
+                #[expect(
+                    clippy::cast_precision_loss,
+                    reason = "for ranges; steps are taken from the whole number"
+                )]
+                Some(ns) => {
+                    self.date_times += 1;
+                    (ns as f64, (ns, 0.0))
+                }
+                None => {
+                    self.other += 1;
+                    return;
+                }
+            },
         };
         if self.numbers == 0 {
             (self.minimum, self.maximum) = (number, number);
@@ -94,7 +109,6 @@ impl Column {
         self.largest = self.largest.max(number.abs());
         self.minimum = self.minimum.min(number);
         self.maximum = self.maximum.max(number);
-        let parts = parts(cell, mark).unwrap_or((0, number));
         if let Some((whole, fraction)) = self.last.replace(parts) {
             #[expect(clippy::cast_precision_loss, reason = "steps are small")]
             let step = parts.0.saturating_sub(whole) as f64;
@@ -105,6 +119,11 @@ impl Column {
     /// Whether it could be the clock of the rows.
     pub(super) fn increases(&self) -> bool {
         self.numbers > 1 && self.steps.back == 0 && self.empty + self.other == 0
+    }
+
+    /// Whether every cell is a date and time.
+    pub(super) fn is_date_time(&self) -> bool {
+        self.date_times > 0 && self.date_times == self.numbers
     }
 
     /// Whether it counts the rows.
@@ -193,6 +212,11 @@ mod tests {
         let seconds =
             column_of((0..100).map(|row| format!("-{}.{:02}", 1_600_000_000 - row / 4, 75 - row % 4 * 25)));
         assert_eq!((seconds.steps.usual, seconds.steps.back), (0.25, 0));
+        let dates = column_of(
+            (0..100).map(|row| format!("2024-05-01T10:00:{:02}.{:03}Z", row / 100, row % 100 * 10)),
+        );
+        assert!(dates.is_date_time() && dates.increases() && !seconds.is_date_time());
+        assert!((dates.steps.usual - 1e7).abs() < 1e-9, "{}", dates.steps.usual);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::sync::Arc;
 
+use super::names::is_unit;
 use super::{Hints, refuse};
 use crate::error::Error;
 use crate::mapping::{Delimiter, Encoding};
@@ -166,10 +167,11 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
     if let Some(at) = header_at {
         let last = cells(before[at], delimiter);
         let bracketed = |cell: &String| cell.is_empty() || cell == "-" || cell.starts_with(['(', '[']);
-        if last.len().abs_diff(width) <= 1
-            && last.iter().all(bracketed)
-            && last.iter().any(|cell| cell.len() > 2)
-        {
+        let in_brackets = last.iter().all(bracketed) && last.iter().any(|cell| cell.len() > 2);
+        let filled = last.iter().filter(|cell| !cell.is_empty()).count();
+        let bare = last.iter().filter(|cell| is_unit(cell)).count();
+        let below_names = at.checked_sub(1).is_some_and(|above| wordy(&cells(before[above], delimiter)));
+        if last.len().abs_diff(width) <= 1 && (in_brackets || below_names && bare >= 3 && bare * 2 > filled) {
             units = last;
             header_at = at.checked_sub(1);
         }

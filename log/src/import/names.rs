@@ -13,7 +13,7 @@ pub(super) enum Kind {
 }
 
 /// What a name says.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Meaning {
     pub(super) kind: Kind,
     /// 0, 1, 2 for x, y, z.
@@ -24,6 +24,8 @@ pub(super) struct Meaning {
     pub(super) increment: bool,
     /// As the mapping spells it.
     pub(super) unit: Option<&'static str>,
+    /// How much of that unit a reading of 1 is, where it is not one: 0.001 of °/s where the column says mdps.
+    pub(super) scale: Option<f64>,
     /// Of several that hold the same, the least is taken.
     pub(super) rank: u8,
 }
@@ -116,6 +118,9 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         return None;
     } else if temperature {
         (Kind::Temperature, false)
+    } else if parts == ["value"] && axis == Some(0) {
+        // LabVIEW's X_Value: the time, whatever the columns beside it are.
+        (Kind::Time, false)
     } else if has(&OTHERS) {
         return None;
     } else if angle && axis.is_some() {
@@ -146,7 +151,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     } else {
         return None;
     };
-    let unit = unit(kind, increment, stated, &parts);
+    let (unit, scale) = scaled_unit(kind, increment, stated, &parts);
     let mut rank = u8::from(unit.is_none()) * 4;
     rank += u8::from(has(&["raw", "lsb"])) * 8 + u8::from(has(&["linear"])) * 2 + u8::from(increment) * 2;
     if kind == Kind::Time {
@@ -156,7 +161,33 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         rank += u8::from(has(&["header", "mag", "baro"]));
     }
     let stem = parts.join(" ");
-    Some(Meaning { kind, axis, stem, increment, unit, rank })
+    let axis = axis.filter(|_| kind != Kind::Time);
+    Some(Meaning { kind, axis, stem, increment, unit, scale, rank })
+}
+
+/// Whether a cell is a unit of measure, and nothing else.
+pub(super) fn is_unit(text: &str) -> bool {
+    let known = |kind| scaled_unit(kind, false, Some(text), &[]).0.is_some_and(|unit| unit != "raw");
+    !text.is_empty() && [Kind::Time, Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().any(known)
+}
+
+/// The unit, as the mapping spells it, and how much of it a reading of 1 is, where it is not one: of sensors, thousandths and millionths have none of
+/// their own.
+fn scaled_unit(
+    kind: Kind,
+    increment: bool,
+    stated: Option<&str>,
+    parts: &[String],
+) -> (Option<&'static str>, Option<f64>) {
+    let plain = unit(kind, increment, stated, parts);
+    let stated =
+        stated.map(str::trim).filter(|_| plain.is_none() && matches!(kind, Kind::Gyro | Kind::Accel));
+    let prefixes = [("m", 1e-3), ("u", 1e-6), ("µ", 1e-6), ("μ", 1e-6)];
+    let scaled = prefixes.into_iter().find_map(|(prefix, scale)| {
+        let unit = unit(kind, increment, Some(stated?.strip_prefix(prefix)?), parts)?;
+        Some((Some(unit), Some(scale)))
+    });
+    scaled.unwrap_or((plain, None))
 }
 
 /// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word.
@@ -192,7 +223,7 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
         .unwrap_or_default()
         .to_lowercase()
         .chars()
-        .filter(|c| !c.is_whitespace() && *c != '.')
+        .filter(|c| !c.is_whitespace() && !matches!(c, '.' | '(' | ')'))
         .collect();
     let text =
         text.replace("degrees", "deg").replace("degree", "deg").replace('°', "deg").replace("sec", "s");
@@ -257,8 +288,9 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "degc" | "c" | "celsius" => Some("deg_c"),
             "k" | "kelvin" => Some("kelvin"),
             "v" | "volt" => Some("volt"),
-            _ if raw => Some("raw"),
-            _ => None,
+            "" if !raw => None,
+            // °F and all else is for the document to convert.
+            _ => Some("raw"),
         },
         Kind::Counter => None,
     }
@@ -272,7 +304,7 @@ mod tests {
     #[test]
     fn names_of_many_makers_say_what_they_hold() {
         type Case = (&'static str, Option<&'static str>, Option<(Kind, Option<usize>, Option<&'static str>)>);
-        let cases: [Case; 44] = [
+        let cases: [Case; 48] = [
             ("Gyr_X", None, Some((Gyro, Some(0), None))),
             ("Acc_Z", None, Some((Accel, Some(2), None))),
             ("UnCompGyroY [rad/s]", None, Some((Gyro, Some(1), Some("rad_per_s")))),
@@ -317,10 +349,35 @@ mod tests {
             ("imu_Timestamp[sec]", None, Some((Time, None, Some("s")))),
             ("Gyro X [°/s]", None, Some((Gyro, Some(0), Some("deg_per_s")))),
             ("time_ms", None, Some((Time, None, Some("ms")))),
+            ("X_Value", None, Some((Time, None, None))),
+            ("temp [F]", None, Some((Temperature, None, Some("raw")))),
+            ("Temperature", None, Some((Temperature, None, None))),
+            ("Accel_LN_X_CAL", Some("m/(s^2)"), Some((Accel, Some(0), Some("m_per_s2")))),
         ];
         for (name, row, expected) in cases {
             let found = meaning(name, row).map(|found| (found.kind, found.axis, found.unit));
             assert_eq!(found, expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn thousandths_and_millionths_are_a_scale() {
+        let scaled = |name| meaning(name, None).map(|found| (found.unit, found.scale));
+        for (name, unit, scale) in [
+            ("G_x [mdps]", "deg_per_s", Some(1e-3)),
+            ("gx [mrad/s]", "rad_per_s", Some(1e-3)),
+            ("gx [µrad/s]", "rad_per_s", Some(1e-6)),
+            ("ax [ug]", "g", Some(1e-6)),
+            ("ax [mg]", "mg", None),
+            ("ax [m/s2]", "m_per_s2", None),
+        ] {
+            assert_eq!(scaled(name), Some((Some(unit), scale)), "{name}");
+        }
+        for unit in ["ms", "m/(s^2)", "deg/s", "mdps", "degC"] {
+            assert!(is_unit(unit), "{unit}");
+        }
+        for word in ["", "-", "time", "Gyro_X", "1.5"] {
+            assert!(!is_unit(word), "{word}");
         }
     }
 

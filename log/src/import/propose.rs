@@ -112,10 +112,11 @@ impl<'a> File<'a> {
         let mut sensors = Vec::new();
         for (group, kind) in groups.into_iter().zip(["gyro", "accel"]) {
             let Some((columns, first)) = group else { continue };
-            let unit = self.sensor_unit(&columns, &first, kind, proposal);
+            let (unit, scale) = self.sensor_unit(&columns, &first, kind, proposal);
             let may_be_empty = columns.iter().any(|column| self.is_sparse(*column));
-            proposal.notes.push(format!("{kind}: {} in {unit}", self.listed(&columns)));
-            sensors.push(Sensors { kind, columns, unit, counter, may_be_empty });
+            let part = scale.map_or_else(String::new, |scale| format!("{scale:?} "));
+            proposal.notes.push(format!("{kind}: {} in {part}{unit}", self.listed(&columns)));
+            sensors.push(Sensors { kind, columns, unit, scale, counter, may_be_empty });
         }
         let temperatures = self.temperatures(&meanings, proposal);
         let name = named.then(|| self.name.to_owned());
@@ -175,15 +176,25 @@ impl<'a> File<'a> {
         Some((best.iter().map(|(index, _)| *index).collect(), first))
     }
 
-    fn sensor_unit(self, columns: &[usize], first: &Meaning, kind: &str, proposal: &mut Proposal) -> String {
+    /// The unit as the mapping spells it, and how much of it a reading of 1 is, where it is not one.
+    fn sensor_unit(
+        self,
+        columns: &[usize],
+        first: &Meaning,
+        kind: &str,
+        proposal: &mut Proposal,
+    ) -> (String, Option<f64>) {
         let hint = if kind == "gyro" { &self.hints.gyro_unit } else { &self.hints.accel_unit };
-        if let Some(unit) = hint.as_deref().or(first.unit) {
-            return unit.to_owned();
+        if let Some(unit) = hint {
+            return (unit.clone(), None);
+        }
+        if let Some(unit) = first.unit {
+            return (unit.to_owned(), first.scale);
         }
         let headed = |name: &str| self.found.header.iter().flatten().any(|have| have == name);
         if headed("PacketCounter") && headed("Gyr_X") && !first.increment {
             proposal.notes.push(format!("{kind}: header of Xsens' MT Manager, which writes rad/s and m/s²"));
-            return if kind == "gyro" { "rad_per_s" } else { "m_per_s2" }.to_owned();
+            return (if kind == "gyro" { "rad_per_s" } else { "m_per_s2" }.to_owned(), None);
         }
         if kind == "accel"
             && !first.increment
@@ -192,7 +203,7 @@ impl<'a> File<'a> {
             && let Some((unit, _)) = GRAVITY.iter().find(|(_, g)| (size / g - 1.0).abs() < 0.1)
         {
             proposal.notes.push(format!("accel: unit from the size at the beginning, {size:.4}"));
-            return (*unit).to_owned();
+            return ((*unit).to_owned(), None);
         }
         let largest = columns.iter().filter_map(|column| self.figures.columns.get(*column));
         let largest = largest.fold(0.0_f64, |largest, column| largest.max(column.largest)).to_string();
@@ -202,7 +213,7 @@ impl<'a> File<'a> {
         } else {
             Question::AccelUnit { columns, largest }
         });
-        "raw".to_owned()
+        ("raw".to_owned(), None)
     }
 
     fn counter(self, meanings: &Meanings, proposal: &mut Proposal) -> Option<usize> {
@@ -227,19 +238,20 @@ impl<'a> File<'a> {
     fn time(self, meanings: &Meanings, counted: bool, proposal: &mut Proposal) -> Time {
         let mut clocks: Vec<_> = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Time).collect();
         clocks.sort_by_key(|(index, meaning)| (meaning.rank, *index));
-        let mut found = None;
+        let (mut found, mut why) = (None, None);
         for (index, meaning) in clocks {
             if let Some(column) = self.figures.columns.get(*index).filter(|column| column.increases()) {
                 found = Some((*index, meaning, column));
                 break;
             }
-            let name = self.listed(&[*index]);
-            proposal.notes.push(format!("time: {name} does not always grow: not used"));
+            let words = format!("{} does not always grow", self.listed(&[*index]));
+            proposal.notes.push(format!("time: {words}: not used"));
+            why.get_or_insert(words);
         }
         let stated = self.hints.rate_hz.or_else(|| rate_in(&self.found.preamble));
         let Some((index, meaning, column)) = found else {
             let Some(rate) = stated else {
-                proposal.open.push(Question::Rate { file: self.name.to_owned() });
+                proposal.open.push(Question::Rate { file: self.name.to_owned(), why });
                 return Time { tick_ns: 1e7, ..Time::default() };
             };
             let by = if self.hints.rate_hz.is_some() { "given" } else { "the log's first lines say" };
@@ -251,6 +263,7 @@ impl<'a> File<'a> {
             .hints
             .time_unit
             .as_deref()
+            .or(column.is_date_time().then_some("iso"))
             .or(meaning.unit)
             .map(ToOwned::to_owned)
             .or_else(|| unit_of(step, column.maximum, stated));
@@ -259,7 +272,7 @@ impl<'a> File<'a> {
             proposal.open.push(Question::TimeUnit { column, step: step.to_string() });
             "s".to_owned()
         });
-        let ns = UNITS_NS.iter().find(|(word, _)| *word == unit).map_or(1e9, |(_, ns)| *ns);
+        let ns = UNITS_NS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, ns)| *ns);
         let tick_ns = (step * ns).max(1.0);
         // Rounded to what stamps can say, so that 0.01 s is 10 000 000 ns.
         let tick_ns = if tick_ns > 1e4 { (tick_ns / 10.0).round() * 10.0 } else { tick_ns };

@@ -11,6 +11,8 @@ pub(super) struct Sensors {
     pub(super) kind: &'static str,
     pub(super) columns: Vec<usize>,
     pub(super) unit: String,
+    /// How much of the unit a reading of 1 is, where it is not one.
+    pub(super) scale: Option<f64>,
     pub(super) counter: Option<usize>,
     pub(super) may_be_empty: bool,
 }
@@ -107,9 +109,10 @@ impl FileText<'_> {
                 line(format_args!("may_be_empty = true"));
             }
             line(format_args!("sensors = ["));
+            let scale = sensors.scale.map_or_else(String::new, |scale| format!(", scale = {scale:?}"));
             for column in &sensors.columns {
                 line(format_args!(
-                    "    {{ column = {}, unit = \"{}\" }},",
+                    "    {{ column = {}, unit = \"{}\"{scale} }},",
                     self.column(*column),
                     sensors.unit
                 ));

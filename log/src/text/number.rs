@@ -67,7 +67,7 @@ pub(super) fn word(cell: &[u8]) -> Option<u64> {
 }
 
 /// Date and time of ISO 8601 as ns since 1970 (UTC); without an offset they are taken as UTC.
-pub(super) fn date_time_ns(cell: &[u8]) -> Option<i64> {
+pub(crate) fn date_time_ns(cell: &[u8]) -> Option<i64> {
     static PARSER: DateTimeParser = DateTimeParser::new();
     let time = PARSER.parse_timestamp(cell).ok().or_else(|| {
         let civil = PARSER.parse_datetime(cell).ok()?;

@@ -42,7 +42,7 @@ pub(super) struct ImportArgs {
     #[arg(long)]
     overwrite: bool,
     /// Column names with units, - for others: 'time [s],gx [deg/s],gy,gz,-,temp [degC]' (default: the header)
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', allow_hyphen_values = true)]
     columns: Vec<String>,
     /// Unit of the gyros (default: from the header)
     #[arg(long, value_name = "UNIT", value_parser = PossibleValuesParser::new(GYRO_UNITS))]

@@ -13,6 +13,8 @@
 //! | PX4 | `sensor_combined` by `ulog2csv` |
 //! | `EuRoC` | `imu0/data.csv` (ADIS16448) |
 //! | ROS | `rostopic echo -p` of `sensor_msgs/Imu` |
+//! | STMicroelectronics, Shimmer | MEMS Studio; `ConsensysPRO` |
+//! | `LabVIEW` | measurement file (LVM) |
 //! | a German Excel | decimal comma, semicolons, Latin-1 and UTF-16 |
 
 use std::fmt::Write;
@@ -324,6 +326,76 @@ fn ros_stamps_of_this_century_are_nanoseconds() {
 }
 
 #[test]
+fn st_thousandths_of_a_unit_are_a_scale() {
+    let front = "Time [s],A_x [mg],A_y [mg],A_z [mg],G_x [mdps],G_y [mdps],G_z [mdps],Temp [F]\n";
+    let text = log(front, |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) / 104.0;
+        format!("{time:.6},1.5,-2.5,1000.{},{:.1},70.0,-35.0,77.{}", row % 10, noise(row, 16) * 1e3, row % 10)
+    });
+    // What no mapping knows of a temperature is left to the document.
+    let parts = [
+        "column = \"G_x [mdps]\", unit = \"deg_per_s\", scale = 0.001 }",
+        "column = \"A_z [mg]\", unit = \"mg\" }",
+        "column = \"Temp [F]\"\nunit = \"raw\"",
+    ];
+    let expected = Expected { parts: &parts, period_ns: 9_615_000, gaps: 0, temperatures: 1 };
+    import("mems_studio.csv", text.as_bytes(), &[], &expected);
+}
+
+#[test]
+fn shimmer_a_row_of_units_without_brackets() {
+    let front = "\"sep=\t\"\n\
+        Shimmer_67A1_Timestamp_Unix_CAL\tShimmer_67A1_Accel_LN_X_CAL\tShimmer_67A1_Accel_LN_Y_CAL\tShimmer_67A1_Accel_LN_Z_CAL\t\
+        Shimmer_67A1_Gyro_X_CAL\tShimmer_67A1_Gyro_Y_CAL\tShimmer_67A1_Gyro_Z_CAL\t\n\
+        ms\tm/(s^2)\tm/(s^2)\tm/(s^2)\tdeg/s\tdeg/s\tdeg/s\t\n";
+    let text = log(front, |row| {
+        format!(
+            "{}\t0.01\t-0.02\t9.80{}\t{:.5}\t0.01\t0.02\t",
+            1_600_000_000_000_i64 + i64::try_from(row).unwrap() * 10,
+            row % 10,
+            noise(row, 17)
+        )
+    });
+    let parts = [
+        "drop_rows = 1",
+        "column = \"Shimmer_67A1_Timestamp_Unix_CAL\"\nunit = \"ms\"",
+        "column = \"Shimmer_67A1_Gyro_X_CAL\", unit = \"deg_per_s\"",
+        "column = \"Shimmer_67A1_Accel_LN_Z_CAL\", unit = \"m_per_s2\"",
+    ];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    import("shimmer.csv", text.as_bytes(), &[], &expected);
+}
+
+#[test]
+fn labview_a_header_of_many_lines_and_decimal_commas() {
+    let front = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\n***End_of_Header***\t\n\t\nChannels\t7\t\n\
+        X0\t0,0E+0\t0,0E+0\t\n***End_of_Header***\t\nX_Value\tGyroX [deg/h]\tGyroY [deg/h]\tGyroZ [deg/h]\tTemp [°C]\n";
+    let text = log(front, |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+        format!("{time:.6}\t{:.4}\t10.5\t-3.25\t25.{}", noise(row, 18), row % 10).replace('.', ",")
+    });
+    let parts = ["column = \"X_Value\"\nunit = \"s\"", "column = \"GyroX [deg/h]\", unit = \"deg_per_h\""];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 1 };
+    import("run.lvm", text.as_bytes(), &[], &expected);
+}
+
+#[test]
+fn dates_and_times_are_stamps() {
+    // A row is missing.
+    let text = log("-,time,gx [deg/s],gy [deg/s],gz [deg/s]\n", |row| {
+        let ms = (row + usize::from(row >= 300)) * 10;
+        format!("x,2024-05-01T10:00:{:02}.{:03}+02:00,{:.4},1.5,2.5", ms / 1000, ms % 1000, noise(row, 19))
+    });
+    let parts = ["unit = \"iso\"", "gap_after_ticks"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 1, temperatures: 0 };
+    import("dated.csv", text.as_bytes(), &[], &expected);
+    // Names that are given may begin with one that is passed over.
+    let columns = ["--columns", "-,time,gx [rad/s],gy,gz"];
+    let parts = ["unit = \"iso\"", "unit = \"rad_per_s\""];
+    import("dated.csv", text.as_bytes(), &columns, &Expected { parts: &parts, ..expected });
+}
+
+#[test]
 fn a_german_table_in_latin_1_and_in_utf_16() {
     let front = "Prüfstand 7;Kammer\nZeit_ms;Gyro X [°/s];Gyro Y [°/s];Gyro Z [°/s];Acc X [g];Acc Y [g];Acc Z [g];Temp [°C]\n".replace("Zeit", "Time");
     let text = log(&front, |row| {
@@ -387,6 +459,21 @@ fn what_no_log_says_is_asked_for_with_its_option() {
         &replay(folder.path(), &["import", "steps.csv"]),
         2,
         "what is the unit of the time time? It usually grows by 1000: give --time-unit s|ms|us|ns",
+    );
+    write(
+        "twice.csv",
+        &log("time [s],gx [deg/s],gy [deg/s],gz [deg/s]\n", |row| {
+            format!(
+                "{:.2},1.5,2.5,{:.3}",
+                f64::from(u32::try_from(row - usize::from(row == 300)).unwrap()) / 100.0,
+                noise(row, 20)
+            )
+        }),
+    );
+    check(
+        &replay(folder.path(), &["import", "twice.csv"]),
+        2,
+        "twice.csv has no usable time (time [s] does not always grow): how many rows per second?: give --rate-hz HZ",
     );
     write("prose.txt", "no figures\nin here at all\n");
     check(&replay(folder.path(), &["import", "prose.txt"]), 2, "no rows of numbers in the first 2 lines");
