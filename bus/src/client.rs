@@ -12,6 +12,7 @@ use zenoh::{Config, Session};
 
 use crate::certificate::common_name;
 use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
+use crate::error::seconds;
 use crate::session::{endpoints, set};
 use crate::{BusError, SessionOptions, obstacle};
 
@@ -217,7 +218,7 @@ impl Way {
             match self.open(left).await {
                 Err(error @ BusError::Unreachable { .. }) if Instant::now() + AGAIN < deadline => {
                     if !std::mem::replace(&mut said, true) {
-                        say(&format!("{error}; trying again for {limit:?}"));
+                        say(&format!("{error}; trying again for {}", seconds(limit)));
                     }
                     tokio::time::sleep(AGAIN).await;
                 }
@@ -239,7 +240,7 @@ impl Way {
             Ok(Ok(Ok(session))) => return Ok(session),
             Ok(Ok(Err(source))) => source,
             Ok(Err(join)) => join.into(),
-            Err(_) => format!("not connected within {limit:?}").into(),
+            Err(_) => format!("not connected within {}", seconds(limit)).into(),
         };
         let (config, said_by) = (self.config.clone(), self.said_by.clone());
         let known =

@@ -1,5 +1,7 @@
 //! Endpoints as people write them.
 
+use std::net::Ipv6Addr;
+
 /// Where a service listens and a client looks for it if nothing else is said.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
 
@@ -44,6 +46,9 @@ pub fn address(endpoint: &str) -> &str {
 }
 
 fn check_host_and_port(text: &str) -> Result<(), String> {
+    if text.parse::<Ipv6Addr>().is_ok() {
+        return Err(format!("must have its IPv6 address in brackets, and a port: [{text}]:7447"));
+    }
     let (host, port) = text.rsplit_once(':').ok_or(MUST_BE)?;
     if host.is_empty() || host.contains(|c: char| c.is_whitespace() || c == '/') {
         return Err(MUST_BE.to_owned());
@@ -85,7 +90,8 @@ mod tests {
             ("127.0.0.1:99999", "has the port \"99999\", must be 0 to 65535"),
             ("tcp/127.0.0.1:", "has the port \"\", must be 0 to 65535"),
             ("udp/127.0.0.1:1", "has the protocol \"udp\", must have one of tcp, tls, unixsock-stream"),
-            ("::1:7447", "must have its IPv6 address in brackets: [::1]:7447"),
+            ("::1", "must have its IPv6 address in brackets, and a port: [::1]:7447"),
+            ("imu::1:7447", "must have its IPv6 address in brackets: [imu::1]:7447"),
         ] {
             assert_eq!(endpoint(text).unwrap_err(), expected, "{text}");
         }

@@ -11,13 +11,21 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum BusError {
-    /// The Zenoh configuration file cannot be read or is not valid.
+    /// The Zenoh configuration is not valid.
     #[error("cannot use the Zenoh configuration {path}: {words}; `isotherm check {path}` shows the place", path = path.display(), words = words(source))]
     Configuration {
         /// The file.
         path: PathBuf,
         /// What Zenoh says.
         source: zenoh::Error,
+    },
+    /// The Zenoh configuration file cannot be read.
+    #[error("cannot read the Zenoh configuration {}: {source}", path.display())]
+    ConfigurationFile {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
     },
     /// An option is not valid, e.g. an endpoint that is none.
     #[error("{option} = {value} is not valid: {words}", words = words(source))]
@@ -51,10 +59,12 @@ pub enum BusError {
         reason: String,
     },
     /// No endpoint can be reached.
-    #[error("cannot reach a service at {}", reasons.join("; "))]
+    #[error("cannot reach a service at {}; {next}", reasons.join("; "))]
     Unreachable {
-        /// Each endpoint, why, and what to do.
+        /// Each endpoint, and why.
         reasons: Vec<String>,
+        /// What to do.
+        next: String,
     },
     /// The session cannot be opened.
     #[error("cannot open the Zenoh session: {words}", words = words(.0))]
@@ -107,7 +117,8 @@ pub enum BusError {
     },
     /// Nobody subscribed to a raw topic in time.
     #[error(
-        "nobody subscribes to {key} after {waited:?}: check that the service runs and is connected to this session"
+        "nobody subscribes to {key} after {}: check that the service runs and is connected to this session",
+        seconds(*waited)
     )]
     NoSubscriber {
         /// The key.
@@ -117,25 +128,32 @@ pub enum BusError {
     },
     /// The service did not answer in time.
     #[error(
-        "no service answers on {key} after {waited:?}: check that it runs and is connected to this session"
+        "no service{} answers on {key} within {}: start one there, check --namespace, or give its address with \
+         --connect HOST:PORT or ISOTHERM_CONNECT",
+        at(peers), seconds(*waited)
     )]
     NoService {
         /// The key.
         key: String,
+        /// Addresses that the session is connected to.
+        peers: Vec<String>,
         /// How long was waited.
         waited: Duration,
     },
     /// The service has gone while it was needed.
-    #[error("the service is gone (no token {key}): it has stopped, or the connection to it is lost")]
+    #[error(
+        "the service at {tried} is gone: it has stopped, or the connection to it is lost; see `isotherm status`"
+    )]
     ServiceGone {
-        /// Key expression of the tokens.
-        key: String,
+        /// Where it was.
+        tried: String,
     },
     /// Nothing comes back on the corrected topic.
     #[error(
-        "unit {unit}: nothing came back on {key} for {waited:?} while {in_flight} ticks were in flight: the service \
+        "unit {unit}: nothing came back on {key} for {} while {in_flight} ticks were in flight: the service \
          holds the unit (uncalibrated = \"hold\"), has stopped, or refuses its messages; see its log and the unit's \
-         status"
+         status",
+        seconds(*waited)
     )]
     NoAcknowledgement {
         /// Serial of the unit.
@@ -149,7 +167,8 @@ pub enum BusError {
     },
     /// A subscriber has not taken what was published for it.
     #[error(
-        "a subscriber has not read everything within {waited:?} ({key}): it, or the link to it, is slow or hangs"
+        "a subscriber has not read everything within {} ({key}): it, or the link to it, is slow or hangs",
+        seconds(*waited)
     )]
     NotTaken {
         /// Key expression of the receipts.
@@ -158,7 +177,7 @@ pub enum BusError {
         waited: Duration,
     },
     /// The session did not close in time; it is left to itself.
-    #[error("the Zenoh session did not close within {0:?}")]
+    #[error("the Zenoh session did not close within {}", seconds(*.0))]
     CloseTimeout(Duration),
     /// The session did not close in order.
     #[error("cannot close the Zenoh session: {words}", words = words(.0))]
@@ -177,6 +196,17 @@ impl BusError {
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::Option { .. } | Self::Endpoint { .. } | Self::Range { .. })
     }
+}
+
+/// A time for people: `5.0 s`, `500 ms`.
+pub(crate) fn seconds(time: Duration) -> String {
+    let ms = time.as_millis();
+    if ms < 1000 { format!("{ms} ms") } else { format!("{:.1} s", time.as_secs_f64()) }
+}
+
+/// Where somebody was looked for, in words.
+fn at(peers: &[String]) -> String {
+    if peers.is_empty() { String::new() } else { format!(" at {}", peers.join(", ")) }
 }
 
 /// What Zenoh says, on one line, without the places in Zenoh's own source that it names in between.

@@ -9,10 +9,12 @@ use zenoh::Config;
 use crate::BusError;
 use crate::client::from;
 use crate::endpoint::{address, host_and_port};
+use crate::error::seconds;
 use crate::session::endpoints;
 
 /// Longest trial of one address.
 const TRIAL: Duration = Duration::from_secs(1);
+const UNKNOWN_HOST: &str = "the host name is not known";
 
 /// What keeps a session from listening, tried before it is opened: the ports are free again afterwards.
 pub(crate) fn before(config: &Config) -> Result<(), BusError> {
@@ -37,6 +39,9 @@ fn listen(endpoint: &str) -> Result<(), BusError> {
         ErrorKind::PermissionDenied => {
             "this user may not use that port: give one above 1023 with --listen HOST:PORT".to_owned()
         }
+        _ if host_and_port.to_socket_addrs().is_err() => {
+            format!("{UNKNOWN_HOST}; give another address with --listen HOST:PORT")
+        }
         _ => format!("{error}; give another address with --listen HOST:PORT"),
     };
     Err(BusError::Listen { endpoint: address(endpoint).to_owned(), reason })
@@ -45,27 +50,33 @@ fn listen(endpoint: &str) -> Result<(), BusError> {
 /// What has kept a session from connecting within `limit`, to endpoints that `said_by` has named.
 pub(crate) fn after(config: &Config, limit: Duration, said_by: Option<&str>) -> Option<BusError> {
     let endpoints = endpoints(config, "connect/endpoints");
-    let reasons: Vec<_> = endpoints.iter().filter_map(|endpoint| silent(endpoint, limit, said_by)).collect();
-    (!reasons.is_empty()).then(|| BusError::Unreachable { reasons })
+    let (mut reasons, mut steps) = (Vec::new(), Vec::new());
+    for endpoint in endpoints {
+        let Some((why, step)) = silent(&endpoint, limit) else { continue };
+        reasons.push(format!("{}{}: {why}", address(&endpoint), from(said_by)));
+        steps.extend(step.filter(|step| !steps.contains(step)));
+    }
+    steps.push("give the service's address: --connect HOST:PORT or ISOTHERM_CONNECT");
+    (!reasons.is_empty()).then(|| BusError::Unreachable { reasons, next: steps.join(", or ") })
 }
 
-/// Why nothing came of an endpoint, with what to do next.
-fn silent(endpoint: &str, limit: Duration, said_by: Option<&str>) -> Option<String> {
-    let at = address(endpoint).to_owned() + &from(said_by);
+/// Why nothing came of an endpoint, and what else to do than to give another.
+fn silent(endpoint: &str, limit: Duration) -> Option<(String, Option<&'static str>)> {
     let address = host_and_port(endpoint)?;
-    let elsewhere = "give the service's address: --connect HOST:PORT or ISOTHERM_CONNECT";
     let addresses: Vec<SocketAddr> = match address.to_socket_addrs() {
         Ok(addresses) => addresses.collect(),
-        Err(_) => return Some(format!("{at}: the host name is not known; {elsewhere}")),
+        Err(_) => return Some((UNKNOWN_HOST.to_owned(), None)),
     };
     let mut last = None;
     for address in addresses {
         match TcpStream::connect_timeout(&address, TRIAL) {
             Ok(_) => {
-                return Some(format!(
-                    "{at}: something listens there but does not answer within {limit:?}: another program, a stopped \
-                     service, or one with other certificates; or {elsewhere}"
-                ));
+                let why = format!(
+                    "something listens there but does not answer within {} (another program, a stopped service, or \
+                     one with other certificates)",
+                    seconds(limit)
+                );
+                return Some((why, None));
             }
             Err(error) => last = Some(error),
         }
@@ -73,11 +84,9 @@ fn silent(endpoint: &str, limit: Duration, said_by: Option<&str>) -> Option<Stri
     let error = last?;
     Some(match error.kind() {
         ErrorKind::ConnectionRefused => {
-            format!("{at}: nothing listens there; start one with `isotherm serve`, or {elsewhere}")
+            ("nothing listens there".to_owned(), Some("start one with `isotherm serve`"))
         }
-        ErrorKind::TimedOut => {
-            format!("{at}: the machine does not answer; check network and firewall, or {elsewhere}")
-        }
-        _ => format!("{at}: {error}; {elsewhere}"),
+        ErrorKind::TimedOut => ("the machine does not answer".to_owned(), Some("check network and firewall")),
+        _ => (error.to_string(), None),
     })
 }

@@ -37,18 +37,25 @@ pub async fn wait_for_service_of(session: &Session, unit: &UnitId, limit: Durati
 
 async fn wait_for_answer(session: &Session, key: &str, limit: Duration) -> Result<(), BusError> {
     let declare = |source| BusError::Declare { key: key.to_owned(), source };
-    let missing = || BusError::NoService { key: key.to_owned(), waited: limit };
     let deadline = Instant::now() + limit;
-    let querier = querier_matched(session, key, limit).await?.ok_or_else(missing)?;
+    let Some(querier) = querier_matched(session, key, limit).await? else {
+        return Err(missing(session, key, limit).await);
+    };
     let replies = querier.get().await.map_err(declare)?;
     // A service without units replies nothing; the end of the replies is the answer.
     loop {
         match timeout_at(deadline, replies.recv_async()).await {
             Ok(Ok(_)) => {}
             Ok(Err(_)) => return Ok(()),
-            Err(_) => return Err(missing()),
+            Err(_) => return Err(missing(session, key, limit).await),
         }
     }
+}
+
+/// Nobody answered those who are connected.
+async fn missing(session: &Session, key: &str, waited: Duration) -> BusError {
+    let peers = session.info().links().await.map(|link| link.dst().to_string()).collect();
+    BusError::NoService { key: key.to_owned(), peers, waited }
 }
 
 /// The status of a unit, as the service that has it answers; `None` where none answers in time.

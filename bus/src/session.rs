@@ -63,11 +63,15 @@ impl SessionOptions {
     /// The configuration that these options stand for.
     ///
     /// # Errors
-    /// [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`].
+    /// [`BusError::ConfigurationFile`], [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`].
     pub fn to_config(&self) -> Result<Config, BusError> {
         let mut config = match &self.config {
-            Some(path) => Config::from_file(path)
-                .map_err(|source| BusError::Configuration { path: path.clone(), source })?,
+            Some(path) => {
+                let unreadable = |source| BusError::ConfigurationFile { path: path.clone(), source };
+                std::fs::File::open(path).map_err(unreadable)?;
+                Config::from_file(path)
+                    .map_err(|source| BusError::Configuration { path: path.clone(), source })?
+            }
             None => loopback()?,
         };
         if !self.connect.is_empty() {

@@ -16,7 +16,7 @@ use isotherm_log::faults::FaultOptions;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::schedule::Clock;
 use isotherm_log::source::LogReport;
-use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::HealthReading;
 use tokio::sync::mpsc::UnboundedReceiver;
 use zenoh::key_expr::OwnedKeyExpr;
@@ -138,7 +138,7 @@ pub async fn play(
         let ended = tokio::select! {
             biased;
             () = &mut stop => Err(Error::Stopped),
-            ended = run(&opened, options, &mut player, watch) => ended,
+            ended = run(&opened, &way.tried(), options, &mut player, watch) => ended,
         };
         Played { report: player.report(ended.is_err()), log: player.log_report(), ended }
     };
@@ -153,6 +153,7 @@ pub async fn play(
 /// Plays while the service is there.
 async fn run<W: Watch>(
     session: &zenoh::Session,
+    tried: &str,
     options: &PlayOptions,
     player: &mut Player<'_, W>,
     watch: &W,
@@ -166,7 +167,7 @@ async fn run<W: Watch>(
         biased;
         ended = player.run() => ended,
         () = service.gone() => {
-            Err(BusError::ServiceGone { key: key::ALL_SERVICES_ALIVE.to_owned() }.into())
+            Err(BusError::ServiceGone { tried: tried.to_owned() }.into())
         }
         never = silence::watch(session, &under_way, watch) => match never {},
     }

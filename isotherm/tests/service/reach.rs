@@ -83,12 +83,25 @@ fn what_cannot_be_reached_is_said_with_its_address_and_the_next_step() {
 
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = silent.local_addr().unwrap().to_string();
-    let parts = [&*format!("tcp/{address}: something listens there but does not answer within")];
+    let parts = [&*format!("tcp/{address}: something listens there but does not answer within 500 ms")];
     refused(&["status", "--connect", &address, "--timeout", "0.5"], &[], 1, &parts);
 
     let parts = ["tcp/no.such.host.invalid:7447: the host name is not known"];
     refused(&["status", "--connect", "no.such.host.invalid:7447", "--timeout", "2"], &[], 1, &parts);
 
+    // Of several addresses each has its reason, and what to do comes once.
+    let both = format!("{nobody},no.such.host.invalid:7447");
+    let parts = [&*format!(
+        "tcp/{nobody} (from ISOTHERM_CONNECT): nothing listens there; tcp/no.such.host.invalid:7447"
+    )];
+    refused(&["status", "--timeout", "2"], &[("ISOTHERM_CONNECT", &both)], 1, &parts);
+    let output = isotherm(&["status", "--timeout", "2"], &[("ISOTHERM_CONNECT", &both)]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(stderr.matches("--connect HOST:PORT").count(), 1, "{stderr}");
+
+    let parts =
+        ["cannot listen on tcp/no.such.host.invalid:7447: the host name is not known", "--listen HOST:PORT"];
+    refused(&["serve", "--listen", "no.such.host.invalid:7447"], &[], 1, &parts);
     let parts =
         [&*format!("cannot listen on tcp/{address}: another program listens there"), "--listen HOST:PORT"];
     refused(&["serve", "--listen", &address], &[], 1, &parts);
@@ -119,6 +132,9 @@ fn wrong_addresses_are_a_wrong_call() {
     let zenoh = folder.path().join("z.json5");
     std::fs::write(&zenoh, "{ mode: \"peerx\" }").unwrap();
     let zenoh = path(&zenoh);
+    let missing = folder.path().join("none.json5");
+    let parts = ["cannot read the Zenoh configuration", "none.json5"];
+    refused(&["status", "--zenoh-config", path(&missing)], &[], 1, &parts);
     refused(
         &["status", "--zenoh-config", zenoh],
         &[],

@@ -39,7 +39,7 @@ pub(super) struct PlotArgs {
     /// Column mapping of the second log (default: that of the first)
     #[arg(long, value_name = "FILE", requires = "beside")]
     beside_mapping: Option<PathBuf>,
-    /// Unit of the second log (default: that of the first)
+    /// Unit of the second log (default: --unit)
     #[arg(long, value_name = "SERIAL", requires = "beside")]
     beside_unit: Vec<String>,
     /// Calibration document (TOML) that corrects a text log and scales counts (recordings: as recorded)
