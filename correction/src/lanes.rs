@@ -1,10 +1,11 @@
 //! Sensor beside sensor: one number of each in an array of fixed width, so that a tick's arithmetic needs no branch per sensor.
 
-use core::array;
+use core::ops::{Deref, DerefMut};
+use core::{array, slice};
 
 use serde::{Deserialize, Serialize};
 
-use crate::sample::MAX_SENSORS;
+use crate::sample::{MAX_SENSORS, Sensors};
 
 /// One number of each sensor, in the order of the calibration; 0 where there is no sensor.
 pub type Lanes = [f64; MAX_SENSORS];
@@ -26,21 +27,85 @@ pub(crate) fn put<const N: usize>(lanes: &mut Lanes, values: [f64; N]) {
     }
 }
 
-/// Readings as lanes; 0 where there is none.
-#[inline]
-pub(crate) fn of_readings<const N: usize>(readings: &[f64]) -> [f64; N] {
-    // Mostly there are three.
-    if let &[x, y, z] = readings {
-        return array::from_fn(|lane| match lane {
-            0 => x,
-            1 => y,
-            2 => z,
-            _ => 0.0,
-        });
+/// What the sensors of a kind read in one tick, in the order of the calibration: a list of at most [`MAX_SENSORS`] numbers that are
+/// lanes already.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(into = "Sensors<f64>", from = "Sensors<f64>")]
+pub struct Readings {
+    /// 0 where there is no sensor.
+    lanes: Lanes,
+    count: usize,
+}
+
+impl Readings {
+    /// The first `N` lanes; 0 where there is no sensor.
+    pub(crate) const fn lanes<const N: usize>(&self) -> &[f64; N] {
+        narrow(&self.lanes)
     }
-    let mut lanes = [0.0; N];
-    lanes.iter_mut().zip(readings).for_each(|(lane, reading)| *lane = *reading);
-    lanes
+
+    /// Has so many readings, at most [`MAX_SENSORS`]: those that are new are 0.
+    #[inline]
+    pub fn resize(&mut self, count: usize) {
+        let count = count.min(MAX_SENSORS);
+        if count != self.count {
+            self.lanes[count..].fill(0.0);
+            self.count = count;
+        }
+    }
+
+    /// One reading more; lost where there are [`MAX_SENSORS`].
+    pub fn push(&mut self, reading: f64) {
+        if let Some(lane) = self.lanes.get_mut(self.count) {
+            *lane = reading;
+            self.count += 1;
+        }
+    }
+}
+
+impl Deref for Readings {
+    type Target = [f64];
+
+    #[inline]
+    fn deref(&self) -> &[f64] {
+        self.lanes.get(..self.count).unwrap_or_default()
+    }
+}
+
+impl DerefMut for Readings {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [f64] {
+        self.lanes.get_mut(..self.count).unwrap_or_default()
+    }
+}
+
+/// Those beyond [`MAX_SENSORS`] are lost.
+impl FromIterator<f64> for Readings {
+    fn from_iter<I: IntoIterator<Item = f64>>(readings: I) -> Self {
+        let mut all = Self::default();
+        readings.into_iter().for_each(|reading| all.push(reading));
+        all
+    }
+}
+
+impl<'a> IntoIterator for &'a Readings {
+    type Item = &'a f64;
+    type IntoIter = slice::Iter<'a, f64>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl From<Sensors<f64>> for Readings {
+    fn from(readings: Sensors<f64>) -> Self {
+        readings.into_iter().collect()
+    }
+}
+
+impl From<Readings> for Sensors<f64> {
+    fn from(readings: Readings) -> Self {
+        readings.iter().copied().collect()
+    }
 }
 
 /// One term of each sensor on a straight line over a share that goes from 0 to 1.

@@ -175,6 +175,11 @@ impl StepSum {
         }
     }
 
+    /// Revision of the open step.
+    pub(crate) fn revision(&self) -> Option<u64> {
+        self.open.as_ref().map(|_| self.revision)
+    }
+
     /// Whether no step is open.
     #[must_use]
     pub const fn is_empty(&self) -> bool {

@@ -29,7 +29,7 @@ pub use parts::{
     AxesPlay, CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
 };
 
-use crate::lanes;
+use crate::lanes::Readings;
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
 use crate::thermal::MAX_PLAYS;
 use crate::vector::dot;
@@ -321,8 +321,8 @@ impl Inverse {
     #[must_use]
     pub fn apply(&self, readings: &[f64]) -> [f64; 3] {
         let used = |(index, s): (usize, &f64)| if self.mask.contains(index) { *s } else { 0.0 };
-        let readings: Sensors<f64> = readings.iter().take(MAX_SENSORS).enumerate().map(used).collect();
-        self.lerp_apply::<MAX_SENSORS>(self, 1.0, &lanes::of_readings(&readings))
+        let readings: Readings = readings.iter().enumerate().map(used).collect();
+        self.lerp_apply::<MAX_SENSORS>(self, 1.0, readings.lanes())
     }
 
     /// What [`lerp`](Self::lerp) to `other` and then [`apply`](Self::apply) give, without the matrix in between; the readings of

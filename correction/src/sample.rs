@@ -6,6 +6,7 @@ use arrayvec::{ArrayString, ArrayVec};
 use bitflags::bitflags;
 use serde::{Deserialize, Serialize};
 
+pub use crate::lanes::Readings;
 use crate::sigma::Sigma;
 use crate::units::{Span, Timestamp};
 
@@ -83,7 +84,7 @@ pub struct GyroTick {
     /// Measured duration of the tick.
     pub duration: Span,
     /// One reading per gyro: counts, or mean rate (rad/s), as the batch's [`OutputKind`] says.
-    pub readings: Sensors<f64>,
+    pub readings: Readings,
     /// Lasing mode that is commanded at the end of the tick; `None` for an instrument without modes.
     pub mode: Option<LasingMode>,
     /// The mode switch was commanded at the start of this tick: it is tick j = 1 of models §5.
@@ -106,7 +107,7 @@ pub struct AccelTick {
     /// Measured duration of the tick.
     pub duration: Span,
     /// One reading per accelerometer: counts, or mean output, as the batch's [`OutputKind`] says.
-    pub readings: Sensors<f64>,
+    pub readings: Readings,
 }
 
 /// One reading of one temperature channel.

@@ -131,7 +131,7 @@ impl Unit {
             Event::Accel { output, ticks } => {
                 pipeline.counters.accel_ticks_in += ticks.len() as u64;
                 let settled = pipeline.settled().filter(|calibration| calibration.accel_output == output);
-                let fitting = settled.map(Calibration::accel_count);
+                let fitting = settled.map(|calibration| calibration.accels.len());
                 for tick in ticks {
                     if fitting == Some(tick.readings.len()) || pipeline.takes_accel(tick, output) {
                         self.accels.admit(tick, output, &mut pipeline.counters);
@@ -147,8 +147,7 @@ impl Unit {
             }
             Event::Reference(reference) => {
                 if let Some(active) = &mut pipeline.active {
-                    // What is refused is counted.
-                    let _ = active.corrector.drift.submit(reference);
+                    active.corrector.refer(reference, false);
                 }
             }
             Event::Flush => {
@@ -201,16 +200,17 @@ impl Unit {
     #[inline]
     fn run(&self, output: OutputKind, ticks: &[GyroTick]) -> usize {
         let Some(calibration) = self.pipeline.settled() else { return 0 };
-        let (accels, accel_count) = (self.accels.waiting(), calibration.accel_count());
+        let (accels, accel_count) = (self.accels.waiting(), calibration.accels.len());
         if calibration.gyro_output != output || (accel_count == 0 && !accels.is_empty()) {
             return 0;
         }
         self.gyros.run(ticks, |index, tick| {
             let is_met = |accel: &PendingAccel| {
-                let fits = accel.count == accel_count && accel.output == calibration.accel_output;
+                let fits =
+                    accel.tick.readings.len() == accel_count && accel.output == calibration.accel_output;
                 fits && accel.ends_with(tick)
             };
-            tick.readings.len() == calibration.gyro_count()
+            tick.readings.len() == calibration.gyros.len()
                 && (accel_count == 0 || accels.get(index).is_some_and(is_met))
         })
     }

@@ -1,7 +1,7 @@
 //! Frames of every kind.
 
 use isotherm_protocol::codec::{CodecError, Kind, Message, decode, encode};
-use isotherm_protocol::raw::{RawBatch, RawTick, TemperatureBatch, read_temperatures, read_ticks};
+use isotherm_protocol::raw::{RawBatch, RawTick, TemperatureBatch, TickReader, read_temperatures};
 
 use crate::said::in_few_words;
 
@@ -11,20 +11,18 @@ pub fn frame<M: Message>(input: &[u8]) {
 }
 
 /// Likewise, for frames that are also read into room that is used again.
-pub fn raw<T: RawTick>(input: &[u8]) {
+pub fn raw<T: RawTick + Clone>(input: &[u8]) {
     // What an earlier frame left there.
-    let mut ticks: Vec<T> = Vec::new();
+    let mut reader = TickReader::<T>::default();
     as_it_is_and_sealed::<RawBatch<T>>(input, |frame| {
         let written = written_again::<RawBatch<T>>(frame);
-        let output = read_ticks(frame, &mut ticks);
+        let read = reader.read(frame).map(|(output, ticks)| RawBatch { output, ticks: ticks.to_vec() });
         match &written {
             Ok(written) => {
-                let output = output.expect("both readers take it");
-                let batch = RawBatch { output, ticks: std::mem::take(&mut ticks) };
+                let batch = read.expect("both readers take it");
                 assert_eq!(encode(&batch).as_ref(), Ok(written), "both readers read the same");
-                ticks = batch.ticks;
             }
-            Err(error) => assert_eq!(output.as_ref(), Err(error), "both readers refuse it"),
+            Err(error) => assert_eq!(read.map(drop), Err(error.clone()), "both readers refuse it"),
         }
         written.map(drop)
     });

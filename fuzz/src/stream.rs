@@ -49,7 +49,7 @@ impl Account {
     /// Takes what is ready: each tick goes on where the one before it ended, but for what it announces as missing.
     fn take(&mut self, stream: &mut UnitStream) {
         let mut frame = Vec::new();
-        while stream.next_frame(&mut frame) {
+        while stream.next_frame(&mut frame).is_some() {
             let batch: CorrectedBatch = decode(&frame).expect("a stream's own frame");
             for tick in batch.ticks {
                 let ticks = u64::from(tick.ticks.max(1));
@@ -186,7 +186,7 @@ impl Producer {
                 0 => tick.sequence = from.number(),
                 1 => tick.end_time = Timestamp::from_ns(from.number().cast_signed()),
                 2 => tick.duration = Span::from_ns(from.number().cast_signed()),
-                _ => tick.readings.truncate(usize::from(from.some() % 8)),
+                _ => tick.readings.resize(tick.readings.len().min(usize::from(from.some() % 8))),
             }
         }
         if shape & 8 == 0 {

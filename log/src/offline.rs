@@ -130,7 +130,7 @@ impl Offline {
 
     /// Takes ready ticks as one frame; false where there are none.
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
-        self.stream.next_frame(frame)
+        self.stream.next_frame(frame).is_some()
     }
 
     /// What was refused or passed over, in words for whoever reads only the summary.

@@ -21,7 +21,7 @@ use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
 
-pub(crate) use reader::{Body, Stretch};
+pub(crate) use reader::{Body, Stretch, Tail};
 pub(crate) use writer::{MAX_NUMBER, Writer, append, append_text};
 
 use crate::version::Versions;
@@ -315,8 +315,9 @@ fn open<M: Message>(frame: &[u8]) -> Result<(u8, &[u8]), CodecError> {
     if kind != M::KIND as u8 {
         return Err(CodecError::Kind { got: kind, need: M::KIND as u8 });
     }
-    if !M::VERSIONS.contains(version) {
-        return Err(CodecError::Version { got: version, known: M::VERSIONS });
+    let known = M::VERSIONS;
+    if !(known.min..=known.current).contains(&version) {
+        return Err(CodecError::Version { got: version, known });
     }
     let (got, need) = (u32::from_le_bytes(*found), checksum(covered));
     if got != need {

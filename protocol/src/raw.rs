@@ -7,14 +7,18 @@ mod batcher;
 mod health;
 mod temperature;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, HalfPeriodCounts, MAX_SENSORS, OutputKind, Sensors};
+use isotherm_correction::sample::{
+    AccelTick, GyroTick, HalfPeriodCounts, MAX_SENSORS, OutputKind, Readings, Sensors,
+};
 use isotherm_correction::units::{Span, Timestamp};
 
 pub use batcher::{BatchError, Batcher, RawFrame};
 pub use health::{HealthBatch, HealthReading, HealthTick, MAX_HEALTH};
 pub use temperature::{MAX_CHANNELS, TemperatureBatch, read_temperatures};
 
-use crate::codec::{self, Body, CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, Stretch, Writer, append};
+use crate::codec::{
+    self, Body, CodecError, Kind, MAX_NUMBER, MAX_TICKS, Message, Stretch, Tail, Writer, append,
+};
 use crate::version::{self, Versions};
 
 /// Consecutive ticks of one unit; gyro ticks are of one series.
@@ -50,12 +54,12 @@ pub trait RawTick: Default {
     /// What both have.
     fn parts(&self) -> Parts<'_>;
     /// Sets number, run and times; gives the readings, to be set next.
-    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) -> &mut Sensors<f64>;
+    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) -> &mut Readings;
     /// Writes what stands behind the readings.
     fn write_rest(&self, _: &mut Writer<'_>) {}
-    /// Reads what stands behind the readings.
-    fn read_rest(&mut self, _: &mut Stretch<'_>) -> Option<()> {
-        Some(())
+    /// Reads what stands behind the readings; how many sensors have half-period counts.
+    fn read_rest(&mut self, _: &mut Stretch<'_>) -> Option<usize> {
+        Some(0)
     }
 }
 
@@ -69,7 +73,7 @@ pub struct Parts<'a> {
     /// End on the producer's clock, and measured duration.
     pub times: (Timestamp, Span),
     /// One reading per sensor.
-    pub readings: &'a Sensors<f64>,
+    pub readings: &'a Readings,
     /// How many sensors have half-period counts.
     pub half_periods: usize,
 }
@@ -87,7 +91,7 @@ impl RawTick for GyroTick {
     }
 
     #[inline]
-    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) -> &mut Sensors<f64> {
+    fn begin(&mut self, sequence: u64, series: u64, times: (Timestamp, Span)) -> &mut Readings {
         (self.sequence, self.series) = (sequence, series);
         (self.end_time, self.duration) = times;
         &mut self.readings
@@ -105,7 +109,7 @@ impl RawTick for GyroTick {
     }
 
     #[inline]
-    fn read_rest(&mut self, part: &mut Stretch<'_>) -> Option<()> {
+    fn read_rest(&mut self, part: &mut Stretch<'_>) -> Option<usize> {
         self.mode = part.mode()?;
         self.switch_command = part.bool()?;
         self.meander = part.mode()?;
@@ -114,7 +118,7 @@ impl RawTick for GyroTick {
             let [positive, negative] = part.two_i32()?;
             *half = HalfPeriodCounts { positive, negative };
         }
-        Some(())
+        Some(self.half_periods.len())
     }
 }
 
@@ -130,7 +134,7 @@ impl RawTick for AccelTick {
     }
 
     #[inline]
-    fn begin(&mut self, sequence: u64, _: u64, times: (Timestamp, Span)) -> &mut Sensors<f64> {
+    fn begin(&mut self, sequence: u64, _: u64, times: (Timestamp, Span)) -> &mut Readings {
         self.sequence = sequence;
         (self.end_time, self.duration) = times;
         &mut self.readings
@@ -143,7 +147,10 @@ impl<T: RawTick> Message for RawBatch<T> {
 
     fn check(&self) -> Result<(), CodecError> {
         let mut alike = Alike::default();
-        self.ticks.iter().enumerate().for_each(|(index, tick)| alike.note(index, self.output, tick));
+        for (index, tick) in self.ticks.iter().enumerate() {
+            let Parts { readings, half_periods, .. } = tick.parts();
+            alike.note(index, (self.output, readings.len()), half_periods);
+        }
         alike.judge(self.ticks.len()).map(drop)
     }
 
@@ -181,8 +188,8 @@ impl<T: RawTick> Message for RawBatch<T> {
     }
 
     fn read_body(_: u8, body: &[u8]) -> Result<Self, CodecError> {
-        let mut ticks = Vec::new();
-        Ok(Self { output: read_body(body, &mut ticks)?, ticks })
+        let mut reader = TickReader::default();
+        Ok(Self { output: reader.read_body(body)?, ticks: reader.ticks })
     }
 }
 
@@ -195,22 +202,36 @@ fn whole(value: f64) -> Option<i32> {
     exact.then_some(count)
 }
 
-/// Reads a frame of gyro or accelerometer ticks; what their readings stand for.
-///
-/// `ticks` holds the ticks afterwards, and anything after an error.
-///
-/// # Errors
-/// As [`codec::decode`] of a [`RawBatch`].
-pub fn read_ticks<T: RawTick>(frame: &[u8], ticks: &mut Vec<T>) -> Result<OutputKind, CodecError> {
-    read_body(codec::body::<RawBatch<T>>(frame)?, ticks)
+/// Reads frames of gyro or accelerometer ticks one after the other, into room that is used again.
+#[derive(Debug)]
+pub struct TickReader<T> {
+    ticks: Vec<T>,
+    tail: Tail,
 }
 
-fn read_body<T: RawTick>(bytes: &[u8], ticks: &mut Vec<T>) -> Result<OutputKind, CodecError> {
-    let mut body = Body::new(bytes);
-    let mut alike = Alike::default();
-    read_all(&mut body, ticks, &mut alike).ok_or(CodecError::Malformed)?;
-    body.ends()?;
-    alike.judge(ticks.len())
+impl<T> Default for TickReader<T> {
+    fn default() -> Self {
+        Self { ticks: Vec::new(), tail: Tail::default() }
+    }
+}
+
+impl<T: RawTick> TickReader<T> {
+    /// Ticks of a frame, and what their readings stand for.
+    ///
+    /// # Errors
+    /// As [`codec::decode`] of a [`RawBatch`].
+    pub fn read(&mut self, frame: &[u8]) -> Result<(OutputKind, &[T]), CodecError> {
+        let output = self.read_body(codec::body::<RawBatch<T>>(frame)?)?;
+        Ok((output, &self.ticks))
+    }
+
+    fn read_body(&mut self, bytes: &[u8]) -> Result<OutputKind, CodecError> {
+        let mut body = Body::new(bytes, &mut self.tail);
+        let mut alike = Alike::default();
+        read_all(&mut body, &mut self.ticks, &mut alike).ok_or(CodecError::Malformed)?;
+        body.ends()?;
+        alike.judge(self.ticks.len())
+    }
 }
 
 /// Reads all ticks of a body.
@@ -230,8 +251,9 @@ fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Ali
             let duration = Span::from_ns(i64::try_from(part.u64()?).unwrap_or(i64::MAX));
             let readings = tick.begin(first.saturating_add(index as u64), series, (end_time, duration));
             let output = read_readings(part, readings)?;
-            tick.read_rest(part)?;
-            alike.note(index, output, tick);
+            let sensors = readings.len();
+            let halves = tick.read_rest(part)?;
+            alike.note(index, (output, sensors), halves);
             Some(())
         })?;
     }
@@ -241,18 +263,18 @@ fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Ali
 /// Reads the readings of a tick; what they stand for.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "else how far a tick has been read leaves its register")]
-fn read_readings(part: &mut Stretch<'_>, readings: &mut Sensors<f64>) -> Option<OutputKind> {
+fn read_readings(part: &mut Stretch<'_>, readings: &mut Readings) -> Option<OutputKind> {
     let kind = part.variant()?;
-    resize(readings, part.length(MAX_SENSORS)?);
+    readings.resize(part.length(MAX_SENSORS)?);
     match kind {
         0 => {
-            for reading in readings {
+            for reading in readings.iter_mut() {
                 *reading = f64::from(part.i32()?);
             }
             Some(OutputKind::Counts)
         }
         1 => {
-            for reading in readings {
+            for reading in readings.iter_mut() {
                 *reading = part.f64()?;
             }
             Some(OutputKind::Mean)
@@ -280,18 +302,9 @@ struct Alike {
 }
 
 impl Alike {
+    /// A tick with `readings`, and half-period counts of `got` gyros.
     #[inline]
-    fn note(&mut self, index: usize, output: OutputKind, tick: &impl RawTick) {
-        let Parts { readings, half_periods: got, .. } = tick.parts();
-        let need = readings.len();
-        if self.first != Some((output, need)) || (got != 0 && got != need) {
-            self.note_other(index, (output, need), got);
-        }
-    }
-
-    /// The first tick, or one that differs.
-    #[cold]
-    fn note_other(&mut self, index: usize, readings: (OutputKind, usize), got: usize) {
+    fn note(&mut self, index: usize, readings: (OutputKind, usize), got: usize) {
         if *self.first.get_or_insert(readings) != readings {
             self.mixed.get_or_insert(index);
         }

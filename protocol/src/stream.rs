@@ -38,7 +38,7 @@ use crate::corrected::{Head, Revision};
 use crate::digest::Digest;
 use crate::journal::JournalEvent;
 use crate::key::{Input, RawStream, UnitId};
-use crate::raw::{self, HealthBatch};
+use crate::raw::{self, HealthBatch, TickReader};
 use crate::reference::Reference;
 use crate::status::{Counter, LastTick};
 
@@ -46,8 +46,8 @@ use crate::status::{Counter, LastTick};
 /// units need no such room of their own.
 #[derive(Debug, Default)]
 struct Scratch {
-    gyro_ticks: Vec<GyroTick>,
-    accel_ticks: Vec<AccelTick>,
+    gyros: TickReader<GyroTick>,
+    accels: TickReader<AccelTick>,
     readings: Vec<TemperatureReading>,
     health: Vec<HealthReading>,
 }
@@ -163,7 +163,7 @@ impl UnitStream {
         let replaced = self.watching_pre_launch(|unit| unit.schedule(change));
         let in_force = self.unit.calibration().map(|(_, counter)| counter);
         let pending = self.unit.pending().map(|(counter, _)| counter);
-        self.revisions.drop_replaced(in_force, pending);
+        self.revisions.drop_replaced([in_force, pending, self.unit.summing()]);
         replaced
     }
 
@@ -204,15 +204,15 @@ impl UnitStream {
 
     /// Reads a frame, and has the unit take what it says.
     fn read(&mut self, input: Input, frame: &[u8], scratch: &mut Scratch) -> Result<(), CodecError> {
-        let Scratch { gyro_ticks, accel_ticks, readings, health } = scratch;
+        let Scratch { gyros, accels, readings, health } = scratch;
         match input {
             Input::Raw(RawStream::Gyro) => {
-                let output = raw::read_ticks(frame, gyro_ticks)?;
-                self.handle(Event::Gyro { output, ticks: gyro_ticks });
+                let (output, ticks) = gyros.read(frame)?;
+                self.handle(Event::Gyro { output, ticks });
             }
             Input::Raw(RawStream::Accel) => {
-                let output = raw::read_ticks(frame, accel_ticks)?;
-                self.handle(Event::Accel { output, ticks: accel_ticks });
+                let (output, ticks) = accels.read(frame)?;
+                self.handle(Event::Accel { output, ticks });
             }
             Input::Raw(RawStream::Temperature) => {
                 raw::read_temperatures(frame, readings)?;
@@ -237,7 +237,6 @@ impl UnitStream {
         if let Event::Gyro { ticks, .. } = event {
             self.incoming_series = ticks.last().map_or(self.incoming_series, |tick| tick.series);
         }
-        let before = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
         let state = self.unit.state();
         let Self { unit, outgoing, revisions, series, incoming_series, .. } = self;
         unit.handle(event, &mut |tick: &CorrectedTick| {
@@ -245,22 +244,16 @@ impl UnitStream {
             if tick.flags.contains(TickFlags::RESTART) || series.is_none() {
                 *series = Some(*incoming_series);
             }
-            let series = series.unwrap_or_default();
-            revisions.released(tick.revision, |revision| InForce {
-                revision,
-                series,
-                sequence: tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1))),
-                end_time_ns: tick.end_time.as_ns(),
-            });
+            if revisions.is_new(tick.revision) {
+                revisions.released(tick.revision, |revision| InForce {
+                    revision,
+                    series: series.unwrap_or_default(),
+                    sequence: tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1))),
+                    end_time_ns: tick.end_time.as_ns(),
+                });
+            }
             outgoing.push(tick);
         });
-        let after = (self.unit.calibration().map(|(_, counter)| counter), self.unit.counters().ticks_out);
-        if before.1 != after.1 {
-            if before.0 != after.0 {
-                before.0.into_iter().for_each(|counter| self.revisions.made_ticks(counter));
-            }
-            after.0.into_iter().for_each(|counter| self.revisions.made_ticks(counter));
-        }
         self.note_pre_launch(state);
     }
 
@@ -293,31 +286,29 @@ impl UnitStream {
     /// Takes the corrected ticks as they are.
     pub fn take_ready(&mut self) -> Vec<CorrectedTick> {
         let (ticks, last) = self.outgoing.take();
-        self.note_taken(last);
+        last.into_iter().for_each(|last| self.note_taken(last));
         ticks
     }
 
     /// Makes the next frame of corrected ticks, all of one revision, in the place of `frame`, whose capacity the stream keeps
-    /// for the one after it; `false` where there is none.
-    pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
-        if self.outgoing.is_empty() {
-            return false;
-        }
+    /// for the one after it; how many ticks are in it, `None` where there is none.
+    pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> Option<usize> {
         let Self { id, unit, revisions, outgoing, .. } = self;
-        let last = outgoing.next_frame(frame, unit.temperature_changes(), |head, counter, ticks| {
-            let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
-            let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
-            let revision = revisions.revision(counter);
-            Head { unit: id.as_str(), revision, temperatures, ticks }.append(head);
-        });
+        let (last, ticks) =
+            outgoing.next_frame(frame, unit.temperature_changes(), |head, counter, ticks| {
+                let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
+                let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
+                let revision = revisions.revision(counter);
+                Head { unit: id.as_str(), revision, temperatures, ticks }.append(head);
+            })?;
         self.note_taken(last);
-        last.is_some()
+        Some(ticks)
     }
 
     /// Gives up the ready ticks: they were taken.
     pub fn drop_ready(&mut self) {
         let last = self.outgoing.clear();
-        self.note_taken(last);
+        last.into_iter().for_each(|last| self.note_taken(last));
     }
 
     /// The first output of each revision, in order and once each; ask after every frame.
@@ -326,8 +317,7 @@ impl UnitStream {
     }
 
     /// Remembers the last tick taken, and drops revisions of which nothing can be waiting any more.
-    fn note_taken(&mut self, last: Option<Last>) {
-        let Some(Last { end_time_ns, sequence, revision }) = last else { return };
+    fn note_taken(&mut self, Last { end_time_ns, sequence, revision }: Last) {
         let series = self.series.unwrap_or_default();
         self.last = Some(LastTick { end_time_ns, sequence, series });
         self.revisions.taken(revision);

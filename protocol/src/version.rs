@@ -19,14 +19,6 @@ pub struct Versions {
     pub current: u8,
 }
 
-impl Versions {
-    /// Whether a version is read.
-    #[must_use]
-    pub const fn contains(self, version: u8) -> bool {
-        self.min <= version && version <= self.current
-    }
-}
-
 impl fmt::Display for Versions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} to {}", self.min, self.current)

@@ -1,6 +1,6 @@
 //! Pendulous accelerometer: quartz with a pulse output, or micromechanical with an output in m/s².
 
-use isotherm_correction::sample::{OutputKind, Sensors};
+use isotherm_correction::sample::{OutputKind, Readings, Sensors};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -132,7 +132,7 @@ impl AccelerometersState {
         (axes_deg_c, board_deg_c): (f64, f64),
         share: f64,
         extra: impl Fn(usize) -> f64,
-    ) -> Sensors<f64> {
+    ) -> Readings {
         let axes = self.orientation.axes(axes_deg_c);
         let output = self.output;
         let states = self.sensors.iter_mut().zip(axes).enumerate();

@@ -1,6 +1,6 @@
 //! The gyros of one unit with their memory, whatever their kind.
 
-use isotherm_correction::sample::{HalfPeriodCounts, LasingMode, Sensors};
+use isotherm_correction::sample::{HalfPeriodCounts, LasingMode, Readings, Sensors};
 
 use crate::fibre_optic::FibreOpticState;
 use crate::instrument::Gyros;
@@ -22,7 +22,7 @@ pub(crate) struct TickTime {
 /// What a tick of all gyros gives.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GyroOutput {
-    pub(crate) readings: Sensors<f64>,
+    pub(crate) readings: Readings,
     pub(crate) halves: Sensors<HalfPeriodCounts>,
     pub(crate) drift_rad_per_s: Sensors<f64>,
     pub(crate) transient_rad_per_s: Sensors<f64>,

@@ -1,6 +1,6 @@
 //! The simulation: a stream of ticks from a scenario.
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, Sensors, TemperatureReading};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, Readings, Sensors, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 
 use crate::accelerometer::AccelerometersState;
@@ -40,7 +40,7 @@ pub struct Simulation {
     failures: Failures,
     effects: EffectsState,
     last_gyro: GyroOutput,
-    last_accel: Sensors<f64>,
+    last_accel: Readings,
 }
 
 impl Simulation {
@@ -79,7 +79,7 @@ impl Simulation {
             effects: EffectsState::new(&instrument.effects),
             surroundings,
             last_gyro: GyroOutput::default(),
-            last_accel: Sensors::new(),
+            last_accel: Readings::default(),
         })
     }
 
@@ -158,7 +158,7 @@ impl Simulation {
         self.last_gyro.halves.clone_from(&output.halves);
     }
 
-    fn fail_accelerometers(&mut self, readings: &mut Sensors<f64>, time_s: f64) {
+    fn fail_accelerometers(&mut self, readings: &mut Readings, time_s: f64) {
         for (index, reading) in readings.iter_mut().enumerate() {
             let sensor = FailingSensor::Accelerometer(index);
             if self.failures.stuck(sensor, time_s) {
@@ -171,12 +171,7 @@ impl Simulation {
         self.last_accel.clone_from(readings);
     }
 
-    fn read_accelerometers(
-        &mut self,
-        velocity: [f64; 3],
-        length_s: f64,
-        middle_s: f64,
-    ) -> Option<Sensors<f64>> {
+    fn read_accelerometers(&mut self, velocity: [f64; 3], length_s: f64, middle_s: f64) -> Option<Readings> {
         let share = self.surroundings.share(middle_s);
         let [_, axes_deg_c] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
         let deg_c = (axes_deg_c, self.surroundings.board_deg_c(share));

@@ -113,7 +113,7 @@ impl Source {
             }
         }
         let (mut frame, mut expected) = (Vec::new(), Vec::new());
-        while self.reference.next_frame(&mut frame) {
+        while self.reference.next_frame(&mut frame).is_some() {
             let batch: CorrectedBatch = codec::decode(&frame).expect("a frame");
             let revision = batch.revision;
             expected.extend(batch.ticks.into_iter().map(|tick| (revision, tick)));

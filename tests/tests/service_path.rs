@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use isotherm_correction::sample::{
-    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+    AccelTick, ChannelName, GyroTick, OutputKind, Readings, TemperatureReading,
 };
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
@@ -98,7 +98,7 @@ fn a_message_allocates_nothing_but_the_frame_that_it_publishes() {
 fn messages(unit: &UnitId, first: u64, batch: u64, channels: &[ChannelName]) -> Vec<Message> {
     let end_time = |tick: u64| Timestamp::from_ns(((tick + 1) * TICK_NS).cast_signed());
     let duration = Span::from_ns(TICK_NS.cast_signed());
-    let readings: Sensors<f64> = [0.01, 0.02, 0.03].into_iter().collect();
+    let readings: Readings = [0.01, 0.02, 0.03].into_iter().collect();
     let output = OutputKind::Mean;
     let ticks = first..first + batch;
     let mut messages = Vec::new();

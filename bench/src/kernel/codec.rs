@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use isotherm_correction::sample::GyroTick;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
-use isotherm_protocol::raw::{GyroBatch, read_ticks};
+use isotherm_protocol::raw::{GyroBatch, TickReader};
 
 use super::{Kernel, unit};
 use crate::error::Error;
@@ -17,7 +17,7 @@ pub(super) struct Decode {
     name: String,
     frames: Vec<Vec<u8>>,
     ticks: Vec<GyroTick>,
-    room: Vec<GyroTick>,
+    reader: TickReader<GyroTick>,
 }
 
 /// Encoding of corrected ticks of the Zeeman unit.
@@ -36,13 +36,13 @@ impl Decode {
         let batches = ticks.chunks(size).map(|ticks| GyroBatch { output, ticks: ticks.to_vec() });
         let frames = batches.filter_map(|batch| codec::encode(&batch).ok());
         let name = format!("decode raw gyros, batches of {size}");
-        Ok(Self { name, frames: frames.collect(), ticks, room: Vec::new() })
+        Ok(Self { name, frames: frames.collect(), ticks, reader: TickReader::default() })
     }
 
     fn decode(&mut self, each: &mut dyn FnMut(&GyroTick)) {
         for frame in &self.frames {
-            if read_ticks(frame, &mut self.room).is_ok() {
-                self.room.iter().for_each(&mut *each);
+            if let Ok((_, ticks)) = self.reader.read(frame) {
+                ticks.iter().for_each(&mut *each);
             }
         }
     }

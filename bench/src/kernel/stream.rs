@@ -63,12 +63,12 @@ impl Stream {
         for (kind, frame) in &self.frames {
             // What is not taken is missed by the check.
             let _ = stream.receive(*kind, frame);
-            while stream.next_frame(&mut self.room) {
+            while stream.next_frame(&mut self.room).is_some() {
                 each(&self.room);
             }
         }
         stream.flush();
-        while stream.next_frame(&mut self.room) {
+        while stream.next_frame(&mut self.room).is_some() {
             each(&self.room);
         }
     }

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 use isotherm_correction::sample::{
-    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+    AccelTick, ChannelName, GyroTick, OutputKind, Readings, TemperatureReading,
 };
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
@@ -22,8 +22,8 @@ const START_NS: u64 = 1_000_000_000_000;
 /// What a unit reads: three gyros, three accelerometers and eight temperature channels of the micromechanical preset.
 #[derive(Debug)]
 pub(crate) struct Instrument {
-    gyro: Vec<Sensors<f64>>,
-    accel: Vec<Sensors<f64>>,
+    gyro: Vec<Readings>,
+    accel: Vec<Readings>,
     channels: ArrayVec<ChannelName, MAX_CHANNELS>,
     temperatures: Vec<ArrayVec<f64, MAX_CHANNELS>>,
 }
@@ -48,8 +48,8 @@ impl Instrument {
         let mut instrument =
             Self { gyro: Vec::new(), accel: Vec::new(), channels: ArrayVec::new(), temperatures: Vec::new() };
         for step in simulation.take(REPEATED) {
-            instrument.gyro.push(step.gyro.readings.iter().copied().collect());
-            instrument.accel.push(step.accel.iter().flat_map(|tick| tick.readings.iter().copied()).collect());
+            instrument.gyro.push(step.gyro.readings);
+            instrument.accel.push(step.accel.map(|tick| tick.readings).unwrap_or_default());
             if !step.temperatures.is_empty() {
                 instrument.channels = step.temperatures.iter().map(|reading| reading.channel).collect();
                 instrument.temperatures.push(step.temperatures.iter().map(|reading| reading.raw).collect());
@@ -64,9 +64,9 @@ impl Instrument {
         let (start_ns, tick_ns) = (START_NS.cast_signed(), plan.tick_ns().cast_signed());
         let end_time = |tick: usize| Timestamp::from_ns(start_ns + (tick as u64 + 1).cast_signed() * tick_ns);
         let (output, duration) = (OutputKind::Mean, Span::from_ns(tick_ns));
-        let means = |of: &[Sensors<f64>], tick: usize| {
+        let means = |of: &[Readings], tick: usize| {
             let place = (tick + unit * AHEAD) % of.len().max(1);
-            of.get(place).cloned().unwrap_or_default()
+            of.get(place).copied().unwrap_or_default()
         };
         let ticks = first..first + plan.batch;
         let second = ticks.clone().find(|tick| tick % plan.rate_hz as usize == 0);

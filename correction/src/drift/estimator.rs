@@ -33,11 +33,9 @@ pub struct DriftEstimator {
     settings: DriftSettings,
     waiting: Waiting,
     counters: ReferenceCounters,
-    /// End of the tick of the last [`advance`](Self::advance).
-    now: Option<Timestamp>,
-    /// Number of the grid cell in which it lies.
+    /// Number of the grid cell in which the tick of the last [`advance`](Self::advance) ends.
     grid: i64,
-    /// End of the last tick that was observed.
+    /// End of the last tick.
     observed_until: Option<Timestamp>,
     /// End of the last reference that was measured against the readings.
     used_until: Option<Timestamp>,
@@ -57,7 +55,6 @@ impl DriftEstimator {
             settings,
             waiting: if gyros.is_empty() { Waiting::default() } else { Waiting::with_room() },
             counters: ReferenceCounters::default(),
-            now: None,
             grid: 0,
             observed_until: None,
             used_until: None,
@@ -95,7 +92,7 @@ impl DriftEstimator {
     /// What is wrong with it by itself, or that too many wait. What shows only when it takes effect is counted then.
     pub fn submit(&mut self, reference: &Reference) -> Result<(), ReferenceRefusal> {
         self.submit_at_rest(reference)?;
-        if self.now.is_some_and(|now| self.effective(reference) < now) {
+        if self.observed_until.is_some_and(|until| self.effective(reference) < until) {
             self.counters.late += 1;
         }
         Ok(())
@@ -132,8 +129,7 @@ impl DriftEstimator {
     /// `restart`: sequence or time starts anew at this tick ([`TickFlags::RESTART`](crate::sample::TickFlags::RESTART)).
     /// `project` gives the rates along the input axes for a rate in case axes, as
     /// [`Orientation::forward`](crate::orientation::Orientation::forward) does at the present temperature; it is called
-    /// once per reference.
-    #[inline]
+    /// once per reference. Ticks that end up to [`rests_until`](Self::rests_until) can do without.
     pub fn advance(
         &mut self,
         end_time: Timestamp,
@@ -146,24 +142,24 @@ impl DriftEstimator {
         let grid = end_time.cell(GRID);
         if restart {
             self.restart(end_time, grid);
-        } else if grid != self.grid || self.now.is_none() {
-            self.draw(grid);
+        } else if grid != self.grid || self.observed_until.is_none() {
+            self.gyros.iter_mut().flatten().for_each(|gyro| gyro.draw(grid));
         }
         self.grid = grid;
-        self.now = Some(end_time);
-        if !self.waiting.references.is_empty() {
-            self.take_effective(end_time, project);
-        }
+        self.take_effective(end_time, project);
     }
 
-    /// Draws every gyro's line over a grid cell.
-    #[cold]
-    fn draw(&mut self, grid: i64) {
-        self.gyros.iter_mut().flatten().for_each(|gyro| gyro.draw(grid));
+    /// Up to when ticks need no [`advance`](Self::advance): while no reference waits, to the end of the grid cell.
+    #[must_use]
+    pub fn rests_until(&self) -> Option<Timestamp> {
+        if self.is_idle() {
+            return Some(Timestamp::from_ns(i64::MAX));
+        }
+        let cell_end = Timestamp::of_cell(self.grid.saturating_add(1), GRID) - Span::from_ns(1);
+        self.waiting.references.is_empty().then_some(cell_end)
     }
 
     /// Applies every reference that takes effect before the tick that ends at `end_time`.
-    #[cold]
     fn take_effective(&mut self, end_time: Timestamp, project: &dyn Fn([f64; 3]) -> Sensors<f64>) {
         let Some(observed_until) = self.observed_until else { return };
         let delay = self.settings.delay;
@@ -206,7 +202,7 @@ impl DriftEstimator {
     #[cold]
     fn restart(&mut self, end_time: Timestamp, grid: i64) {
         self.open = None;
-        let last = self.now.replace(end_time);
+        let last = self.observed_until.take();
         let goes_on = last.is_none_or(|last| last < end_time);
         for gyro in self.gyros.iter_mut().flatten() {
             gyro.ring.clear();
@@ -216,7 +212,6 @@ impl DriftEstimator {
             }
             gyro.hand_over(before, grid, end_time);
         }
-        self.observed_until = None;
         if !goes_on {
             self.used_until = None;
         }
@@ -253,20 +248,21 @@ impl DriftEstimator {
                     }
                 }
             }
-            None => self.go_on(Covered::new(start, end), start, count, residual),
+            None => self.go_on((start, end), count, residual),
         }
         self.observed_until = Some(end);
     }
 
     /// Likewise of a tick that does not lie in the open cell; the cell in which it ends is open then.
     #[cold]
+    #[inline(never)]
     fn go_on(
         &mut self,
-        covered: Covered,
-        start: Timestamp,
+        (start, end): (Timestamp, Timestamp),
         count: usize,
         residual: impl Fn(usize) -> Option<f64>,
     ) {
+        let covered = Covered::new(start, end);
         self.close_cell();
         for (lane, gyro) in self.gyros.iter_mut().enumerate().take(count) {
             let Some(gyro) = gyro else { continue };
@@ -307,7 +303,7 @@ impl DriftEstimator {
     ///
     /// The rate comes from a grid of 1 s and moves linearly in between; sigma and trend are evaluated here.
     pub fn estimates(&self) -> impl Iterator<Item = Option<DriftEstimate>> + '_ {
-        let now = self.now.unwrap_or_default();
+        let now = self.observed_until.unwrap_or_default();
         self.gyros.iter().map(move |gyro| Some(gyro.as_ref()?.estimate(self.grid, now)))
     }
 

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use super::counters::Counters;
 use super::gyro_intake::{LONGEST_KEPT, MAX_TICK_DURATION, is_possible};
-use crate::lanes::{Lanes, of_readings};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::{Span, Timestamp};
 
@@ -16,12 +15,9 @@ const MAX_PENDING: usize = 8192;
 /// A tick that waits for its gyro tick, or has met it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct PendingAccel {
-    end_time: Timestamp,
-    pub(super) duration: Span,
-    /// What its readings stand for, and how many there are.
+    pub(super) tick: AccelTick,
+    /// What its readings stand for.
     pub(super) output: OutputKind,
-    pub(super) count: usize,
-    pub(super) readings: Lanes,
     /// Messages of gyro ticks that had come before it.
     after: u64,
 }
@@ -31,18 +27,13 @@ impl PendingAccel {
     #[inline]
     pub(super) fn ends_with(&self, gyro: &GyroTick) -> bool {
         let half = Span::from_ns(gyro.duration.as_ns() / 2);
-        self.end_time < gyro.end_time + half && !self.ends_before(gyro)
+        self.tick.end_time < gyro.end_time + half && !self.ends_before(gyro)
     }
 
     /// Whether it ends earlier than that.
     #[inline]
     fn ends_before(&self, gyro: &GyroTick) -> bool {
-        self.end_time + Span::from_ns(gyro.duration.as_ns() / 2) <= gyro.end_time
-    }
-
-    /// One reading per accelerometer: counts, or mean output.
-    pub(super) fn readings(&self) -> &[f64] {
-        self.readings.get(..self.count).unwrap_or_default()
+        self.tick.end_time + Span::from_ns(gyro.duration.as_ns() / 2) <= gyro.end_time
     }
 }
 
@@ -67,10 +58,8 @@ impl AccelIntake {
             counters.bad_duration += 1;
             return;
         }
-        let &AccelTick { end_time, duration, ref readings, .. } = tick;
-        let (count, readings) = (readings.len(), of_readings(readings));
-        let pending = PendingAccel { end_time, duration, output, count, readings, after: self.gyro_messages };
-        if self.released.is_some_and(|released| end_time <= released) {
+        let pending = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
+        if self.released.is_some_and(|released| tick.end_time <= released) {
             self.note_late(pending, counters);
         } else {
             self.insert(pending, counters);
@@ -89,7 +78,7 @@ impl AccelIntake {
     /// Puts a tick in its place in time.
     #[inline]
     fn insert(&mut self, pending: PendingAccel, counters: &mut Counters) {
-        let is_newest = self.pending.back().is_none_or(|last| last.end_time < pending.end_time);
+        let is_newest = self.pending.back().is_none_or(|last| last.tick.end_time < pending.tick.end_time);
         if is_newest && self.pending.len() < MAX_PENDING {
             self.pending.push_back(pending);
         } else {
@@ -100,9 +89,9 @@ impl AccelIntake {
     /// Likewise a tick that is not the newest, or one too many.
     #[cold]
     fn insert_between(&mut self, pending: PendingAccel, counters: &mut Counters) {
-        let time = pending.end_time;
-        let place = self.pending.iter().rposition(|p| p.end_time < time).map_or(0, |i| i + 1);
-        if self.pending.get(place).is_some_and(|p| p.end_time == time) {
+        let time = pending.tick.end_time;
+        let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
+        if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
             counters.accel_duplicates += 1;
             return;
         }
@@ -165,7 +154,7 @@ impl AccelIntake {
         if self.released.take().is_none() {
             return;
         }
-        let near = |tick: &PendingAccel| {
+        let near = |PendingAccel { tick, .. }: &PendingAccel| {
             tick.end_time + MAX_TICK_DURATION > end_time && tick.end_time < end_time + MAX_TICK_DURATION
         };
         let before = self.pending.len();

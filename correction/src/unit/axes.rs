@@ -29,6 +29,8 @@ pub(super) struct Axes {
     ends: [Inverse; 2],
     /// Whether they do.
     spans: bool,
+    /// They do, and are all that there are.
+    whole: bool,
     /// There is no way from the one to the other.
     stands: bool,
     /// Sensors that the parity check has not excluded.
@@ -51,6 +53,7 @@ impl Axes {
             mask,
             ends: [inverse.unwrap_or_default(); 2],
             spans: inverse.is_some(),
+            whole: inverse.is_some(),
             stands: true,
             included: mask,
             parity: ParityCheck::new(),
@@ -120,26 +123,27 @@ impl Axes {
         readings: &[f64; N],
         time: Timestamp,
     ) -> ([f64; 3], bool) {
-        if usable != self.mask {
-            self.choose(orientation, usable, time);
-        }
-        if self.spans && self.mask == self.all {
+        if self.whole && usable == self.all {
             let [from, to] = &self.ends;
             return (from.lerp_apply(to, self.share(time), readings), true);
         }
         // A copy, so that the readings themselves need no place in memory.
         let readings = *readings;
-        self.resolve_some(orientation, &readings, time)
+        self.resolve_some(orientation, usable, &readings, time)
     }
 
-    /// Likewise from some of the sensors.
+    /// Likewise from some of the sensors, or with others than the last time.
     #[cold]
     fn resolve_some<const N: usize>(
         &mut self,
         orientation: &Orientation,
+        usable: SensorMask,
         readings: &[f64; N],
         time: Timestamp,
     ) -> ([f64; 3], bool) {
+        if usable != self.mask {
+            self.choose(orientation, usable, time);
+        }
         let trusted = self.spans;
         if !trusted {
             self.choose(orientation, self.included, time);
@@ -160,7 +164,6 @@ impl Axes {
 
     /// Goes on with other sensors: both ends anew, from where the temperature is now, so that the change of sensors is all that
     /// steps.
-    #[cold]
     fn choose(&mut self, orientation: &Orientation, mask: SensorMask, time: Timestamp) {
         self.mask = mask;
         let now = self.temperature.at(time);
@@ -180,6 +183,7 @@ impl Axes {
         let is_clear = |_: &_| orientation.is_conditioned_between(self.mask, now, target);
         let ends = from.zip(to).filter(is_clear);
         self.spans = ends.is_some();
+        self.whole = self.spans && self.mask == self.all;
         self.ends = ends.map_or_else(Default::default, |(from, to)| [from, to]);
         let [from, to] = &self.ends;
         self.stands = from == to;

@@ -16,19 +16,18 @@ use alloc::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::accel_intake::PendingAccel;
 use super::counters::Counters;
 use super::flags::Health;
 use super::gyro_intake::Break;
 use super::slew::{Slew, Slewing};
 use super::thermal_memory::{ThermalMemory, Waiting};
 use crate::calibration::Calibration;
-use crate::drift::{DriftEstimator, DriftSettings};
+use crate::drift::{DriftEstimator, DriftSettings, Reference};
 use crate::lanes::Lanes;
 use crate::observation::Observation;
 use crate::orientation::{Inverse, SensorMask};
 use crate::reversal::Substitution;
-use crate::sample::{CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, TickFlags};
+use crate::sample::{AccelTick, CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags, Sensors, TickFlags};
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
@@ -68,17 +67,23 @@ pub(super) struct Corrector {
     calm: Calm,
 }
 
-/// What a tick finds as the last one did, until a temperature reading falls due, a swap moves on or a new series begins.
+/// What a tick finds as the last one did, until a temperature reading falls due or one is too old, the drift estimator moves on, a swap
+/// does, or a new series begins.
 #[derive(Debug, Clone, Copy, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each holds, or not, without the others")]
 struct Calm {
     /// Ticks that end later look for what has changed; all do without.
     until: Option<Timestamp>,
+    /// Whether the temperatures have nothing to say of any gyro, of any accelerometer.
+    sound: [bool; 2],
     /// Whether any sensor needs more than four lanes.
     wide: bool,
     /// Whether the gyros have terms that change their sign.
     modal: bool,
     /// Whether the terms of the gyros are not what the bank gives, or a switch of the mode is given up.
     special: bool,
+    /// Whether a gyro's drift is estimated.
+    drifts: bool,
     /// What follows motion.
     follows: Follows,
 }
@@ -100,7 +105,7 @@ pub(super) struct Takeover {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Paired<'a> {
     pub(super) gyro: &'a GyroTick,
-    pub(super) accel: Option<&'a PendingAccel>,
+    pub(super) accel: Option<&'a AccelTick>,
     /// What lies between it and the last tick that was corrected.
     pub(super) before: Break,
     /// When the unit was turned on.
@@ -200,29 +205,19 @@ impl Corrector {
         if tick.before.restart || self.calm.until.is_none_or(|until| time > until) {
             self.renew(calibration, tick, (waiting, delay), counters);
         }
-        if !self.drift.is_idle() {
-            self.advance_drift(calibration, time, tick.before.restart);
-        }
         // Four lanes fill two registers of every x86-64, and suffice for most units.
         if self.calm.wide {
             self.correct_lanes::<MAX_SENSORS>(calibration, tick, counters, out);
         } else {
             self.correct_lanes::<4>(calibration, tick, counters, out);
         }
-        if !self.drift.is_idle() {
+        if self.calm.drifts {
             self.drift.observe(&self.seen);
         }
     }
 
-    /// Has the drift estimator go on to a tick.
-    #[inline(never)]
-    fn advance_drift(&mut self, calibration: &Calibration, time: Timestamp, restart: bool) {
-        self.drift.advance(time, restart, &|rate| {
-            calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
-        });
-    }
-
-    /// Does before a tick what few need: a new series begins, temperature readings take effect, a swap is on its way.
+    /// Does before a tick what few need: a new series begins, temperature readings or rate references take effect, a swap is on its
+    /// way.
     #[cold]
     fn renew(
         &mut self,
@@ -241,6 +236,9 @@ impl Corrector {
         if waiting.is_due(time, delay) {
             self.thermal.advance(calibration, waiting, delay, time, counters);
         }
+        self.drift.advance(time, tick.before.restart, &|rate| {
+            calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)
+        });
         self.seen.gyros.temperature_deg_c = self.thermal.gyro_footing.temperature_deg_c;
         self.slew_share = self.slew.as_ref().map_or(0.0, |slew| slew.share(time));
         if self.slew_share <= 0.0 {
@@ -249,15 +247,25 @@ impl Corrector {
         if !self.drift.subtracts() {
             self.seen.gyros.drift = [0.0; MAX_SENSORS];
         }
+        let sound = [&self.thermal.gyro_footing, &self.thermal.accel_footing].map(|it| it.sound_from(time));
+        let due = sound.into_iter().flatten().fold(waiting.due_after(delay), Timestamp::min);
         let slews = self.slew.is_some();
         let given_up = calibration.reversal.is_none() && !self.substitution.is_settled();
         self.calm = Calm {
-            until: Some(waiting.due_after(delay)).filter(|_| !slews),
+            until: self.drift.rests_until().map(|rests| rests.min(due)).filter(|_| !slews),
+            sound: sound.map(|until| until.is_some()),
+            drifts: !self.drift.is_idle(),
             wide: calibration.gyros.len().max(calibration.accels.len()) > 4,
             modal: slews || self.thermal.gyros.has_any([2, 3]),
             special: slews || given_up || calibration.trends.is_some() || self.drift.subtracts(),
             follows: self.follow_motion(calibration),
         };
+    }
+
+    /// Takes a reference for the drift estimator; `at_rest`: one that the unit made itself. What is refused is counted.
+    pub(super) fn refer(&mut self, reference: &Reference, at_rest: bool) {
+        let _ = if at_rest { self.drift.submit_at_rest(reference) } else { self.drift.submit(reference) };
+        self.disturb();
     }
 
     /// Has the next tick look for what has changed.
@@ -312,6 +320,14 @@ impl Corrector {
         }
     }
 
+    /// A sensor was excluded: the flags of the next ticks say so.
+    #[cold]
+    fn exclude(&mut self, calibration: &Calibration, counters: &mut Counters) {
+        counters.sensors_excluded += 1;
+        self.thermal.note_footing(calibration);
+        self.disturb();
+    }
+
     /// The swap that is on its way at the present tick.
     fn slewing(&self) -> Option<Slewing<'_>> {
         let slew = self.slew.as_deref().filter(|_| self.slew_share > 0.0);
@@ -344,7 +360,7 @@ fn of_sensors(flags: [SensorFlags; MAX_SENSORS], sensors: usize) -> Sensors<Sens
 }
 
 /// The first three raw readings as they are, unscaled and flagged.
-pub(super) fn pass_through(tick: &GyroTick, accel: Option<&PendingAccel>) -> CorrectedTick {
+pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> CorrectedTick {
     let first_three = |readings: &[f64]| {
         core::array::from_fn(|i| readings.get(i).copied().filter(|r| r.is_finite()).unwrap_or(0.0))
     };
@@ -354,14 +370,17 @@ pub(super) fn pass_through(tick: &GyroTick, accel: Option<&PendingAccel>) -> Cor
         duration: tick.duration,
         ticks: 1,
         delta_angle: first_three(&tick.readings),
-        delta_velocity: accel.map_or([0.0; 3], |accel| first_three(accel.readings())),
+        delta_velocity: accel.map_or([0.0; 3], |accel| first_three(&accel.readings)),
         mode: tick.mode,
         flags: TickFlags::UNCALIBRATED
             | TickFlags::ANGLE_INVALID
             | TickFlags::VELOCITY_INVALID
             | if accel.is_none() { TickFlags::ACCELEROMETER_MISSING } else { TickFlags::empty() },
         gyro_flags: of_sensors([SensorFlags::empty(); MAX_SENSORS], tick.readings.len()),
-        accel_flags: of_sensors([SensorFlags::empty(); MAX_SENSORS], accel.map_or(0, |accel| accel.count)),
+        accel_flags: of_sensors(
+            [SensorFlags::empty(); MAX_SENSORS],
+            accel.map_or(0, |accel| accel.readings.len()),
+        ),
         ..CorrectedTick::default()
     }
 }

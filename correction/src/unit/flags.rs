@@ -25,10 +25,9 @@ pub(super) struct Footing {
 }
 
 impl Footing {
-    /// Whether there is nothing to say of any sensor in a tick that ends at `time`.
-    #[inline]
-    pub(super) fn is_sound(&self, time: Timestamp) -> bool {
-        self.sound_until.is_some_and(|until| time <= until)
+    /// Up to when there is nothing to say of any sensor, as there is not at `time`; `None` where there is something already.
+    pub(super) fn sound_from(&self, time: Timestamp) -> Option<Timestamp> {
+        self.sound_until.filter(|until| time <= *until)
     }
 
     /// Enters one sensor, by the temperature that it follows (°C) and up to when that is fresh.
@@ -135,30 +134,22 @@ pub struct SensorHealth {
 /// Accounts of all sensors of a kind.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Health {
-    /// All but the flags and the ticks, which stand below: in most ticks nothing else is to be written down.
+    /// All but ticks, which stand below, and flags, which are those of the last tick: mostly there is nothing else to write down.
     accounts: Sensors<SensorHealth>,
-    flags: [SensorFlags; MAX_SENSORS],
-    ticks: u64,
+    /// Ticks seen.
+    pub(super) ticks: u64,
 }
 
 impl Health {
     /// Of so many sensors that have not been seen.
     pub(super) fn new(sensors: usize) -> Self {
         let accounts = core::iter::repeat_n(SensorHealth::default(), sensors).collect();
-        Self { accounts, ..Self::default() }
+        Self { accounts, ticks: 0 }
     }
 
-    /// Enters a tick in which every sensor was valid and nothing else.
-    #[inline]
-    pub(super) fn note_sound(&mut self) {
-        self.flags = [SensorFlags::VALID; MAX_SENSORS];
-        self.ticks += 1;
-    }
-
-    /// Enters the flags of one tick.
+    /// Enters the flags of a tick in which not every sensor was valid and nothing else.
+    #[cold]
     pub(super) fn note(&mut self, flags: [SensorFlags; MAX_SENSORS]) {
-        self.flags = flags;
-        self.ticks += 1;
         for (account, flags) in self.accounts.iter_mut().zip(flags) {
             account.invalid += u64::from(!flags.contains(SensorFlags::VALID));
             account.overrange += u64::from(flags.contains(SensorFlags::OVERRANGE));
@@ -170,9 +161,9 @@ impl Health {
         }
     }
 
-    /// Sensor by sensor.
-    pub(super) fn accounts(&self) -> Sensors<SensorHealth> {
-        let accounts = self.accounts.iter().zip(self.flags);
+    /// Sensor by sensor, with the flags of the last tick.
+    pub(super) fn with(&self, flags: &[SensorFlags; MAX_SENSORS]) -> Sensors<SensorHealth> {
+        let accounts = self.accounts.iter().zip(*flags);
         accounts.map(|(account, flags)| SensorHealth { flags, ticks: self.ticks, ..*account }).collect()
     }
 }

@@ -29,7 +29,7 @@ pub enum PreLaunchView<'a> {
 /// State of one unit and what belongs to it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Operating {
-    state: State,
+    pub(super) state: State,
     /// Whether somebody chose it; until then it follows the calibration.
     chosen: bool,
     self_test: Option<Box<SelfTest>>,
@@ -51,10 +51,6 @@ impl Operating {
             aborted: false,
             rest: None,
         }
-    }
-
-    pub(super) fn state(&self) -> State {
-        self.state
     }
 
     /// The last self-test that ended.

@@ -173,7 +173,7 @@ impl Pipeline {
 
     /// Whether an accelerometer tick fits the calibration in force.
     pub(super) fn fits_accel(&mut self, accel: &PendingAccel) -> bool {
-        self.fits(false, accel.output, accel.count, |c| (c.accel_output(), c.accel_count()))
+        self.fits(false, accel.output, accel.tick.readings.len(), |c| (c.accel_output(), c.accel_count()))
     }
 
     /// Whether a gyro tick cannot go without its accelerometers. Whether a unit without calibration has any is not known: it
@@ -216,7 +216,7 @@ impl Pipeline {
         let mut accels = run.accels.iter();
         for tick in run.ticks {
             self.last_end = tick.end_time;
-            let accel = accels.next();
+            let accel = accels.next().map(|accel| &accel.tick);
             match &mut self.active {
                 Some(active) if fits => {
                     let tick = Paired { gyro: tick, accel, before: unseen, turn_on };
@@ -236,7 +236,7 @@ impl Pipeline {
                 Some(_) => {}
                 None => self.corrected = pass_through(tick, accel),
             }
-            let is_running = self.operating.state().is_running() && !held;
+            let is_running = self.operating.state.is_running() && !held;
             if !is_running || !(fits || uncalibrated) {
                 untold = untold.and_a_tick();
                 if uncalibrated || !fits {
@@ -280,7 +280,6 @@ fn watch(operating: &mut Operating, active: &mut Active, time: Timestamp) {
     let in_force = (&*active.calibration, active.revision);
     let reference = operating.observe(&active.corrector.seen, in_force, &temperature);
     if let Some(reference) = reference {
-        // What is refused is counted.
-        let _ = active.corrector.drift.submit_at_rest(&reference);
+        active.corrector.refer(&reference, true);
     }
 }

@@ -62,6 +62,12 @@ impl Unit {
         self.pipeline.active.as_ref().map_or(0, |active| active.corrector.thermal().changes)
     }
 
+    /// Revision of the navigation step that is being summed.
+    #[must_use]
+    pub fn summing(&self) -> Option<u64> {
+        self.pipeline.steps.revision()
+    }
+
     /// Whether ticks wait for their accelerometer tick, a missing neighbour, or the end of a navigation step.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
@@ -89,7 +95,7 @@ impl Unit {
     /// What the unit is doing.
     #[must_use]
     pub fn state(&self) -> State {
-        self.pipeline.operating.state()
+        self.pipeline.operating.state
     }
 
     /// The last tick that was corrected, taken apart; `None` before the first one under a calibration.
@@ -102,13 +108,15 @@ impl Unit {
     /// Account of each gyro, in the order of the calibration; empty without one.
     #[must_use]
     pub fn gyro_health(&self) -> Sensors<SensorHealth> {
-        self.pipeline.active.iter().flat_map(|active| active.corrector.gyro_health.accounts()).collect()
+        let corrector = self.pipeline.active.as_ref().map(|active| &active.corrector);
+        corrector.map(|it| it.gyro_health.with(&it.seen.gyros.flags)).unwrap_or_default()
     }
 
     /// Account of each accelerometer, likewise.
     #[must_use]
     pub fn accel_health(&self) -> Sensors<SensorHealth> {
-        self.pipeline.active.iter().flat_map(|active| active.corrector.accel_health.accounts()).collect()
+        let corrector = self.pipeline.active.as_ref().map(|active| &active.corrector);
+        corrector.map(|it| it.accel_health.with(&it.seen.accels.flags)).unwrap_or_default()
     }
 
     /// What is presently subtracted from the readings, in case axes; `None` before the first corrected tick.

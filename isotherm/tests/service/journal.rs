@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use isotherm_bus::{SessionOptions, close, locators, open, presence};
 use isotherm_correction::sample::{
-    AccelTick, ChannelName, GyroTick, LasingMode, OutputKind, Sensors, TemperatureReading,
+    AccelTick, ChannelName, GyroTick, LasingMode, OutputKind, Readings, TemperatureReading,
 };
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::{Span, Timestamp};
@@ -111,7 +111,7 @@ fn end_ns(sequence: u64) -> i64 {
 fn messages(sequence: u64, last: bool) -> Vec<(Input, Vec<u8>)> {
     let (end_time, duration) = (Timestamp::from_ns(end_ns(sequence)), Span::from_ns(TICK_NS));
     let wobble = f64::from(u32::try_from(sequence * 7 % 11).unwrap());
-    let readings: Sensors<f64> = [wobble, 2.0, -wobble, 1.0].into_iter().collect();
+    let readings: Readings = [wobble, 2.0, -wobble, 1.0].into_iter().collect();
     let mut messages = Vec::new();
     if sequence.is_multiple_of(20) {
         let time = Timestamp::from_ns(end_ns(sequence) - TICK_NS);
@@ -222,7 +222,7 @@ fn correct(mut stream: UnitStream, log: &Log, after: u64) -> (UnitStream, Vec<Co
     let mut batches = Vec::new();
     let mut give = |stream: &mut UnitStream| {
         let mut frame = Vec::new();
-        while stream.next_frame(&mut frame) {
+        while stream.next_frame(&mut frame).is_some() {
             batches.push(decode(&frame).unwrap());
         }
     };

@@ -238,12 +238,12 @@ impl Taker {
                 stream.drop_ready();
             }
             Form::Wire => {
-                while stream.next_frame(&mut self.frame) {
+                while stream.next_frame(&mut self.frame).is_some() {
                     let _ = write_frame(&mut self.output.bytes, &self.frame);
                 }
             }
             Form::Messages => {
-                while stream.next_frame(&mut self.frame) {
+                while stream.next_frame(&mut self.frame).is_some() {
                     let topic = Topic::Corrected(self.id.clone());
                     let message = Message { topic, received_ns: self.received_ns, frame: self.frame.clone() };
                     self.output.messages.push(message);

@@ -183,7 +183,7 @@ impl Plot {
     ) {
         let unit = unit.or_else(|| self.units.keys().next()).cloned().unwrap_or_else(|| stream.id().clone());
         let mut frame = Vec::new();
-        while stream.next_frame(&mut frame) {
+        while stream.next_frame(&mut frame).is_some() {
             let topic = Topic::Corrected(unit.clone());
             self.show(log, &Message { topic, received_ns, frame: std::mem::take(&mut frame) });
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{ChannelName, OutputKind, Sensors};
+use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::GyroBatch;
@@ -27,7 +27,7 @@ pub struct Shape {
 impl Shape {
     /// Of readings, with half-period counts or without.
     #[must_use]
-    pub fn of(output: OutputKind, readings: &Sensors<f64>, half_periods: bool) -> Self {
+    pub fn of(output: OutputKind, readings: &[f64], half_periods: bool) -> Self {
         Self { counts: output == OutputKind::Counts, sensors: readings.len(), half_periods }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, Sensors, TemperatureReading};
+use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
 use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_correction::units::{Span, Timestamp};
 
@@ -226,7 +226,7 @@ impl Part {
         *duration = Span::from_ns(until(self.number + 1).as_ns() - until(self.number).as_ns());
     }
 
-    fn share(self, output: OutputKind, readings: &mut Sensors<f64>) {
+    fn share(self, output: OutputKind, readings: &mut [f64]) {
         if output == OutputKind::Counts {
             readings.iter_mut().for_each(|reading| *reading /= f64::from(self.parts));
         }

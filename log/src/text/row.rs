@@ -1,6 +1,6 @@
 //! The current row of a file: its cells as numbers, times and states.
 
-use isotherm_correction::sample::{HalfPeriodCounts, LasingMode, OutputKind, Sensors};
+use isotherm_correction::sample::{self, HalfPeriodCounts, LasingMode, OutputKind, Sensors};
 use isotherm_correction::units::Span;
 
 use super::cells::Cell;
@@ -33,7 +33,7 @@ pub(super) struct Row<'a> {
 #[derive(Debug)]
 pub(super) struct Readings {
     /// One per sensor; increments are not yet divided by the duration.
-    pub(super) values: Sensors<f64>,
+    pub(super) values: sample::Readings,
     /// Sequence number that the row states.
     pub(super) sequence: Option<u64>,
     /// Duration that the row states.
@@ -144,7 +144,7 @@ impl<'a> Row<'a> {
         if cells.may_be_empty && self.all_empty(cells)? {
             return Ok(None);
         }
-        let mut values = Sensors::new();
+        let mut values = sample::Readings::default();
         for (cell, conversion) in &cells.sensors {
             values.push(match cells.output {
                 OutputKind::Counts => f64::from(self.count(*cell)?) * conversion.factor,

@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use isotherm_correction::sample::{ChannelName, TemperatureReading};
 use isotherm_correction::units::Timestamp;
 
-use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, append, append_text};
+use crate::codec::{self, Body, CodecError, Kind, MAX_TICKS, Message, Tail, append, append_text};
 use crate::version::{self, Versions};
 
 /// Most temperature channels in one batch.
@@ -98,7 +98,8 @@ pub fn read_temperatures(frame: &[u8], readings: &mut Vec<TemperatureReading>) -
 }
 
 fn read_body(bytes: &[u8], readings: &mut Vec<TemperatureReading>) -> Result<(), CodecError> {
-    let mut body = Body::new(bytes);
+    let mut tail = Tail::default();
+    let mut body = Body::new(bytes, &mut tail);
     let (count, mixed) = read_all(&mut body, readings).ok_or(CodecError::Malformed)?;
     body.ends()?;
     match mixed {

@@ -81,7 +81,7 @@ fn gyros((first, series, Ticks(plain)): PlainGyros) -> Result<GyroBatch, CodecEr
         sequence: first.saturating_add(index),
         end_time: Timestamp::from_ns(end_ns),
         duration: span(duration_ns),
-        readings: readings.values(),
+        readings: readings.values().into(),
         mode,
         switch_command,
         meander,
@@ -100,7 +100,7 @@ fn accels((first, Ticks(plain)): PlainAccels) -> Result<AccelBatch, CodecError> 
         sequence: first.saturating_add(index),
         end_time: Timestamp::from_ns(end_ns),
         duration: span(duration_ns),
-        readings: readings.values(),
+        readings: readings.values().into(),
     };
     Ok(AccelBatch { output, ticks: (0..).zip(plain).map(tick).collect() })
 }

@@ -380,7 +380,7 @@ impl Made {
         let Some(stream) = &mut self.stream else { return };
         loop {
             let mut frame = Vec::new();
-            if !stream.next_frame(&mut frame) {
+            if stream.next_frame(&mut frame).is_none() {
                 break;
             }
             self.frames.push(frame);

@@ -189,6 +189,8 @@ impl UnitStream {
             return Err(JournalError::OtherUnit { got, need });
         }
         let mut outgoing = std::mem::take(&mut self.outgoing);
+        // The remembered unit counts changes of its temperatures anew.
+        outgoing.forget_head();
         remembered.outgoing.take().0.iter().for_each(|tick| outgoing.push(tick));
         *self = Self { outgoing, ..remembered };
         Ok(())

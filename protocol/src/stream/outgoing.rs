@@ -21,9 +21,11 @@ pub struct Outgoing {
     open: Frame,
     /// Length of the last frame in bytes: the next one is likely to be as long.
     length: usize,
-    /// What stood before its ticks: so will the next one begin, mostly until a temperature was read.
+    /// What stood before its ticks, and what that follows from: so will the next one begin, mostly until a temperature was read.
     head: Vec<u8>,
     head_of: Option<HeadKey>,
+    /// How many heads there were before this one.
+    heads: u64,
     /// Ticks are kept as they are, and written when a frame is asked for.
     as_ticks: bool,
     ticks: Vec<CorrectedTick>,
@@ -41,9 +43,10 @@ const MAX_RUNS: usize = 512;
 /// A frame whose ticks are written and whose head is not.
 #[derive(Debug, Default, Clone)]
 struct Frame {
-    /// Room for the head, then the ticks.
+    /// A head, likely the one that will be right, then the ticks.
     bytes: Vec<u8>,
-    /// Length of that room in bytes.
+    /// Number of that head, and its length in bytes.
+    head: u64,
     room: usize,
     count: usize,
     last: Last,
@@ -116,7 +119,7 @@ impl Outgoing {
             self.open.sigmas.clear();
             self.open.bytes.reserve(self.length + self.length / 8 + WINDOW);
             self.open.bytes.extend_from_slice(&self.head);
-            self.open.room = self.head.len();
+            (self.open.head, self.open.room) = (self.heads, self.head.len());
         }
         append_tick(&mut self.open.bytes, tick);
         self.open.count += 1;
@@ -136,13 +139,14 @@ impl Outgoing {
     }
 
     /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
-    /// last tick. `write_head` appends the head of a frame of so many ticks of a revision; `temperatures` says in which state they are.
+    /// last tick, and how many there are. `write_head` appends the head of a frame of so many ticks of a revision;
+    /// `temperatures` says in which state they are.
     pub(super) fn next_frame(
         &mut self,
         into: &mut Vec<u8>,
         temperatures: u64,
         write_head: impl FnOnce(&mut Vec<u8>, u64, usize),
-    ) -> Option<Last> {
+    ) -> Option<(Last, usize)> {
         if !self.ticks.is_empty() {
             let mut ticks = std::mem::take(&mut self.ticks);
             ticks.drain(..).for_each(|tick| self.write(&tick));
@@ -156,26 +160,25 @@ impl Outgoing {
         let key = HeadKey { version, revision: frame.last.revision, temperatures, ticks: frame.count };
         if self.head_of != Some(key) {
             self.head_of = Some(key);
+            self.heads += 1;
             self.head.clear();
             begin::<CorrectedBatch>(&mut self.head, version);
             write_head(&mut self.head, frame.last.revision, frame.count);
         }
-        match frame.bytes.get_mut(..frame.room) {
-            Some(room) if room.len() == self.head.len() => room.copy_from_slice(&self.head),
-            _ => drop(frame.bytes.splice(..frame.room, self.head.iter().copied())),
+        if frame.head != self.heads {
+            frame.bytes.splice(..frame.room, self.head.iter().copied());
         }
         append_sigmas(&mut frame.bytes, &frame.sigmas);
         seal(&mut frame.bytes);
         self.length = frame.bytes.len();
         std::mem::swap(into, &mut frame.bytes);
-        frame.count = 0;
-        let last = frame.last;
+        let done = (frame.last, std::mem::take(&mut frame.count));
         if let Some(frame) = self.full.pop_front()
             && self.open.count == 0
         {
             self.open.bytes = frame.bytes;
         }
-        Some(last)
+        Some(done)
     }
 
     /// Forgets the head of the last frame: a revision's counter may mean another one.

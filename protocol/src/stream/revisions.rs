@@ -31,8 +31,8 @@ pub(super) struct Given {
     pub(super) label: Label,
     /// Time over which the change to it is made.
     pub(super) slew: Span,
-    /// Ticks may be waiting that it has made.
-    made_ticks: bool,
+    /// It has made outputs, which may not have been taken yet.
+    made_outputs: bool,
 }
 
 /// The revision in force, one that waits for its tick, and those whose ticks have not been taken yet.
@@ -44,16 +44,13 @@ pub(super) struct Revisions {
     highest: u64,
     /// Counter of the last output that was released.
     released: u64,
-    /// That of the last one known to have made ticks: no memory, only a shorter way.
-    #[serde(skip)]
-    made_ticks: Option<u64>,
     in_force: VecDeque<InForce>,
 }
 
 impl Revisions {
     /// None yet; counters go on behind `highest`.
     pub(super) fn new(highest: u64) -> Self {
-        Self { given: VecDeque::new(), highest, released: 0, made_ticks: None, in_force: VecDeque::new() }
+        Self { given: VecDeque::new(), highest, released: 0, in_force: VecDeque::new() }
     }
 
     /// Counter of the next one.
@@ -64,10 +61,10 @@ impl Revisions {
     /// Enters one.
     pub(super) fn give(&mut self, revision: Revision, label: Label, slew: Span) {
         self.highest = self.highest.max(revision.counter);
+        let made_outputs = self.find(revision.counter).is_some_and(|given| given.made_outputs);
         // Mostly the only one.
         self.given.reserve_exact(1);
-        self.given.push_back(Given { revision, label, slew, made_ticks: false });
-        self.made_ticks = None;
+        self.given.push_back(Given { revision, label, slew, made_outputs });
     }
 
     /// That of a counter; the latest where a counter was given twice.
@@ -80,23 +77,18 @@ impl Revisions {
         self.find(counter).map_or(Revision { counter, ..Revision::default() }, |given| given.revision)
     }
 
-    /// Ticks were corrected while this counter was in force.
-    pub(super) fn made_ticks(&mut self, counter: u64) {
-        if self.made_ticks == Some(counter) {
-            return;
-        }
-        self.made_ticks = Some(counter);
-        if let Some(given) = self.given.iter_mut().rfind(|given| given.revision.counter == counter) {
-            given.made_ticks = true;
-        }
+    /// Whether an output of this counter is the first of its revision.
+    pub(super) fn is_new(&self, counter: u64) -> bool {
+        self.released != counter
     }
 
-    /// An output was released; notes it where it is the first of its revision.
+    /// Notes the first output of a revision.
+    #[cold]
     pub(super) fn released(&mut self, counter: u64, first: impl FnOnce(Revision) -> InForce) {
-        if self.released == counter {
-            return;
-        }
         self.released = counter;
+        if let Some(given) = self.given.iter_mut().rfind(|given| given.revision.counter == counter) {
+            given.made_outputs = true;
+        }
         if self.in_force.len() == MAX_IN_FORCE {
             self.in_force.pop_front();
         }
@@ -118,12 +110,9 @@ impl Revisions {
         }
     }
 
-    /// Drops those that neither are in force, nor wait, nor have made ticks: they were replaced before their time.
-    pub(super) fn drop_replaced(&mut self, in_force: Option<u64>, pending: Option<u64>) {
-        self.given.retain(|given| {
-            let counter = Some(given.revision.counter);
-            given.made_ticks || counter == in_force || counter == pending
-        });
+    /// Drops those that have made no output and are not `needed`, by counter: they were replaced before their time.
+    pub(super) fn drop_replaced(&mut self, needed: [Option<u64>; 3]) {
+        self.given.retain(|given| given.made_outputs || needed.contains(&Some(given.revision.counter)));
     }
 
     #[cfg(test)]

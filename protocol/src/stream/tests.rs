@@ -1,7 +1,7 @@
 use isotherm_correction::earth::Place as Site;
 use isotherm_correction::operation::Command;
 use isotherm_correction::prelaunch::PreLaunchSettings;
-use isotherm_correction::sample::{ChannelName, LasingMode, Sensors};
+use isotherm_correction::sample::{ChannelName, LasingMode, Readings};
 use isotherm_correction::units::Timestamp;
 
 use super::status::reason;
@@ -38,7 +38,7 @@ fn tick(stream: &mut UnitStream, series: u64, sequence: u64) {
     let (calibration, _) = full();
     // A reading that stands still is that of a dead sensor.
     let wobble = if sequence.is_multiple_of(2) { 1.0 } else { 2.0 };
-    let readings = |count: usize| -> Sensors<f64> { (0..count).map(|_| wobble).collect() };
+    let readings = |count: usize| -> Readings { (0..count).map(|_| wobble).collect() };
     if sequence.is_multiple_of(200) {
         let channels = ["block", "coil", "accel", "board"].map(|name| ChannelName::from(name).unwrap());
         let time = Timestamp::from_ns(end(sequence).as_ns() - TICK_NS);
@@ -77,7 +77,7 @@ fn ticks(stream: &mut UnitStream, sequences: std::ops::Range<u64>) {
 fn batches(stream: &mut UnitStream) -> Vec<CorrectedBatch> {
     let mut frame = Vec::new();
     let mut batches = Vec::new();
-    while stream.next_frame(&mut frame) {
+    while stream.next_frame(&mut frame).is_some() {
         batches.push(codec::decode(&frame).unwrap());
     }
     batches

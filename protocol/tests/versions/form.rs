@@ -163,7 +163,7 @@ impl Form for GyroBatch {
             sequence: self.first_sequence.saturating_add(index),
             end_time: Timestamp::from_ns(tick.end_time_ns),
             duration: span(tick.duration_ns),
-            readings: tick.readings.values(),
+            readings: tick.readings.values().into(),
             mode: tick.mode,
             switch_command: tick.switch_command,
             meander: tick.meander,
@@ -191,7 +191,7 @@ impl Form for AccelBatch {
             sequence: self.first_sequence.saturating_add(index),
             end_time: Timestamp::from_ns(tick.end_time_ns),
             duration: span(tick.duration_ns),
-            readings: tick.readings.values(),
+            readings: tick.readings.values().into(),
         };
         let output = self.ticks[0].readings.output();
         raw::AccelBatch { output, ticks: self.ticks.iter().zip(0..).map(tick).collect() }

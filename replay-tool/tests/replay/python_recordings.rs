@@ -96,7 +96,7 @@ fn record(folder: &std::path::Path, unit: &str, writer: &mut RecordingWriter) {
     let mut frame = Vec::new();
     let publish =
         |stream: &mut UnitStream, received_ns, writer: &mut RecordingWriter, frame: &mut Vec<u8>| {
-            while stream.next_frame(frame) {
+            while stream.next_frame(frame).is_some() {
                 let topic = Topic::of(&key::corrected(&unit));
                 writer.write(&Message { topic, received_ns, frame: frame.clone() }).unwrap();
             }

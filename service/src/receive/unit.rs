@@ -235,22 +235,14 @@ impl UnitActor {
 
     /// Publishes every corrected tick that is ready; whether there was one.
     fn publish(&mut self) -> bool {
-        let mut published = false;
-        while let ready @ 1.. = self.stream.ready().len() {
-            // The one that the stream has written into goes away: nothing is given back for it.
-            let mut frame = Vec::new();
-            let encoded = self.stream.next_frame(&mut frame);
-            let taken = (ready - self.stream.ready().len()) as u64;
-            let sent = if encoded { self.let_out(frame) } else { Err("cannot be encoded".into()) };
-            match sent {
+        let (mut published, mut frame) = (false, Vec::new());
+        while let Some(ticks) = self.stream.next_frame(&mut frame) {
+            // It goes away: nothing is given back for it.
+            match self.let_out(std::mem::take(&mut frame)) {
                 Ok(()) => published = true,
-                Err(error) => self.fault(FaultKind::Unpublished, taken, || {
+                Err(error) => self.fault(FaultKind::Unpublished, ticks as u64, || {
                     format!("corrected: {}", isotherm_bus::words(&error))
                 }),
-            }
-            if taken == 0 {
-                // Not to be reached: the stream says that ticks are ready and gives none. Rather lose them than loop.
-                self.reset("the stream holds ticks back");
             }
         }
         published

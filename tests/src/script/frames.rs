@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use isotherm_correction::sample::{
-    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+    AccelTick, ChannelName, GyroTick, OutputKind, Readings, Sensors, TemperatureReading,
 };
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec::encode;
@@ -64,7 +64,7 @@ impl Script {
     /// Where there are too many sensors.
     pub fn foreign(&mut self, output: OutputKind, sensors: usize) {
         let (accel, gyro) = self.next_tick();
-        let readings: Sensors<f64> = std::iter::repeat_n(3.0, sensors).collect();
+        let readings: Readings = std::iter::repeat_n(3.0, sensors).collect();
         let half_periods = Sensors::new();
         self.steps.push(accel_frame(output, &[AccelTick { readings: readings.clone(), ..accel }]));
         self.steps.push(gyro_frame(output, &[GyroTick { readings, half_periods, ..gyro }]));

@@ -3,7 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, HalfPeriodCounts, LasingMode, OutputKind, Sensors};
+use isotherm_correction::sample::{
+    AccelTick, GyroTick, HalfPeriodCounts, LasingMode, OutputKind, Readings, Sensors,
+};
 use isotherm_correction::units::Timestamp;
 
 use super::Script;
@@ -80,10 +82,10 @@ impl Script {
         }
     }
 
-    fn gyro_readings(&mut self, sequence: u64) -> Sensors<f64> {
+    fn gyro_readings(&mut self, sequence: u64) -> Readings {
         let calibration = Arc::clone(&self.calibration);
         let output = calibration.gyro_output();
-        let mut readings: Sensors<f64> = (0..calibration.gyro_count())
+        let mut readings: Readings = (0..calibration.gyro_count())
             .map(|sensor| self.reading(output, self.swing_of(sequence, sensor)))
             .collect();
         if let Some((gyro, from)) = self.fails
@@ -95,7 +97,7 @@ impl Script {
         readings
     }
 
-    fn accel_readings(&mut self, sequence: u64) -> Sensors<f64> {
+    fn accel_readings(&mut self, sequence: u64) -> Readings {
         let calibration = Arc::clone(&self.calibration);
         let output = calibration.accel_output();
         let readings = (0..calibration.accel_count()).map(|sensor| {
@@ -105,7 +107,7 @@ impl Script {
             let mean = if output == OutputKind::Counts { mean * 5e-3 } else { mean };
             self.reading(output, mean)
         });
-        let mut readings = readings.collect();
+        let mut readings = readings.collect::<Readings>();
         self.make_odd(Kind::Accel, sequence, &mut readings);
         readings
     }
@@ -128,7 +130,7 @@ impl Script {
         self.swing * (2.0 * share - 1.0)
     }
 
-    fn make_odd(&self, kind: Kind, sequence: u64, readings: &mut Sensors<f64>) {
+    fn make_odd(&self, kind: Kind, sequence: u64, readings: &mut Readings) {
         let odd = self.odd.iter().filter(|odd| odd.kind == kind && odd.ticks.contains(&sequence));
         for Odd { sensor, value, .. } in odd {
             let which = readings.iter_mut().enumerate();

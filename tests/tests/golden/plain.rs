@@ -173,7 +173,7 @@ pub(crate) fn frames() -> Vec<Vec<u8>> {
     let (mut frames, mut frame) = (Vec::new(), Vec::new());
     for step in &scenario.steps {
         crate::recording::give(&mut stream, step);
-        while stream.next_frame(&mut frame) {
+        while stream.next_frame(&mut frame).is_some() {
             frames.push(frame.clone());
         }
     }

@@ -110,7 +110,7 @@ pub(crate) fn give(stream: &mut UnitStream, step: &Step) -> Option<String> {
 /// Takes everything out; whether there was the first output of a revision.
 fn take_out(stream: &mut UnitStream, recording: &mut Recording) -> bool {
     let (mut frame, mut first) = (Vec::new(), false);
-    while stream.next_frame(&mut frame) {
+    while stream.next_frame(&mut frame).is_some() {
         recording.frame(&frame);
     }
     while let Some(InForce { revision, series, sequence, end_time_ns }) = stream.take_in_force() {

@@ -36,13 +36,13 @@ fn run(scenario: &Scenario, mut cut: impl FnMut(usize, &UnitStream) -> bool) -> 
         }
         let mut frame = Vec::new();
         // Some outputs wait in the stream over the next cut.
-        while !index.is_multiple_of(3) && stream.next_frame(&mut frame) {
+        while !index.is_multiple_of(3) && stream.next_frame(&mut frame).is_some() {
             frames.push(frame.clone());
         }
         in_force.extend(std::iter::from_fn(|| stream.take_in_force()));
     }
     let mut frame = Vec::new();
-    while stream.next_frame(&mut frame) {
+    while stream.next_frame(&mut frame).is_some() {
         frames.push(frame.clone());
     }
     Given { frames, in_force, memory: stream.memory() }

@@ -84,16 +84,16 @@ impl Corrector {
         // The corrected tick has the gyro tick's time.
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
         let terms = self.accel_terms::<N>(shares);
-        let readings = narrow::<N>(&raw.readings);
+        let readings = raw.readings.lanes::<N>();
         let output = calibration.accel_output;
         let mut forces = sensed(&terms, output, *readings, duration_s);
 
         let mut usable = axes.included();
         let within = within(readings, narrow(&calibration.accel_limits));
         let mut flags = SOUND;
-        if self.thermal.accel_footing.is_sound(time) & within {
+        self.accel_health.ticks += 1;
+        if self.calm.sound[1] & within {
             put(&mut self.last_forces, forces);
-            self.accel_health.note_sound();
         } else {
             let (mut patched, mut counted) = (*readings, usable);
             let patch = (&mut patched, &calibration.accel_limits, count);
@@ -164,8 +164,7 @@ impl Corrector {
         }
         self.seen.specific_force = trusted.then_some(force);
         if excluded {
-            counters.sensors_excluded += 1;
-            self.thermal.note_footing(calibration);
+            self.exclude(calibration, counters);
         }
     }
 }

@@ -4,7 +4,7 @@ use core::array;
 
 use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
-use crate::lanes::{narrow, of_readings, put};
+use crate::lanes::{narrow, put};
 use crate::orientation::SensorMask;
 use crate::reversal::{Reversal, Substitution, TickInput};
 use crate::sample::{
@@ -70,7 +70,7 @@ impl Corrector {
             let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
             bias = array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
         }
-        let readings: [f64; N] = of_readings(&raw.readings);
+        let readings: [f64; N] = *raw.readings.lanes();
         let scale =
             Scale { weight, times_s: (calibration.gyro_output == OutputKind::Mean).then_some(duration_s) };
         let mut clamped = SensorMask::NONE;
@@ -85,7 +85,9 @@ impl Corrector {
             }
             bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
-        self.servo.advance(lost, time, raw.duration);
+        if reversal.is_some() | self.calm.special {
+            self.servo.advance(lost, time, raw.duration);
+        }
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
             && !self.servo.pass_settled(settles_s, (time, raw.duration), &raw.half_periods)
         {
@@ -104,9 +106,8 @@ impl Corrector {
 
         let mut usable = self.thermal.gyro_axes.included();
         let outside = clamped != SensorMask::NONE;
-        let sound = !(lost | outside)
-            & self.thermal.gyro_footing.is_sound(time)
-            & within(&readings, narrow(&calibration.gyro_limits));
+        let sound =
+            !(lost | outside) & self.calm.sound[0] & within(&readings, narrow(&calibration.gyro_limits));
         let mut flags = SOUND;
         if lost {
             (increments, flags) = ([0.0; N], self.thermal.gyro_footing.lost(time));
@@ -166,9 +167,9 @@ impl Corrector {
         flags: [SensorFlags; MAX_SENSORS],
         rates: [f64; N],
     ) {
+        self.gyro_health.ticks += 1;
         if sound {
             put(&mut self.last_rates, rates);
-            self.gyro_health.note_sound();
             return;
         }
         let before: [f64; N] = *narrow(&self.last_rates);
@@ -250,8 +251,7 @@ impl Corrector {
             out.flags |= TickFlags::ANGLE_INVALID;
         }
         if excluded {
-            counters.sensors_excluded += 1;
-            self.thermal.note_footing(calibration);
+            self.exclude(calibration, counters);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use isotherm_correction::operation::Command;
 use isotherm_correction::sample::{
-    AccelTick, ChannelName, GyroTick, OutputKind, Sensors, TemperatureReading,
+    AccelTick, ChannelName, GyroTick, OutputKind, Readings, TemperatureReading,
 };
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
@@ -112,7 +112,7 @@ impl Session {
 
     fn publish(&mut self) {
         let mut frame = Vec::new();
-        while self.service.next_frame(&mut frame) {
+        while self.service.next_frame(&mut frame).is_some() {
             self.record(Topic::Corrected(self.id()), frame.clone(), 0);
         }
         while self.service.take_in_force().is_some() {}
@@ -141,7 +141,7 @@ impl Session {
             let sequence = self.sequence;
             let end_time = Timestamp::from_ns(i64::try_from((sequence + 1) * TICK_NS).unwrap());
             let (output, duration) = (OutputKind::Mean, Span::from_ns(TICK_NS.cast_signed()));
-            let wobble = |scale: f64| -> Sensors<f64> {
+            let wobble = |scale: f64| -> Readings {
                 (0..3)
                     .map(|axis| scale * f64::from(u32::try_from((sequence * 7919 + axis) % 97).unwrap()))
                     .collect()

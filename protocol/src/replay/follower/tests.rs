@@ -64,7 +64,7 @@ impl Leader {
 
 fn take_frames(stream: &mut UnitStream, into: &mut Vec<Vec<u8>>) {
     let mut frame = Vec::new();
-    while stream.next_frame(&mut frame) {
+    while stream.next_frame(&mut frame).is_some() {
         into.push(std::mem::take(&mut frame));
     }
 }

@@ -47,7 +47,9 @@ impl NoticeCollector {
             }
             (self.state, self.revision) = (Some(state), revision);
         }
-        self.tell(stream);
+        if !self.untold.is_empty() {
+            self.tell(stream);
+        }
         changed
     }
 

@@ -24,7 +24,7 @@ mod speech;
 fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
     let end_time = Timestamp::from_ns(i64::try_from(sequence + 1).unwrap() * 5_000_000);
     let duration = Span::from_ms(5);
-    let readings: isotherm_correction::sample::Sensors<f64> = [1.0, 2.0, 3.0].into_iter().collect();
+    let readings: isotherm_correction::sample::Readings = [1.0, 2.0, 3.0].into_iter().collect();
     let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
     let gyro = GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() };
     [
