@@ -302,7 +302,9 @@ impl Mapping {
     pub fn parse(text: &str, file: &str) -> Result<Self, Vec<Problem>> {
         let mut reader = Reader::new(text, Some(file));
         let mapping = reader.read(&FORM);
-        mapping.iter().for_each(|mapping| check::check(&mut reader, mapping));
+        if let Some(mapping) = &mapping {
+            check::check(&mut reader, mapping);
+        }
         reader.finish(mapping)
     }
 

@@ -286,7 +286,9 @@ impl UnitStream {
     /// Takes the corrected ticks as they are.
     pub fn take_ready(&mut self) -> Vec<CorrectedTick> {
         let (ticks, last) = self.outgoing.take();
-        last.into_iter().for_each(|last| self.note_taken(last));
+        if let Some(last) = last {
+            self.note_taken(last);
+        }
         ticks
     }
 
@@ -308,7 +310,9 @@ impl UnitStream {
     /// Gives up the ready ticks: they were taken.
     pub fn drop_ready(&mut self) {
         let last = self.outgoing.clear();
-        last.into_iter().for_each(|last| self.note_taken(last));
+        if let Some(last) = last {
+            self.note_taken(last);
+        }
     }
 
     /// The first output of each revision, in order and once each; ask after every frame.

@@ -135,10 +135,11 @@ pub async fn play(
     };
     let played = {
         let mut player = Player::new(&opened, options, commands, watch)?;
+        let tried = way.tried();
         let ended = tokio::select! {
             biased;
             () = &mut stop => Err(Error::Stopped),
-            ended = run(&opened, &way.tried(), options, &mut player, watch) => ended,
+            ended = run(&opened, &tried, options, &mut player, watch) => ended,
         };
         Played { report: player.report(ended.is_err()), log: player.log_report(), ended }
     };

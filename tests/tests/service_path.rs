@@ -116,7 +116,7 @@ fn messages(unit: &UnitId, first: u64, batch: u64, channels: &[ChannelName]) -> 
         sequence,
         end_time: end_time(sequence),
         duration,
-        readings: readings.clone(),
+        readings,
     });
     let accels = AccelBatch { output, ticks: accels.collect() };
     messages.push(message(RawStream::Accel, codec::encode(&accels)));
@@ -124,7 +124,7 @@ fn messages(unit: &UnitId, first: u64, batch: u64, channels: &[ChannelName]) -> 
         sequence,
         end_time: end_time(sequence),
         duration,
-        readings: readings.clone(),
+        readings,
         ..GyroTick::default()
     });
     let gyros = GyroBatch { output, ticks: gyros.collect() };

@@ -1,6 +1,7 @@
 //! What each stream's rows hold, column by column.
 
-use isotherm_correction::sample::{self, AccelTick, GyroTick, LasingMode, OutputKind, SensorFlags};
+use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, SensorFlags};
+use isotherm_correction::sigma::Causes;
 use isotherm_correction::units::Span;
 use isotherm_log::streams::contents::{CorrectedShape, Shape, Shapes};
 use isotherm_protocol::corrected::{AppliedTemperature, CorrectedTick, Revision};
@@ -38,13 +39,7 @@ impl Sensors {
         }
     }
 
-    fn readings(
-        self,
-        row: &mut Row<'_>,
-        mean_unit: &str,
-        output: OutputKind,
-        readings: &sample::Sensors<f64>,
-    ) {
+    fn readings(self, row: &mut Row<'_>, mean_unit: &str, output: OutputKind, readings: &[f64]) {
         let (counts, means): (&[f64], &[f64]) = match output {
             OutputKind::Counts => (readings, &[]),
             OutputKind::Mean => (&[], readings),
@@ -157,7 +152,7 @@ pub(super) fn corrected(
             let (cause, axis) = (CAUSES[n / AXES.len()], AXES[n % AXES.len()]);
             sparse(format!("{increment}_{cause}_sigma_{axis}_{unit}"), Kind::Double)
         };
-        let cells = causes.iter().flat_map(|causes| causes.all()).flatten();
+        let cells = causes.iter().flat_map(Causes::all).flatten();
         row.each(CAUSES.len() * AXES.len(), column, cells);
     }
 }

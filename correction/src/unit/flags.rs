@@ -162,8 +162,8 @@ impl Health {
     }
 
     /// Sensor by sensor, with the flags of the last tick.
-    pub(super) fn with(&self, flags: &[SensorFlags; MAX_SENSORS]) -> Sensors<SensorHealth> {
-        let accounts = self.accounts.iter().zip(*flags);
+    pub(super) fn with(&self, flags: [SensorFlags; MAX_SENSORS]) -> Sensors<SensorHealth> {
+        let accounts = self.accounts.iter().zip(flags);
         accounts.map(|(account, flags)| SensorHealth { flags, ticks: self.ticks, ..*account }).collect()
     }
 }

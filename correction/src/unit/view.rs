@@ -109,14 +109,14 @@ impl Unit {
     #[must_use]
     pub fn gyro_health(&self) -> Sensors<SensorHealth> {
         let corrector = self.pipeline.active.as_ref().map(|active| &active.corrector);
-        corrector.map(|it| it.gyro_health.with(&it.seen.gyros.flags)).unwrap_or_default()
+        corrector.map(|it| it.gyro_health.with(it.seen.gyros.flags)).unwrap_or_default()
     }
 
     /// Account of each accelerometer, likewise.
     #[must_use]
     pub fn accel_health(&self) -> Sensors<SensorHealth> {
         let corrector = self.pipeline.active.as_ref().map(|active| &active.corrector);
-        corrector.map(|it| it.accel_health.with(&it.seen.accels.flags)).unwrap_or_default()
+        corrector.map(|it| it.accel_health.with(it.seen.accels.flags)).unwrap_or_default()
     }
 
     /// What is presently subtracted from the readings, in case axes; `None` before the first corrected tick.

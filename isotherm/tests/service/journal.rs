@@ -124,7 +124,7 @@ fn messages(sequence: u64, last: bool) -> Vec<(Input, Vec<u8>)> {
         messages.push((Input::Raw(RawStream::Temperature), encode(&batch).unwrap()));
     }
     if !last {
-        let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
+        let accel = AccelTick { sequence, end_time, duration, readings };
         let batch = AccelBatch { output: OutputKind::Counts, ticks: vec![accel] };
         messages.push((Input::Raw(RawStream::Accel), encode(&batch).unwrap()));
     }

@@ -84,22 +84,19 @@ impl Column {
             self.empty += 1;
             return;
         }
-        let (number, parts) = match parse_float(cell, mark).filter(|number| number.is_finite()) {
-            Some(number) => (number, parts(cell, mark).unwrap_or((0, number))),
-            None => match date_time_ns(cell.as_bytes()) {
-                #[expect(
-                    clippy::cast_precision_loss,
-                    reason = "for ranges; steps are taken from the whole number"
-                )]
-                Some(ns) => {
-                    self.date_times += 1;
-                    (ns as f64, (ns, 0.0))
-                }
-                None => {
-                    self.other += 1;
-                    return;
-                }
-            },
+        let number = parse_float(cell, mark).filter(|number| number.is_finite());
+        let (number, parts) = if let Some(number) = number {
+            (number, parts(cell, mark).unwrap_or((0, number)))
+        } else if let Some(ns) = date_time_ns(cell.as_bytes()) {
+            self.date_times += 1;
+            #[expect(
+                clippy::cast_precision_loss,
+                reason = "for ranges; steps are taken from the whole number"
+            )]
+            (ns as f64, (ns, 0.0))
+        } else {
+            self.other += 1;
+            return;
         };
         if self.numbers == 0 {
             (self.minimum, self.maximum) = (number, number);

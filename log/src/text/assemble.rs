@@ -105,7 +105,7 @@ impl Assembler {
             self.mode = states.mode;
             let waits = self.gyro.waits(readings.duration.is_some());
             let timing = self.gyro.tick(stamp, readings.sequence, readings.duration);
-            let tick = gyro_tick(timing, readings, states, changed);
+            let tick = gyro_tick(timing, &readings, states, changed);
             self.add(GYRO, waits, stamp, LogEvent::Gyro { output, tick }, columns);
         }
         self.settled = stamp;
@@ -228,7 +228,9 @@ impl Part {
 
     fn share(self, output: OutputKind, readings: &mut [f64]) {
         if output == OutputKind::Counts {
-            readings.iter_mut().for_each(|reading| *reading /= f64::from(self.parts));
+            for reading in readings {
+                *reading /= f64::from(self.parts);
+            }
         }
     }
 }
@@ -251,7 +253,7 @@ fn to_means(event: &mut LogEvent, columns: &Columns) {
 }
 
 /// A gyro tick of its parts.
-fn gyro_tick(timing: Timing, readings: Readings, states: GyroStates, changed: bool) -> GyroTick {
+fn gyro_tick(timing: Timing, readings: &Readings, states: GyroStates, changed: bool) -> GyroTick {
     GyroTick {
         sequence: timing.sequence,
         end_time: Timestamp::from_ns(timing.end_ns),

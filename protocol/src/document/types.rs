@@ -107,8 +107,8 @@ impl Document {
         let accel = self.accel.as_ref().and_then(|accel| accel.orientation.thermal.as_ref());
         for (kind, thermal) in [("gyro", self.gyro.orientation.thermal.as_ref()), ("accel", accel)] {
             let path = format!("{kind}.orientation.thermal.channels");
-            let names = thermal.into_iter().flat_map(|thermal| &thermal.channels).enumerate();
-            named.extend(names.map(|(i, name)| (element(&path, i), name.as_str(), false)));
+            let channels = thermal.into_iter().flat_map(|thermal| &thermal.channels).enumerate();
+            named.extend(channels.map(|(i, name)| (element(&path, i), name.as_str(), false)));
         }
         named
     }

@@ -85,6 +85,6 @@ fn with_data_the_tumble_log_joins_its_two_files() {
         assert_eq!((accel.end_time, accel.sequence), (gyro.end_time, gyro.sequence));
     }
     let LogEvent::Accel { tick, .. } = &events[0] else { panic!("{:?}", events[0]) };
-    assert_eq!(tick.readings.as_slice(), [33108.0, 33329.0, 36429.0]);
+    assert_eq!(*tick.readings, [33108.0, 33329.0, 36429.0]);
     assert_eq!(tick.end_time.as_ns(), 29_840_000);
 }

@@ -66,7 +66,7 @@ impl Script {
         let (accel, gyro) = self.next_tick();
         let readings: Readings = std::iter::repeat_n(3.0, sensors).collect();
         let half_periods = Sensors::new();
-        self.steps.push(accel_frame(output, &[AccelTick { readings: readings.clone(), ..accel }]));
+        self.steps.push(accel_frame(output, &[AccelTick { readings, ..accel }]));
         self.steps.push(gyro_frame(output, &[GyroTick { readings, half_periods, ..gyro }]));
     }
 

@@ -265,13 +265,11 @@ impl Corrector {
             return;
         }
         let slewed;
-        let positions = match (self.slewing(), calibration.motion.as_deref()) {
-            (None, Some(motion)) => &motion.positions_m,
-            _ => {
-                slewed =
-                    [0, 1, 2].map(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]));
-                &slewed
-            }
+        let positions = if let (None, Some(motion)) = (self.slewing(), calibration.motion.as_deref()) {
+            &motion.positions_m
+        } else {
+            slewed = [0, 1, 2].map(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]));
+            &slewed
         };
         let (rate, acceleration) = self.turning(missed, out);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)

@@ -25,7 +25,7 @@ fn frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
     let end_time = Timestamp::from_ns(i64::try_from(sequence + 1).unwrap() * 5_000_000);
     let duration = Span::from_ms(5);
     let readings: isotherm_correction::sample::Readings = [1.0, 2.0, 3.0].into_iter().collect();
-    let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
+    let accel = AccelTick { sequence, end_time, duration, readings };
     let gyro = GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() };
     [
         (RawStream::Accel, encode(&AccelBatch { output: OutputKind::Counts, ticks: vec![accel] }).unwrap()),

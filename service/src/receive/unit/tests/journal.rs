@@ -111,7 +111,7 @@ fn example_frames(sequence: u64) -> [(RawStream, Vec<u8>); 2] {
     let duration = Span::from_ms(5);
     let wobble = f64::from(u32::try_from(sequence % 5).unwrap());
     let readings: isotherm_correction::sample::Readings = [wobble, 2.0, -wobble, 1.0].into_iter().collect();
-    let accel = AccelTick { sequence, end_time, duration, readings: readings.clone() };
+    let accel = AccelTick { sequence, end_time, duration, readings };
     let gyro = GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() };
     [
         (RawStream::Accel, encode(&AccelBatch { output: OutputKind::Counts, ticks: vec![accel] }).unwrap()),
