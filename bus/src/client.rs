@@ -13,7 +13,7 @@ use zenoh::{Config, Session};
 use crate::certificate::common_name;
 use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
 use crate::error::seconds;
-use crate::session::{endpoints, set};
+use crate::session::{close, connected_to, endpoints, set};
 use crate::{BusError, SessionOptions, obstacle};
 
 /// Environment variable that says where the service is: one endpoint, or several separated by commas.
@@ -21,6 +21,12 @@ pub const CONNECT_VARIABLE: &str = "ISOTHERM_CONNECT";
 
 /// How long to wait before a session is opened again.
 const AGAIN: Duration = Duration::from_millis(250);
+/// How long an endpoint may take before it is looked whether something listens there at all.
+const AT_ONCE: Duration = Duration::from_millis(100);
+/// How long the other endpoints of several may take once one has answered.
+const OTHERS: Duration = Duration::from_millis(500);
+/// How long closing a session may take that nobody has answered.
+const CLOSING: Duration = Duration::from_secs(1);
 
 /// How to reach a service.
 ///
@@ -61,6 +67,8 @@ pub struct Way {
     /// Who says where it leads: the variable, or the user's file.
     said_by: Option<String>,
     name: Option<String>,
+    /// Endpoints of which one is enough, as of a pair: the others are tried again meanwhile.
+    any_of: Vec<String>,
 }
 
 /// What the options, the variable and the user's file say together.
@@ -180,12 +188,20 @@ impl Stated {
             set(&mut config, "mode", "client")?;
             set(&mut config, "listen/endpoints", Vec::<String>::new())?;
         }
-        if options.config.is_none() && !options.connect.is_empty() {
+        let mut any_of = Vec::new();
+        match options.connect.len() {
+            0 => {}
+            _ if options.config.is_some() => {}
             // Once: what does not answer is reported at once, not after many trials.
-            set(&mut config, "connect/timeout_ms", 0)?;
+            1 => set(&mut config, "connect/timeout_ms", 0)?,
+            _ => {
+                set(&mut config, "connect/timeout_ms", -1)?;
+                set(&mut config, "connect/exit_on_failure", false)?;
+                any_of = endpoints(&config, "connect/endpoints");
+            }
         }
         let name = common_name(&config);
-        Ok(Way { config, said_by, name })
+        Ok(Way { config, said_by, name, any_of })
     }
 }
 
@@ -227,26 +243,56 @@ impl Way {
         }
     }
 
+    /// Whether one of several endpoints answers within the limit; the others get a moment to answer too.
+    async fn is_connected(&self, session: &Session, limit: Duration) -> bool {
+        let all = &self.any_of;
+        if all.is_empty() {
+            return true;
+        }
+        let mut count = connected_to(session, all, 1, limit.min(AT_ONCE)).await;
+        if count == 0 {
+            let endpoints = all.clone();
+            let listens =
+                tokio::task::spawn_blocking(move || endpoints.iter().any(|it| obstacle::listens(it)));
+            if !listens.await.unwrap_or(true) {
+                return false;
+            }
+            count = connected_to(session, all, 1, limit).await;
+        }
+        count == all.len() || (count > 0 && connected_to(session, all, all.len(), OTHERS).await > 0)
+    }
+
     /// Opens a session within the limit.
     ///
     /// # Errors
     /// [`BusError::Unreachable`] with what to do next, [`BusError::Listen`], or [`BusError::Open`] where the cause is not known.
     pub async fn open(&self, limit: Duration) -> Result<Session, BusError> {
         obstacle::before(&self.config)?;
-        let config = self.config.clone();
+        let (config, started) = (self.config.clone(), Instant::now());
         // A task of its own: opening may hold its thread, and a timeout on the same one would not be heard.
         let opening = tokio::spawn(async move { zenoh::open(config).await });
         let source = match tokio::time::timeout(limit, opening).await {
-            Ok(Ok(Ok(session))) => return Ok(session),
+            Ok(Ok(Ok(session))) => {
+                if self.is_connected(&session, limit.saturating_sub(started.elapsed())).await {
+                    return Ok(session);
+                }
+                close(session, CLOSING).await?;
+                not_connected(limit)
+            }
             Ok(Ok(Err(source))) => source,
             Ok(Err(join)) => join.into(),
-            Err(_) => format!("not connected within {}", seconds(limit)).into(),
+            Err(_) => not_connected(limit),
         };
         let (config, said_by) = (self.config.clone(), self.said_by.clone());
         let known =
             tokio::task::spawn_blocking(move || obstacle::after(&config, limit, said_by.as_deref())).await;
         Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
     }
+}
+
+/// Nothing has answered.
+fn not_connected(limit: Duration) -> zenoh::Error {
+    format!("not connected within {}", seconds(limit)).into()
 }
 
 /// The words behind an endpoint that name who says it.

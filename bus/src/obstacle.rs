@@ -60,6 +60,12 @@ pub(crate) fn after(config: &Config, limit: Duration, said_by: Option<&str>) -> 
     (!reasons.is_empty()).then(|| BusError::Unreachable { reasons, next: steps.join(", or ") })
 }
 
+/// Whether something listens at an endpoint, or that cannot be known.
+pub(crate) fn listens(endpoint: &str) -> bool {
+    let Some(addresses) = host_and_port(endpoint).map(ToSocketAddrs::to_socket_addrs) else { return true };
+    addresses.is_ok_and(|mut all| all.any(|address| TcpStream::connect_timeout(&address, TRIAL).is_ok()))
+}
+
 /// Why nothing came of an endpoint, and what else to do than to give another.
 fn silent(endpoint: &str, limit: Duration) -> Option<(String, Option<&'static str>)> {
     let address = host_and_port(endpoint)?;

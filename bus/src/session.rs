@@ -223,20 +223,30 @@ pub async fn open_config(config: Config) -> Result<Session, BusError> {
 /// # Errors
 /// As [`SessionOptions::to_config`].
 pub async fn connected(session: &Session, options: &SessionOptions, limit: Duration) -> Result<(), BusError> {
-    let wanted: Vec<_> = endpoints(&options.to_config()?, "connect/endpoints")
-        .iter()
-        .map(|endpoint| reached(endpoint))
-        .collect();
+    let wanted = endpoints(&options.to_config()?, "connect/endpoints");
+    connected_to(session, &wanted, wanted.len(), limit).await;
+    Ok(())
+}
+
+/// Waits until a session is connected to so many of these endpoints; no longer than `limit`. To how many it is.
+pub(crate) async fn connected_to(
+    session: &Session,
+    endpoints: &[String],
+    least: usize,
+    limit: Duration,
+) -> usize {
+    let wanted: Vec<_> = endpoints.iter().map(|endpoint| reached(endpoint)).collect();
     let deadline = Instant::now() + limit;
-    while Instant::now() < deadline {
+    loop {
         let links: Vec<_> = session.info().links().await.map(|link| link.dst().to_string()).collect();
         // A connection from elsewhere says nothing: producers may find this session before it finds the others.
-        if wanted.iter().all(|any_of| any_of.iter().any(|endpoint| links.contains(endpoint))) {
-            break;
+        let is_there = |any_of: &&Vec<String>| any_of.iter().any(|endpoint| links.contains(endpoint));
+        let count = wanted.iter().filter(is_there).count();
+        if count >= least || Instant::now() >= deadline {
+            return count;
         }
         tokio::time::sleep(CONNECTED_INTERVAL).await;
     }
-    Ok(())
 }
 
 /// What a link to an endpoint may be called: its host name stands for one of these addresses.

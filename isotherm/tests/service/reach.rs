@@ -60,6 +60,21 @@ fn environment_and_the_users_file_say_where_the_service_is() {
     assert_eq!(served.stop("-INT").0, Some(0));
 }
 
+#[test]
+fn of_two_addresses_one_that_answers_is_enough() {
+    let served = Served::start(&[]);
+    let there = served.locators[0].strip_prefix("tcp/").unwrap();
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    for other in [free(), silent.local_addr().unwrap().to_string()] {
+        for pair in [format!("{there},{other}"), format!("{other},{there}")] {
+            let output = isotherm(&["status", "--json"], &[("ISOTHERM_CONNECT", &pair)]);
+            assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+            assert!(!output.stdout.is_empty() && output.stderr.is_empty(), "{output:?}");
+        }
+    }
+    assert_eq!(served.stop("-INT").0, Some(0));
+}
+
 /// An address at which nobody listens.
 fn free() -> String {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string()
