@@ -165,7 +165,7 @@ fn several_modes(folder: &Path, run: &Path, alone: &Path) {
     let outputs = ["--out", text(&out), "--html", text(&html)];
     let arguments = [&logs[..], &rest, &outputs].concat();
     let (code, said, errors) = words(&calibrate(&arguments));
-    assert!(code == Some(1) && errors.contains("ZLG-0003.toml does not exist"), "{errors}");
+    assert!(code == Some(1) && errors.contains("no document of the folder is for unit ZLG-0003"), "{errors}");
     let table = said.rsplit("\n\n").find(|part| part.starts_with("3 units: ")).unwrap();
     assert!(table.starts_with("3 units: 6 of 6 sensors accepted, 1 of the units failed."), "{table}");
     assert_eq!(table.lines().filter(|line| line.contains("ZLG-0002")).count(), 3, "{table}");

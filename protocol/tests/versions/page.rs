@@ -158,7 +158,7 @@ fn the_page_states_keys_and_limits() {
         format!("`{}`", key::ALL_RECEIPTS),
         format!("`{}`", key::receipt("{session}")),
         format!("1…{} characters", key::MAX_UNIT_ID),
-        format!("at most {} bytes", codec::MAX_FRAME),
+        format!("6…{} bytes", codec::MAX_FRAME),
     ] {
         assert!(page.contains(&text), "{text}");
     }
