@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use isotherm_protocol::codec;
 use isotherm_protocol::journal::JournalPart;
+use isotherm_protocol::key;
+use isotherm_protocol::pair::PairReport;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use tokio::time::{Instant, timeout, timeout_at};
 use zenoh::Session;
@@ -54,6 +56,16 @@ pub async fn ask_all(
     });
     let in_time = collected.await.is_ok();
     Ok((all, in_time))
+}
+
+/// What every instance that answers within `limit` says of itself and its units; what cannot be read is left out.
+///
+/// # Errors
+/// [`BusError::Declare`].
+pub async fn pair_reports(session: &Session, limit: Duration) -> Result<Vec<PairReport>, BusError> {
+    let (replies, _) = ask_all(session, key::ALL_PAIRS, limit).await?;
+    let samples = replies.into_iter().filter_map(|reply| reply.into_result().ok());
+    Ok(samples.filter_map(|sample| serde_json::from_slice(&sample.payload().to_bytes()).ok()).collect())
 }
 
 /// A querier of all who answer `key`, each within `limit`, once one of them is there; `None` where nobody is within `limit`.

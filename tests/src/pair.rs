@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use isotherm_bus::inquiry::ask_all;
+use isotherm_bus::inquiry::pair_reports;
 use isotherm_bus::{SessionOptions, open};
-use isotherm_protocol::key;
 use isotherm_protocol::pair::{PairReport, Role};
 use zenoh::Session;
 
@@ -141,9 +140,7 @@ impl Pair {
 /// # Panics
 /// Where the question cannot be asked.
 pub async fn reports(session: &Session) -> Vec<PairReport> {
-    let (replies, _) = ask_all(session, key::ALL_PAIRS, Duration::from_secs(1)).await.expect("asked");
-    let samples = replies.into_iter().filter_map(|reply| reply.into_result().ok());
-    samples.filter_map(|sample| serde_json::from_slice(&sample.payload().to_bytes()).ok()).collect()
+    pair_reports(session, Duration::from_secs(1)).await.expect("asked")
 }
 
 /// Waits until of two instances one speaks for every unit and the other stands by.

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use isotherm_bus::inquiry::ask_all;
+use isotherm_bus::inquiry::pair_reports;
 use isotherm_correction::sample::TickFlags;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick};
 use isotherm_protocol::document::Document;
-use isotherm_protocol::key::{self, RawStream};
-use isotherm_protocol::pair::{PairReport, Role, UnitRole};
+use isotherm_protocol::key::RawStream;
+use isotherm_protocol::pair::{Role, UnitRole};
 use isotherm_protocol::stream::UnitStream;
 
 use super::python::Constants;
@@ -66,13 +66,7 @@ pub(crate) fn check(plan: &Plan, subject: Subject, received: &Received) -> Resul
 /// Whether the two services are a pair: one stands by for every unit, and computes the same bits.
 pub(crate) fn is_pair(plan: &Plan) -> Result<(), Error> {
     let session = open(plan)?;
-    let asked = async {
-        let (replies, _) = ask_all(&session, key::ALL_PAIRS, ANSWER_LIMIT).await?;
-        let samples = replies.into_iter().filter_map(|reply| reply.into_result().ok());
-        let texts = samples.map(|sample| sample.payload().to_bytes().into_owned());
-        Ok::<_, Error>(texts.filter_map(|text| serde_json::from_slice(&text).ok()).collect())
-    };
-    let reports: Vec<PairReport> = runtime()?.block_on(asked)?;
+    let reports = runtime()?.block_on(pair_reports(&session, ANSWER_LIMIT))?;
     let all = reports.iter().flat_map(|report| &report.units);
     let follows =
         |unit: &&UnitRole| unit.role == Role::Standby && unit.ticks_compared > 0 && unit.ticks_differing == 0;
