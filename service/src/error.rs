@@ -75,6 +75,15 @@ pub enum ServiceError {
     /// Something about the Zenoh session.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// The other instance of a pair does not connect to this one.
+    #[error(
+        "the other instance at {other} (pair.other) does not connect to this one: state this one's address there \
+         (zenoh.connect)"
+    )]
+    NotConnected {
+        /// Its address.
+        other: String,
+    },
     /// A subscriber or queryable cannot be declared.
     #[error("cannot declare {key}: {words}", words = isotherm_bus::words(source))]
     Declare {
@@ -90,9 +99,10 @@ impl ServiceError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Configuration(_) | Self::BadCalibrations { .. } | Self::NoCalibrations { .. } => {
-                Exit::BadConfiguration
-            }
+            Self::Configuration(_)
+            | Self::BadCalibrations { .. }
+            | Self::NoCalibrations { .. }
+            | Self::NotConnected { .. } => Exit::BadConfiguration,
             // An address that is not allowed, not one that somebody else has.
             Self::Metrics { source, .. } if source.kind() == std::io::ErrorKind::Other => {
                 Exit::BadConfiguration
