@@ -20,7 +20,7 @@ pub struct PairSettings {
     pub mode: Mode,
     /// Of two that speak the one with the lower priority yields.
     pub priority: u8,
-    /// How late the other's output may be.
+    /// How long the other may be silent; a tick is waited for at least three quarters of it.
     #[serde(rename = "takeover_ms", with = "As::<Ms>")]
     #[schemars(with = "u32", range(min = 5, max = 10_000))]
     pub takeover: Duration,

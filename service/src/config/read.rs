@@ -89,6 +89,14 @@ fn names(r: &mut Reader<'_>, settings: &mut Settings) {
     }
     if let Some(other) = &settings.pair.other {
         match endpoint(other) {
+            Ok(other)
+                if settings.zenoh.session.connect.iter().any(|it| endpoint(it).as_ref() == Ok(&other)) =>
+            {
+                r.report(
+                    "pair.other",
+                    format!("is {other:?}, as in zenoh.connect: only one of the two connects"),
+                );
+            }
             Ok(other) => settings.pair.other = Some(other),
             Err(reason) => r.report("pair.other", format!("is {other:?}, {reason}")),
         }

@@ -165,7 +165,11 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         ("max_units = -1", "1:13: max_units: is -1, must be a whole number from 1 to 16384"),
         (
             "[pair]\nother = \"a:70000\"",
-            "2:9: pair.other: is \"a:70000\", has the port 70000, must be 0 to 65535",
+            "2:9: pair.other: is \"a:70000\", has the port \"70000\", must be 0 to 65535",
+        ),
+        (
+            "[pair]\nother = \"a:7\"\n[zenoh]\nconnect = [\"tcp/a:7\"]",
+            "2:9: pair.other: is \"tcp/a:7\", as in zenoh.connect: only one of the two connects",
         ),
         ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),
         (

@@ -135,10 +135,12 @@ impl Kept {
         }
     }
 
-    /// When the oldest frame that waits to be heard has waited for that long.
+    /// When nothing has been heard for that long while a frame waits to be heard: counted from what was last heard, as subscribers do,
+    /// where the frame has waited for three quarters of it by then.
     pub(super) fn late_at(&self, limit: Duration) -> Option<Instant> {
-        let waiting = self.frames.iter().rev().take_while(|frame| !frame.heard).last();
-        waiting.map(|frame| frame.at + limit)
+        let oldest = self.frames.iter().rev().take_while(|frame| !frame.heard).last()?;
+        let silent = self.heard_at.map_or(oldest.at, |heard_at| heard_at.min(oldest.at)) + limit;
+        Some(silent.max(oldest.at + limit * 3 / 4))
     }
 
     /// Whether frames were computed and nothing was heard for that long.
@@ -290,6 +292,25 @@ mod tests {
         kept.replace((2..7).map(frame).collect(), true, late);
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [6]);
         assert!(kept.due(late, TAKEOVER).is_empty());
+    }
+
+    #[test]
+    fn silence_counts_from_what_was_last_heard_if_the_next_tick_was_due_soon() {
+        let start = Instant::now();
+        // Time of the next tick behind what was heard, and of the takeover (ms).
+        for (next, late) in [(1, 20), (5, 20), (6, 21), (100, 115)] {
+            let mut kept = Kept::default();
+            kept.computed(frame(0), start);
+            kept.heard(batch(0), start);
+            assert_eq!(kept.late_at(TAKEOVER), None);
+            kept.computed(frame(1), start + Duration::from_millis(next));
+            assert_eq!(kept.late_at(TAKEOVER), Some(start + Duration::from_millis(late)));
+        }
+        // What is behind by itself is late no later for that.
+        let mut kept = Kept::default();
+        (0..3).for_each(|sequence| drop(kept.computed(frame(sequence), start)));
+        kept.heard(batch(0), start + Duration::from_millis(10));
+        assert_eq!(kept.late_at(TAKEOVER), Some(start + TAKEOVER));
     }
 
     /// The stream's own memory may be younger than what waits.
