@@ -99,10 +99,9 @@ impl ServiceError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Configuration(_)
-            | Self::BadCalibrations { .. }
-            | Self::NoCalibrations { .. }
-            | Self::NotConnected { .. } => Exit::BadConfiguration,
+            Self::Configuration(_) | Self::BadCalibrations { .. } | Self::NoCalibrations { .. } => {
+                Exit::BadConfiguration
+            }
             // An address that is not allowed, not one that somebody else has.
             Self::Metrics { source, .. } if source.kind() == std::io::ErrorKind::Other => {
                 Exit::BadConfiguration
