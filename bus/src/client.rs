@@ -302,7 +302,8 @@ impl Way {
                 if self.is_connected(&session, limit.saturating_sub(started.elapsed())).await {
                     return Ok(session);
                 }
-                close(session, CLOSING).await?;
+                // Why nobody answers is what counts.
+                let _ = close(session, CLOSING).await;
                 not_connected(limit)
             }
             Ok(Ok(Err(source))) => source,

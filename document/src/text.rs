@@ -124,7 +124,8 @@ impl<'t> Reader<'t> {
 fn spaced_number(text: &str, offset: usize) -> Option<(Range<usize>, String)> {
     let is_part = |c: &char| !"[]{}=,#\r\n".contains(*c);
     let (before, after) = text.split_at_checked(offset)?;
-    let before: usize = before.chars().rev().take(LONGEST_NUMBER).take_while(is_part).map(char::len_utf8).sum();
+    let before: usize =
+        before.chars().rev().take(LONGEST_NUMBER).take_while(is_part).map(char::len_utf8).sum();
     let after: usize = after.chars().take(LONGEST_NUMBER).take_while(is_part).map(char::len_utf8).sum();
     let place = offset - before..offset + after;
     let item = text.get(place.clone())?.trim();

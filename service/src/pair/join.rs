@@ -10,6 +10,7 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::Settings;
+use crate::supervisor;
 
 /// How long other instances may take to show themselves.
 const LIMIT: Duration = Duration::from_millis(500);
@@ -30,6 +31,7 @@ pub(super) async fn others(
 ) -> Result<Vec<Member>, ServiceError> {
     connected(session, &settings.zenoh.session, LIMIT).await?;
     let Some(other) = &settings.pair.other else { return members(session, group).await };
+    supervisor::status(&format!("nothing is corrected yet: waiting for the other instance at {other}"));
     let (start, mut told) = (Instant::now(), false);
     loop {
         let is_there = is_there(settings, other, group).await?;
@@ -59,7 +61,13 @@ async fn is_there(settings: &Settings, address: &str, group: &str) -> Result<boo
     if !way.listens().await {
         return Ok(false);
     }
-    let Ok(visit) = way.open(LIMIT).await else { return Ok(false) };
+    let visit = match way.open(LIMIT).await {
+        Ok(visit) => visit,
+        Err(error) => {
+            tracing::warn!(address, "what listens where the other instance may be does not answer: {error}");
+            return Ok(false);
+        }
+    };
     let members = members(&visit, group).await;
     if let Err(error) = close(visit, LIMIT).await {
         tracing::debug!("{error}");

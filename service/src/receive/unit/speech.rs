@@ -31,7 +31,7 @@ const MUTUAL: Duration = Duration::from_millis(100);
 /// How the instance stands to the others, as a unit needs to know it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Standing {
-    /// How late the other's output may be.
+    /// How long the other may be silent.
     pub(crate) takeover: Duration,
     /// Whether corrected ticks go out while another instance speaks, too.
     pub(crate) active: bool,

@@ -140,13 +140,14 @@ impl UnitActor {
         }
         let (unit, name, before) = (self.stream.id().clone(), entry.event.name(), self.stream.unit().state());
         if let Err(error) = self.stream.carry_out(&entry.event) {
-            tracing::warn!(%unit, instance = entry.instance, "{name} was done by another instance, not here: {error}");
+            tracing::warn!(%unit, instance = entry.instance, "an order of another instance ({name}) cannot be \
+                carried out here: {error}");
             return;
         }
         // A command that changed nothing is not told again, or two that speak would tell it to each other for ever.
         let is_change = matches!(entry.event, JournalEvent::Changed { .. });
         if is_change || self.stream.unit().state() != before {
-            tracing::info!(%unit, instance = entry.instance, "{name} was done by another instance, and here too");
+            tracing::info!(%unit, instance = entry.instance, "an order of another instance ({name}) holds here too");
             self.journal(|_| entry.event.clone());
             self.notices.push(Notice::Followed(Box::new(entry)));
         }

@@ -344,9 +344,13 @@ mod tests {
     fn what_was_made_before_the_stream_was_taken_back_is_kept() {
         let start = Instant::now();
         // The last one: what was made behind the place that it was taken back to is none of the stream's, as after a command to stand by.
-        for (heard, holds, again, due) in
-            [(2, 5, 5..7, 3..7), (4, 5, 5..7, 5..7), (2, 7, 7..7, 3..7), (2, 7, 7..9, 3..9), (2, 5, 5..5, 3..5)]
-        {
+        for (heard, holds, again, due) in [
+            (2, 5, 5..7, 3..7),
+            (4, 5, 5..7, 5..7),
+            (2, 7, 7..7, 3..7),
+            (2, 7, 7..9, 3..9),
+            (2, 5, 5..5, 3..5),
+        ] {
             let mut kept = Kept { since: Some(start), ..Kept::default() };
             let late = start + LONGEST_WAIT;
             for sequence in 0..7 {

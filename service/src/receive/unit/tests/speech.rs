@@ -124,6 +124,9 @@ fn one_that_yields_to_an_instance_that_stands_by_says_nothing_in_its_place() {
         give(&mut actor, 30..40, start + ms(20));
         // By the clock of this machine: frames are kept with the time at which they were computed.
         let late = Instant::now() + TAKEOVER * 2;
-        assert_eq!((actor.watch_speech(late, &standing).spoke, sink.sequences().len() > 30), (speaks, speaks));
+        assert_eq!(
+            (actor.watch_speech(late, &standing).spoke, sink.sequences().len() > 30),
+            (speaks, speaks)
+        );
     }
 }
