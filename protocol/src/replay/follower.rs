@@ -69,8 +69,10 @@ pub struct Follower {
     /// The memory that is to be gone on from.
     memory: Option<(JournalEntry, u64)>,
     frames: VecDeque<Frame>,
-    /// How many frames came before the first of [`Self::frames`].
+    /// How many frames came before the first of [`Self::frames`], as far as they were followed.
     gone: u64,
+    /// What was heard before it.
+    before: [Heard; Input::ALL.len()],
     /// Behind the first anchor, by number; while there is no memory those of every instance.
     entries: Vec<(JournalEntry, u64)>,
     /// How many of [`Self::entries`], the last ones, the stream was not given.
@@ -78,11 +80,12 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// One that has no memory of the other service yet.
+    /// One that has no memory of the other service yet; its stream has heard `before`.
     #[must_use]
-    pub fn new(unit: UnitId) -> Self {
+    pub fn new(unit: UnitId, before: [Heard; Input::ALL.len()]) -> Self {
         Self {
             unit,
+            before,
             anchors: VecDeque::new(),
             memory: None,
             frames: VecDeque::new(),
@@ -119,13 +122,22 @@ impl Follower {
     /// Notes a frame that the stream is given.
     pub fn frame(&mut self, input: Input, now_ns: u64, bytes: &[u8]) {
         if self.frames.len() == MAX_WAITING {
-            self.frames.pop_front();
-            self.gone += 1;
+            self.give_up_oldest();
             if self.anchors.front().is_some_and(|anchor| anchor.frames < self.gone) {
                 self.lose();
             }
         }
         self.frames.push_back(Frame { input, at_ns: now_ns, bytes: bytes.into() });
+    }
+
+    /// Gives the oldest frame up; `false` where there is none.
+    fn give_up_oldest(&mut self) -> bool {
+        let Some(Frame { input, bytes, .. }) = self.frames.pop_front() else { return false };
+        if let Some(before) = self.before.get_mut(input.index()) {
+            before.note(&bytes);
+        }
+        self.gone += 1;
+        true
     }
 
     /// Takes the answer to a question for the memory, or an entry of the journal. Whether it is of use.
@@ -293,9 +305,7 @@ impl Follower {
         }
         let Some(oldest) = self.anchors.front() else { return };
         let (first, number) = (oldest.frames, oldest.entry.number);
-        while self.gone < first && self.frames.pop_front().is_some() {
-            self.gone += 1;
-        }
+        while self.gone < first && self.give_up_oldest() {}
         self.entries.retain(|(entry, _)| entry.number > number);
     }
 
@@ -306,7 +316,8 @@ impl Follower {
         let behind: Vec<_> =
             self.entries.iter().filter(|(entry, _)| is_behind(entry, &anchor.entry)).cloned().collect();
         let marks = behind.iter().map(|(entry, at_ns)| Mark::of(entry, *at_ns));
-        let mut sequencer = Sequencer::new(Outline::new(std::iter::once(mark).chain(marks).collect()));
+        let mut sequencer =
+            Sequencer::new(Outline::new(std::iter::once(mark).chain(marks).collect())).behind(self.before);
         let skipped = usize::try_from(anchor.frames.saturating_sub(self.gone)).unwrap_or(usize::MAX);
         let mut left = behind.len() + 1;
         sequencer.entry(anchor.entry.clone(), anchor.at_ns);

@@ -105,7 +105,7 @@ impl UnitActor {
         }
         self.speech.doubled = None;
         self.speech.memory_due = false;
-        self.speech.following = Some(Box::new(Following::new(self.stream.id().clone(), now, footing)));
+        self.speech.following = Some(Box::new(Following::new(&self.stream, now, footing)));
         self.status_due = true;
     }
 

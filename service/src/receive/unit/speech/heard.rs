@@ -105,6 +105,9 @@ impl UnitActor {
             JournalEvent::Changed { .. } | JournalEvent::Commanded { accepted: true, .. }
         );
         let order = order.then(|| entry.clone());
+        // It publishes what it has made until its memory has come, should the other be gone by then.
+        let at_once =
+            following.intact && !following.follower.has_joined() && !following.follower.has_memory();
         let documents = match &entry.event {
             JournalEvent::Memory { document, pending, .. } => Some([document, pending].map(Clone::clone)),
             _ => None,
@@ -114,7 +117,12 @@ impl UnitActor {
                 following.documents = documents.into_iter().flatten().collect();
             }
             if let Some(order) = order {
+                // With the memory it is done once more, in its place.
+                let done = at_once && self.stream.carry_out(&order.event).is_ok();
                 following.note_order(order);
+                if done {
+                    self.look();
+                }
             }
         }
         self.catch_up(now);
