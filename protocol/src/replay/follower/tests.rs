@@ -96,7 +96,7 @@ impl Standby {
 
     /// Whether the memory must be asked for anew.
     fn go_on(&mut self) -> bool {
-        let (rebuilt, stuck) = self.follower.advance(&self.stream, self.now_ns);
+        let (rebuilt, stuck) = self.follower.advance(&self.stream, 0, self.now_ns);
         if let Some(rebuilt) = rebuilt {
             assert!(rebuilt.exact);
             self.stream = rebuilt.stream;

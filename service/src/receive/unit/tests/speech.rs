@@ -108,3 +108,25 @@ fn of_two_that_speak_the_one_that_goes_before_goes_on() {
         assert_eq!(actor.speaks(), !yields);
     }
 }
+
+#[test]
+fn one_that_yields_to_an_instance_that_stands_by_says_nothing_in_its_place() {
+    for (command, speaks) in [(None, true), (Some(Command::Standby), false)] {
+        let (mut other, ..) = deserted();
+        other.journal_to(Journal { instance: "other".into(), outlet: Arc::new(|_, _| Ok(())) });
+        if let Some(command) = command {
+            other.command(&command).unwrap();
+        }
+        let (mut actor, sink, start) = deserted();
+        let standing = Standing { yields: true, alone_since: None, deserted: false, ..lost(start) };
+        actor.hear_journal(other.memory("other"), start + ms(20), &standing);
+        assert!(!actor.speaks());
+        give(&mut actor, 30..40, start + ms(20));
+        // By the clock of this machine: frames are kept with the time at which they were computed.
+        let late = Instant::now() + TAKEOVER * 2;
+        assert_eq!(
+            (actor.watch_speech(late, &standing).spoke, sink.sequences().len() > 30),
+            (speaks, speaks)
+        );
+    }
+}
