@@ -7,6 +7,9 @@ use crate::lanes::Lanes;
 use crate::sample::{LasingMode, MAX_SENSORS, SensorFlags, TickFlags};
 use crate::units::{Span, Timestamp};
 
+/// Flags of the sensors in a tick with nothing to say of any.
+pub(crate) const SOUND: [SensorFlags; MAX_SENSORS] = [SensorFlags::VALID; MAX_SENSORS];
+
 /// One gyro in one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GyroSeen {

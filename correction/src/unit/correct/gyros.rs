@@ -4,7 +4,8 @@ use core::array;
 
 use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
-use crate::lanes::{narrow, put};
+use crate::lanes::{narrow, put, within};
+use crate::observation::SOUND;
 use crate::orientation::SensorMask;
 use crate::reversal::{Reversal, Substitution, TickInput};
 use crate::sample::{
@@ -13,7 +14,6 @@ use crate::sample::{
 use crate::servo::{ServoTick, Transient};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
-use crate::unit::flags::{SOUND, within};
 
 /// What the substitution did, and the servo could not: counted.
 const SWITCHING: TickFlags = TickFlags::INTERPOLATED
@@ -58,17 +58,21 @@ impl Corrector {
         let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick)));
         let lost = reversal.is_some_and(|(reversal, input)| self.substitution.is_lost(reversal, &input));
 
-        let mut terms = self.thermal.gyros.at::<N>(shares);
-        // What few ticks need is given copies: lanes of which nobody has the address stay in registers.
-        if self.calm.special {
-            let mut special = terms;
-            self.special_terms(calibration, &mut special, time.seconds_from(tick.turn_on));
-            terms = special;
-        }
-        let [weight, mut bias, magnetic, meander] = terms;
-        if self.calm.modal {
+        let [mut weight, mut bias] = self.thermal.gyros.at::<N, 2>(shares);
+        if self.calm.modal | self.calm.special {
+            let mut terms = self.thermal.gyros.at::<N, 4>(shares);
+            // What few ticks need is given copies: lanes of which nobody has the address stay in registers.
+            if self.calm.special {
+                let mut special = terms;
+                self.special_terms(calibration, &mut special, time.seconds_from(tick.turn_on));
+                terms = special;
+            }
             let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
-            bias = array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+            let [_, plain, magnetic, meander] = terms;
+            (weight, bias) = (terms[0], plain);
+            if self.calm.modal {
+                bias = array::from_fn(|i| plain[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+            }
         }
         let readings: [f64; N] = *raw.readings.lanes();
         let scale =
@@ -141,15 +145,24 @@ impl Corrector {
         seen.flags = flags;
         out.gyro_flags = of_sensors(flags, count);
 
-        if reversal.is_some() | self.calm.special {
-            let mut bridged = increments;
-            out.flags |= self.substitute(reversal, &mut bridged[..count]);
-            increments = bridged;
+        match reversal {
+            Some((_, input)) if self.substitution.passes(&input) => {
+                let mut of_sensors = [f64::NAN; MAX_SENSORS];
+                put(&mut of_sensors, rates);
+                of_sensors.iter_mut().take(N).skip(count).for_each(|rate| *rate = f64::NAN);
+                self.substitution.pass(&input, of_sensors);
+            }
+            None if !self.calm.special => {}
+            _ => {
+                let mut bridged = increments;
+                out.flags |= self.substitute(reversal, &mut bridged[..count]);
+                increments = bridged;
+            }
         }
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
         }
-        if self.calm.follows.any && self.holds_back() {
+        if self.calm.follows.delays {
             let (mut held, mut counted) = (increments, usable);
             let given = self.hold_gyros_back(calibration, tick, &mut out.flags, (&mut held, &mut counted));
             (increments, usable, rates) = (held, counted, given.unwrap_or(rates));
@@ -242,7 +255,7 @@ impl Corrector {
             let watched = &watched[..orientation.sensors()];
             excluded = axes.watch(orientation, usable, watched, (&mut out.gyro_parity, &mut out.flags));
         }
-        let (angle, trusted) = axes.resolve(orientation, usable, &increments, out.end_time);
+        let (angle, trusted) = axes.resolve(orientation, usable, (&increments, None), out.end_time);
         out.delta_angle = self.slewing().map_or(angle, |slewing| {
             let copied = increments;
             slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &copied[..orientation.sensors()])
