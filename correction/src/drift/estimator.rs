@@ -244,7 +244,8 @@ impl DriftEstimator {
             Some((covered_s, open)) => {
                 let all: [f64; N] = array::from_fn(|lane| rate[lane] - bias[lane]);
                 let finite = all.iter().fold(true, |finite, residual| finite & residual.is_finite());
-                if finite & observation.settled & (*flags == SOUND) {
+                let whole = finite & observation.settled;
+                if whole && *flags == SOUND {
                     open.gain_all(covered_s, all);
                 } else {
                     (0..count).filter_map(|lane| Some((lane, residual(lane)?))).for_each(|(lane, rate)| {

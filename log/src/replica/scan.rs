@@ -126,7 +126,7 @@ struct Chunk {
 }
 
 impl Recording {
-fn open(path: &Path, journals: bool) -> io::Result<Self> {
+    fn open(path: &Path, journals: bool) -> io::Result<Self> {
         let records = RecordFile::new(File::open(path)?, BLOCK)?;
         let at = MAGIC.len() as u64;
         Ok(Self { records, at, topics: HashMap::new(), journals, chunk: None })

@@ -42,6 +42,28 @@ impl Corrector {
         }
     }
 
+    /// What the gyros drift by acceleration and rate, and those whose rate is beyond its curve.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "lanes that stay in registers")]
+    fn drift_with_motion<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        shares: Shares<'_>,
+        scale: Scale<N>,
+        readings: [f64; N],
+        duration_s: f64,
+    ) -> ([f64; N], SensorMask) {
+        let mut clamped = SensorMask::NONE;
+        let mut drift = if self.calm.follows.force { self.drift_with_force::<N>(shares) } else { [0.0; N] };
+        if self.calm.follows.rates {
+            let limits = narrow::<N>(&calibration.gyro_limits);
+            let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
+            let rates = scale.angles(within).map(|angle| angle / duration_s);
+            clamped = self.weigh_over_rate::<N>(calibration, shares, &rates, &mut drift);
+        }
+        (drift, clamped)
+    }
+
     /// Corrects the gyros' readings of a tick.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
@@ -79,14 +101,8 @@ impl Corrector {
             Scale { weight, times_s: (calibration.gyro_output == OutputKind::Mean).then_some(duration_s) };
         let mut clamped = SensorMask::NONE;
         if self.calm.follows.force | self.calm.follows.rates {
-            let mut drift =
-                if self.calm.follows.force { self.drift_with_force::<N>(shares) } else { [0.0; N] };
-            if self.calm.follows.rates {
-                let limits = narrow::<N>(&calibration.gyro_limits);
-                let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
-                let rates = scale.angles(within).map(|angle| angle / duration_s);
-                clamped = self.weigh_over_rate::<N>(calibration, shares, &rates, &mut drift);
-            }
+            let drift;
+            (drift, clamped) = self.drift_with_motion(calibration, shares, scale, readings, duration_s);
             bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
         if reversal.is_some() | self.calm.special {
@@ -137,12 +153,7 @@ impl Corrector {
         let mut rates: [f64; N] = increments.map(|increment| increment / duration_s);
         self.note_rates(sound, flags, rates);
 
-        let seen = &mut self.seen.gyros;
-        seen.count = count;
-        put(&mut seen.reading, readings);
-        put::<N>(&mut seen.rate, array::from_fn(|i| rates[i] + subtrahend[i]));
-        put(&mut seen.bias, bias);
-        seen.flags = flags;
+        self.seen.gyros.note([readings, array::from_fn(|i| rates[i] + subtrahend[i]), bias], count, flags);
         out.gyro_flags = of_sensors(flags, count);
 
         match reversal {
