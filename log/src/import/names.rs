@@ -154,8 +154,8 @@ pub(super) fn is_unit(text: &str) -> bool {
     !text.is_empty() && [Kind::Time, Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().any(known)
 }
 
-/// The unit, as the mapping spells it, and how much of it a reading of 1 is, where it is not one: of sensors, thousandths and millionths have none of
-/// their own.
+/// The unit, as the mapping spells it, and the factor from a reading to it, where that is not 1: of sensors, thousandths and millionths
+/// have no unit of their own.
 fn scaled_unit(
     kind: Kind,
     increment: bool,
@@ -283,7 +283,7 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "degc" | "c" | "celsius" => Some("deg_c"),
             "k" | "kelvin" => Some("kelvin"),
             "v" | "volt" => Some("volt"),
-            "" if !raw => None,
+            "" | "-" | "deg" if !raw => None,
             // °F and all else is for the document to convert.
             _ => Some("raw"),
         },
