@@ -167,7 +167,9 @@ fn instrument(report: &mut Report, instrument: &Instrument, tick_s: f64) {
             let scale = sensor.scale_v_per_m_per_s2[0].abs();
             report.number(&at("scale_v_per_m_per_s2"), scale, [1e-12, 1e12]);
             report.number(&at("board_ratio[0]"), ratio, [1e-3, 1e3]);
-            rest.iter().for_each(|ratio| report.number(&at("board_ratio"), *ratio, [-1e-3, 1e-3]));
+            for ratio in rest {
+                report.number(&at("board_ratio"), ratio, [-1e-3, 1e-3]);
+            }
         }
     }
     thermometers(report, instrument, tick_s);

@@ -5,7 +5,7 @@
 //! the indexes that stand behind each chunk, so that it costs little even for a long recording and works for one that was
 //! cut short.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use isotherm_protocol::key::UnitId;
 use mcap::records::{Channel, Record, op};
 
 use super::{Mark, Outline, Outlines, UnitOutline};
-use crate::error::Error;
+use crate::error::{Error, few};
 use crate::message::Topic;
 use crate::recording::walk::{Head, RecordFile};
 use crate::recording::{MAGIC, MESSAGE_ENCODING, chunk_records};
@@ -29,13 +29,36 @@ const BLOCK: usize = 1 << 13;
 /// # Errors
 /// [`Error::File`] where one cannot be opened or read. What is damaged ends the look at its file, as it ends its reading.
 pub fn scan(paths: &[PathBuf]) -> Result<Outlines, Error> {
+    Ok(look(paths, true)?.finish())
+}
+
+/// Refuses units that none of these recordings has, before they are read for what they do not hold.
+///
+/// # Errors
+/// [`Error::NoSuchUnit`], and as [`scan`].
+pub fn check_units(paths: &[PathBuf], units: &BTreeSet<UnitId>) -> Result<(), Error> {
+    if units.is_empty() {
+        return Ok(());
+    }
+    let there = look(paths, false)?.units;
+    let Some(unit) = units.iter().find(|unit| !there.contains_key(*unit)) else { return Ok(()) };
+    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+    Err(Error::NoSuchUnit {
+        recording: names.join(", "),
+        unit: unit.clone(),
+        there: few(&there.keys().map(UnitId::as_str).collect::<Vec<_>>()),
+    })
+}
+
+/// Goes through recordings; without `journals`, for the units alone.
+fn look(paths: &[PathBuf], journals: bool) -> Result<Found, Error> {
     let mut found = Found::default();
     for path in paths {
         let failed = |source| Error::file(path, "read the recording", source);
-        let mut recording = Recording::open(path).map_err(failed)?;
+        let mut recording = Recording::open(path, journals).map_err(failed)?;
         while recording.record(&mut found).map_err(failed)? {}
     }
-    Ok(found.finish())
+    Ok(found)
 }
 
 /// What has been come across.
@@ -87,6 +110,8 @@ struct Recording {
     at: u64,
     /// Topic of each channel so far; `None` for channels of something else.
     topics: HashMap<u16, Option<Topic>>,
+    /// Whether journals are read.
+    journals: bool,
     /// The last chunk, unread until it is known to hold a journal.
     chunk: Option<Chunk>,
 }
@@ -101,9 +126,10 @@ struct Chunk {
 }
 
 impl Recording {
-    fn open(path: &Path) -> io::Result<Self> {
+    fn open(path: &Path, journals: bool) -> io::Result<Self> {
         let records = RecordFile::new(File::open(path)?, BLOCK)?;
-        Ok(Self { records, at: MAGIC.len() as u64, topics: HashMap::new(), chunk: None })
+        let at = MAGIC.len() as u64;
+        Ok(Self { records, at, topics: HashMap::new(), journals, chunk: None })
     }
 
     /// Goes on by one record; `false` at the end of what can be read.
@@ -126,7 +152,7 @@ impl Recording {
                 {
                     chunk.indexed = true;
                     chunk.wanted |= match self.topics.get(&u16::from_le_bytes(*id)) {
-                        Some(topic) => matches!(topic, Some(Topic::Journal(_))),
+                        Some(topic) => self.journals && matches!(topic, Some(Topic::Journal(_))),
                         None => true,
                     };
                 }
@@ -164,7 +190,9 @@ impl Recording {
                 self.topics.insert(*id, topic);
             }
             Record::Message { header, data } => {
-                if let Some(Some(Topic::Journal(unit))) = self.topics.get(&header.channel_id) {
+                if let Some(Some(Topic::Journal(unit))) = self.topics.get(&header.channel_id)
+                    && self.journals
+                {
                     found.journal(unit, header.log_time, data);
                 }
             }

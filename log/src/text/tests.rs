@@ -164,7 +164,7 @@ fn date_times_are_stamps_to_the_nanosecond() {
     assert_eq!(found[1].1 - found[0].1, 11);
     assert_eq!(found[1].2, 11, "measured");
     let fault = error(&mapping("delimiter = \"semicolon\"", time), b"23.11.2026 14:05;1;2;20\n");
-    assert!(matches!(fault.reason, Reason::NotADateTime), "{fault}");
+    assert!(matches!(fault.reason, Reason::NotADateTime { .. }), "{fault}");
     let text = "version = 1\n[[file]]\ndelimiter = \"comma\"\n[file.time]\ntick_ms = 1\n[file.gyro]\noutput = \"counts\"\n\
                 sensors = [{ column = 2 }]\nduration_column = 1\nduration_unit = \"iso\"\n";
     let problems = Mapping::parse(text, "m.toml").unwrap_err();
@@ -347,9 +347,9 @@ fn a_column_is_one_sensors_alone() {
     let twice = mapping("delimiter = \"comma\"", STAMPS);
     for (column, as_well) in [(1, "gyro 2"), (3, "temperature channel \"case\""), (0, "time")] {
         let mut wrong = twice.clone();
-        wrong.files[0].gyro.as_mut().unwrap().ticks.sensors[0].column = Column::Index(column);
+        wrong.files[0].gyro.as_mut().unwrap().ticks.sensors[0].column = Some(Column::Index(column));
         if column == 1 {
-            wrong.files[0].gyro.as_mut().unwrap().ticks.sensors[1].column = Column::Index(1);
+            wrong.files[0].gyro.as_mut().unwrap().ticks.sensors[1].column = Some(Column::Index(1));
         }
         let fault = error(&wrong, b"10,1,7,20\n");
         let Reason::ColumnTwice { column: found, first, second } = &fault.reason else { panic!("{fault}") };

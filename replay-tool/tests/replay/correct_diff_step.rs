@@ -220,7 +220,6 @@ fn what_does_not_go_together_is_refused() {
             vec!["correct", "raw.mcap", "--calibration", "mems.toml", "--calibration", "mems.toml"],
             "given twice for unit MEMS-0001",
         ),
-        (vec!["correct", "raw.mcap", "--unit", "X-1", "--calibration", "mems.toml"], "nothing of this unit"),
         (vec!["correct", "raw.mcap", "--mapping", "mems.mapping.toml"], "is for text logs"),
         (
             vec!["correct", "raw.mcap", "--calibration", "mems.toml", "--out", "raw.mcap"],

@@ -39,7 +39,7 @@ fn all_errors_are_told_at_once() {
 fn each_broken_key_is_told() {
     type Break = fn(&mut Scenario);
     let cases: [(&str, Break); 8] = [
-        ("no sensors", |s| s.instrument.gyros = crate::instrument::Gyros::Mems(Vec::new())),
+        ("no sensors", |s| s.instrument.gyros = Gyros::Mems(Vec::new())),
         ("plane", |s| s.instrument.gyro_orientation.rows[2] = [0.6, 0.8, 0.0]),
         ("thermal step", |s| s.instrument.thermal_step_s = 0.0),
         ("ramp", |s| s.chamber.segments.push(Segment::Ramp { to_deg_c: 0.0, rate_deg_c_per_min: -1.0 })),

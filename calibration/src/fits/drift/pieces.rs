@@ -241,8 +241,8 @@ fn cut(column: Vec<f64>, gaps: &[Gap], bridge: bool) -> Vec<Piece> {
     pieces
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
+#[cfg(test)]
 mod tests {
     use super::super::columns::Kind;
     use super::*;

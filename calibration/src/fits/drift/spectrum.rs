@@ -133,8 +133,8 @@ impl Spectrum {
     }
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -127,8 +127,8 @@ impl Ins {
     }
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
+#[cfg(test)]
 mod tests {
     use isotherm_correction::units::AngularRate;
 

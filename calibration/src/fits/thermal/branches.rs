@@ -204,8 +204,8 @@ fn between_turns(temperature: &[f64], stands_out: f64) -> Vec<[usize; 2]> {
     ends.windows(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "small numbers")]
+#[cfg(test)]
 mod tests {
     use super::*;
 

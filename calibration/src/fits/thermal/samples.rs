@@ -163,8 +163,8 @@ fn by_sensor(patterns: &[[&[f64]; 3]], count: usize) -> Vec<Vec<f64>> {
     sensors
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "small numbers")]
+#[cfg(test)]
 mod tests {
     use super::*;
 

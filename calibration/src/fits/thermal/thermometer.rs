@@ -189,8 +189,8 @@ fn reach(bins: &[Bin], at: usize, half_width_s: f64, forwards: bool) -> usize {
     }
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "small numbers")]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -151,8 +151,8 @@ impl Mixture {
     }
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
+#[cfg(test)]
 mod tests {
     use super::*;
 

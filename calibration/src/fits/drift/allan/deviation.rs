@@ -143,8 +143,8 @@ pub fn lengths(ticks: usize) -> Vec<usize> {
     std::iter::successors(Some(1), |m| Some(2 * m)).take_while(|m| 3 * m <= ticks).collect()
 }
 
-#[cfg(test)]
 #[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
+#[cfg(test)]
 mod tests {
     use super::*;
 
