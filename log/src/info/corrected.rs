@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{SensorFlags, TickFlags};
 use isotherm_correction::sigma::Causes;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use serde::Serialize;
+
+use crate::offline::sums::FlagCounts;
 
 /// Most revisions and channels that are told one by one.
 const MAX_LISTED: usize = 1024;
@@ -99,8 +100,7 @@ pub struct CorrectedInfo {
 pub(super) struct CorrectedSurvey {
     info: CorrectedInfo,
     revision: Option<Revision>,
-    flags: [u64; 16],
-    sensor_flags: [u64; 8],
+    flags: FlagCounts,
 }
 
 impl CorrectedSurvey {
@@ -123,10 +123,7 @@ impl CorrectedSurvey {
             info.gaps += u64::from(tick.missed > 0);
             info.missed_ticks = info.missed_ticks.saturating_add(tick.missed);
             info.longest_gap_ticks = info.longest_gap_ticks.max(tick.missed);
-            count(&mut self.flags, tick.flags.bits());
-            let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
-            let any = sensors.fold(0, |bits, flags| bits | flags.bits()) & !SensorFlags::VALID.bits();
-            count(&mut self.sensor_flags, u16::from(any));
+            self.flags.add(tick);
             if let Some(sigma) = tick.sigma.as_deref() {
                 info.angle_sigma_rad.get_or_insert_default().take(&sigma.angle);
                 info.velocity_sigma_m_per_s.get_or_insert_default().take(&sigma.velocity);
@@ -149,29 +146,9 @@ impl CorrectedSurvey {
 
     pub(super) fn finish(self) -> Option<CorrectedInfo> {
         let mut info = self.info;
-        let flags = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits()));
-        info.flags = named(flags, &self.flags);
-        let flags = SensorFlags::all().iter_names().map(|(name, flag)| (name, u16::from(flag.bits())));
-        info.sensor_flags = named(flags, &self.sensor_flags);
+        [info.flags, info.sensor_flags] = self.flags.named();
         let sigmas = [&mut info.angle_sigma_rad, &mut info.velocity_sigma_m_per_s];
         sigmas.into_iter().flatten().for_each(SigmaInfo::finish);
         (info.outputs > 0).then_some(info)
     }
-}
-
-/// Counts the bits that are set.
-fn count(counts: &mut [u64], bits: u16) {
-    let mut rest = bits;
-    while rest != 0 {
-        if let Some(count) = counts.get_mut(rest.trailing_zeros() as usize) {
-            *count += 1;
-        }
-        rest &= rest - 1;
-    }
-}
-
-/// Counts by the names of their bits, those that occurred.
-fn named(flags: impl Iterator<Item = (&'static str, u16)>, counts: &[u64]) -> BTreeMap<&'static str, u64> {
-    let counted = flags.filter_map(|(name, bits)| Some((name, *counts.get(bits.trailing_zeros() as usize)?)));
-    counted.filter(|(_, count)| *count > 0).collect()
 }

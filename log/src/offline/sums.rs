@@ -23,10 +23,40 @@ pub struct Sums {
     angle_rad: [f64; 3],
     /// Velocity gained (m/s).
     velocity_m_per_s: [f64; 3],
-    /// Outputs with each flag, by its bit.
-    flags: [u64; 16],
-    /// Outputs in which any sensor has a flag, by its bit.
-    sensor_flags: [u64; 8],
+    flags: FlagCounts,
+}
+
+/// Outputs by their flags.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FlagCounts {
+    /// With each flag, by its bit.
+    ticks: [u64; 16],
+    /// In which any sensor has a flag other than `VALID`, by its bit.
+    sensors: [u64; 8],
+}
+
+impl FlagCounts {
+    /// Counts one output.
+    pub(crate) fn add(&mut self, tick: &CorrectedTick) {
+        count_bits(&mut self.ticks, tick.flags.bits());
+        let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
+        let bits = sensors.fold(0, |bits, flags| bits | (*flags - SensorFlags::VALID).bits());
+        count_bits(&mut self.sensors, bits.into());
+    }
+
+    /// By name, those that occurred: flags of outputs, and of sensors.
+    pub(crate) fn named(&self) -> [BTreeMap<&'static str, u64>; 2] {
+        let ticks = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
+        let sensors =
+            SensorFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
+        [occurred(ticks, &self.ticks), occurred(sensors, &self.sensors)]
+    }
+}
+
+/// Counts by the names of their bits, those that occurred.
+fn occurred(bits: impl Iterator<Item = (&'static str, u32)>, counts: &[u64]) -> BTreeMap<&'static str, u64> {
+    let counted = bits.filter_map(|(name, bit)| Some((name, *counts.get(bit as usize)?)));
+    counted.filter(|(_, count)| *count > 0).collect()
 }
 
 /// What the sums come to.
@@ -76,10 +106,7 @@ impl Sums {
         for (sum, delta) in self.velocity_m_per_s.iter_mut().zip(tick.delta_velocity) {
             *sum += delta;
         }
-        count_bits(&mut self.flags, tick.flags.bits());
-        let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
-        let bits = sensors.fold(0, |bits, flags| bits | (*flags - SensorFlags::VALID).bits());
-        count_bits(&mut self.sensor_flags, bits.into());
+        self.flags.add(tick);
     }
 
     /// Raw ticks so far.
@@ -93,14 +120,7 @@ impl Sums {
     pub fn summary(&self) -> Summary {
         let duration_s = Span::from_ns(self.duration_ns).as_s();
         let mean = |sum: f64| if duration_s > 0.0 { sum / duration_s } else { 0.0 };
-        let named = TickFlags::all().iter_names().filter_map(|(name, flag)| {
-            let count = *self.flags.get(flag.bits().trailing_zeros() as usize)?;
-            (count > 0).then_some((name, count))
-        });
-        let sensors = SensorFlags::all().iter_names().filter_map(|(name, flag)| {
-            let count = *self.sensor_flags.get(flag.bits().trailing_zeros() as usize)?;
-            (count > 0).then_some((name, count))
-        });
+        let [flags, sensor_flags] = self.flags.named();
         Summary {
             ticks: self.ticks,
             outputs: self.outputs,
@@ -111,8 +131,8 @@ impl Sums {
                 .angle_rad
                 .map(|sum| AngularRate::from_rad_per_s(mean(sum)).as_deg_per_h()),
             mean_specific_force_m_per_s2: self.velocity_m_per_s.map(mean),
-            flags: named.collect(),
-            sensor_flags: sensors.collect(),
+            flags,
+            sensor_flags,
         }
     }
 }
