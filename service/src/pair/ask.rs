@@ -192,7 +192,12 @@ impl Asker {
 
     /// Has histories and documents written down here too: what came since it was done last.
     async fn records(&self, unit: Option<UnitId>, copied: &mut Copied) {
-        copied.of(self.pair.others());
+        let others = self.pair.others();
+        if others.is_empty() {
+            // When one comes, all is asked for.
+            return;
+        }
+        copied.of(others);
         let selector = unit.as_ref().map_or(key::ALL_HISTORY.to_owned(), key::history);
         let after = copied.after(unit.as_ref());
         let samples = self.ask(&format!("{selector}?limit={ENTRIES};after={after}")).await;
