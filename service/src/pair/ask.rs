@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use isotherm_bus::inquiry::{ask_all, ask_each};
+use isotherm_bus::inquiry::{ask_all, ask_each, pair_reports};
 use isotherm_protocol::codec;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::journal::{Joiner, JournalPart};
 use isotherm_protocol::key::{self, UnitId};
-use isotherm_protocol::pair::{Member, PairReport, Role};
+use isotherm_protocol::pair::{Member, Role};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
@@ -145,11 +145,12 @@ impl Asker {
 
     /// Units that others speak for.
     async fn spoken(&self) -> BTreeSet<UnitId> {
-        let answers = self.ask(key::ALL_PAIRS).await;
-        let reports = answers
-            .iter()
-            .filter_map(|sample| serde_json::from_slice::<PairReport>(&sample.payload().to_bytes()).ok());
-        let units = reports.flat_map(|report| report.units).filter(|unit| unit.role == Role::Speaking);
+        let reports = pair_reports(&self.session, LIMIT).await.unwrap_or_else(|error| {
+            tracing::warn!("{error}");
+            Vec::new()
+        });
+        let others = reports.into_iter().filter(|report| report.member.instance != self.pair.me().instance);
+        let units = others.flat_map(|report| report.units).filter(|unit| unit.role == Role::Speaking);
         units.filter_map(|unit| UnitId::new(&unit.unit).ok()).collect()
     }
 
