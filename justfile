@@ -49,7 +49,7 @@ pair:
     cargo test --release --workspace --locked --test operators pair:: -- --include-ignored --skip soak --nocapture --test-threads=1
 
 # Half an hour with 20 units at 200 Hz, swaps, commands, failovers and watchers, and a day of ticks at full speed; prints what grows
-# (ISOTHERM_SOAK=MINUTES)
+# (ISOTHERM_SOAK=MINUTES,UNITS,SECONDS_BETWEEN_FAILOVERS)
 soak:
     cargo test --release --workspace --locked --test operators pair::soak:: -- --ignored --nocapture --test-threads=1
 
