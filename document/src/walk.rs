@@ -235,7 +235,8 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
                 (low, usize::MAX) => format!("{low} or more"),
                 (low, high) => format!("{low} to {high}"),
             };
-            let message = format!("has {} entries, must have {must_have}", array.len());
+            let entries = if array.len() == 1 { "entry" } else { "entries" };
+            let message = format!("has {} {entries}, must have {must_have}", array.len());
             self.reader.report_at(value.span().start, path, message);
             self.reader.damage(path);
         }

@@ -161,8 +161,12 @@ impl Question {
             None => Err(format!("must be one of {}", words.join(", "))),
         };
         match self {
-            Self::Columns { .. } => {
-                hints.columns = text.split(',').map(|name| name.trim().to_owned()).collect();
+            Self::Columns { width, .. } => {
+                let columns: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
+                if !columns.iter().any(|column| names::is_gyro(column)) {
+                    return Err(format!("names no gyro; name the log's {width} columns in order"));
+                }
+                hints.columns = columns;
             }
             Self::GyroUnit { .. } => hints.gyro_unit = one_of(&GYRO_UNITS)?,
             Self::AccelUnit { .. } => hints.accel_unit = one_of(&ACCEL_UNITS)?,
@@ -181,7 +185,10 @@ impl fmt::Display for Question {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Columns { file, width, rows } => {
-                write!(f, "{file}: which of the {width} columns are the gyros and the time? ")?;
+                write!(
+                    f,
+                    "{file}: which of the {width} columns are gyros, accelerometers, temperatures and the time? "
+                )?;
                 write!(f, "The first rows: {}", rows.join(" ⏎ "))
             }
             Self::GyroUnit { columns, largest } => {

@@ -21,7 +21,7 @@ use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
 use isotherm_protocol::document::{Document, Problem};
 use isotherm_protocol::key::{RawStream, UnitId};
-use isotherm_protocol::stream::UnitStream;
+use isotherm_protocol::stream::{UnitStream, unfit};
 
 pub use parallel::{Made, RunOptions, correct};
 pub use unit::{Basis, Form, Output, UnitPlan, UnitReport};
@@ -155,11 +155,10 @@ impl Offline {
                 "{value} temperature readings are of channels that the calibration does not have; it has: {}",
                 if channels.is_empty() { "none".to_owned() } else { channels.join(", ") }
             ),
-            "wrong_sensor_count" => {
-                format!("{value} ticks refused: another number of sensors than the calibration has")
-            }
-            "wrong_output_kind" => {
-                format!("{value} ticks refused: counts where the calibration has means, or the reverse")
+            name if unfit::COUNTERS.contains(&name) => {
+                let calibration = self.stream.unit().calibration();
+                let why = calibration.and_then(|(calibration, _)| unfit::words(name, calibration));
+                format!("{value} ticks of gyros and accelerometers refused: {}", why.unwrap_or_default())
             }
             "not_finite_readings" => format!("{value} sensor readings are not numbers"),
             "overrange_readings" => format!("{value} sensor readings are at or beyond the input range"),

@@ -59,7 +59,7 @@ pub enum ConsoleError {
         tried: String,
     },
     /// The service is there, the unit is not.
-    #[error("the service knows no unit {unit}; it has {}", known(units))]
+    #[error("the service has heard no unit {unit}; it has heard {}", known(units))]
     NoUnit {
         /// The serial asked for.
         unit: String,

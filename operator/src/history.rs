@@ -148,7 +148,7 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
 /// When it took effect and what changed, short.
 fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
     let mut words = match changed {
-        [] => "first document, or no entry changed".to_owned(),
+        [] => "no entry changed, or the first document".to_owned(),
         [one] => one.clone(),
         [first, rest @ ..] => format!("{first}, and {} more", rest.len()),
     };

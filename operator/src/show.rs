@@ -53,14 +53,20 @@ pub(super) fn schedule(schedule: Schedule, slew_s: f64) -> String {
     words
 }
 
+/// Entries of a document that are shown of those that change.
+const MOST_CHANGES: usize = 24;
+
 /// A difference: entries of the document line by line, and a table of what comes of them.
 pub(super) fn difference(difference: &Difference) -> String {
     let mut text = String::new();
     if difference.document.is_empty() {
         text.push_str("No entry of the document differs.\n");
     }
-    for change in &difference.document {
+    for change in difference.document.iter().take(MOST_CHANGES) {
         let _ = writeln!(text, "  {}", change.words());
+    }
+    if let Some(more) = difference.document.len().checked_sub(MOST_CHANGES).filter(|more| *more > 0) {
+        let _ = writeln!(text, "  … and {more} more: --json");
     }
     if difference.temperatures.is_empty() {
         text.push_str("The unit's temperatures are not known yet, so the effect is unknown.");
@@ -68,7 +74,7 @@ pub(super) fn difference(difference: &Difference) -> String {
         text.push_str("The correction at the present temperatures does not change.");
     } else {
         let rows = difference.correction.iter().map(correction_row);
-        let header = ["correction", "before", "after", "change", "unit"];
+        let header = ["subtracted", "before", "after", "change", "unit"];
         let _ = write!(text, "\n{}", table(header, rows.collect(), 1));
     }
     if !difference.temperatures.is_empty() {

@@ -30,7 +30,7 @@ Examples:
 
 One line per unit, or everything about one unit. On a narrow terminal the least important columns are left out.
 Columns:
-  ●  running    ○  not running    ▲  warning    !  fault in the last minute
+  ●  running    ○  not running    ▲  warning    !  fault now
   state    \"running ±\" with, \"running\" without reversal of the lasing mode
   rev      revision of the calibration in force; cal. age: time since its document was made
   °C       temperature and its rate, of the first channel that is stale or outside its range, else of the first
@@ -197,7 +197,7 @@ mod tests {
             error
         };
         let error = refused(&mut report, "ZLG-9999");
-        assert!(error.contains("no unit ZLG-9999; it has ZLG-0001, ZLG-0002"), "{error}");
+        assert!(error.contains("no unit ZLG-9999; it has heard ZLG-0001, ZLG-0002"), "{error}");
         let error = refused(&mut report, "ZLG-0002");
         assert!(error.contains("did not answer"), "its service has it: {error}");
         select(&mut report, &serial("ZLG-0003"), "here").unwrap();

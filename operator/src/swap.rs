@@ -179,18 +179,18 @@ async fn change(
     Ok(result(&reply, consent.json))
 }
 
-/// Says on stderr what a reply holds beside its outcome.
+/// Says on stderr what a reply holds beside its outcome: what is to be done last, where it is read.
 fn tell(reply: &SwapReply, name: Option<&str>) {
+    if let Some(difference) = &reply.difference
+        && reply.outcome != SwapOutcome::Unchanged
+    {
+        say_lines(show::difference(difference));
+    }
     for problem in &reply.problems {
         say(show::problem(problem, name));
     }
     for warning in &reply.warnings {
         say(format_args!("{} (warning)", show::problem(warning, name)));
-    }
-    if let Some(difference) = &reply.difference
-        && reply.outcome != SwapOutcome::Unchanged
-    {
-        say_lines(show::difference(difference));
     }
 }
 
@@ -251,9 +251,7 @@ async fn wait(follow: &mut Follow, reply: &SwapReply, timeout: std::time::Durati
     let revision = reply.revision;
     let seen = follow.until(timeout, |status| {
         if status.revision().counter >= revision {
-            let tick =
-                status.last_tick.map_or_else(String::new, |tick| format!(", last tick {}", tick.sequence));
-            return Some(format!("revision {} is in force{tick}", status.revision().counter));
+            return Some(format!("revision {} is in force", status.revision().counter));
         }
         let pending = status.pending.as_ref().filter(|pending| pending.revision.counter == revision)?;
         Some(format!("revision {revision} waits: {}", show::schedule(pending.schedule, pending.slew_s)))

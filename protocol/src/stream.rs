@@ -12,6 +12,7 @@ mod revisions;
 mod status;
 #[cfg(test)]
 mod tests;
+pub mod unfit;
 
 use std::cell::RefCell;
 use std::sync::Arc;

@@ -39,6 +39,12 @@ pub enum Error {
         /// What was waited for, and what else could be done.
         words: String,
     },
+    /// Nothing comes back of what is played.
+    #[error("{words}")]
+    Silent {
+        /// Of which unit, and why.
+        words: String,
+    },
     /// A log without a message to play.
     #[error(
         "nothing was played: there is no raw message of these units, topics and times; `isotherm-replay list LOG` shows what there is"

@@ -166,7 +166,12 @@ async fn run<W: Watch>(
     let under_way = player.under_way();
     tokio::select! {
         biased;
-        ended = player.run() => ended,
+        ended = player.run() => match ended {
+            Err(Error::Bus(BusError::NoAcknowledgement { unit, in_flight, waited, .. })) => {
+                Err(Error::Silent { words: silence::explained(session, &unit, in_flight, waited).await })
+            }
+            ended => ended,
+        },
         () = service.gone() => {
             Err(BusError::ServiceGone { tried: tried.to_owned() }.into())
         }

@@ -40,9 +40,9 @@ pub enum ServiceError {
     },
     /// The folder of calibration documents cannot be read, and there is nothing to go on with.
     #[error(
-        "the folder of calibrations {path} cannot be read: {source}; create it, or correct `calibrations` (`state` \
-         has no last good set, or strict_start is set)",
-        path = path.display()
+        "the folder of calibrations {path} cannot be read: {source}; {} (--calibration, or `calibrations` in the \
+         configuration; `state` has no last good set, or strict_start is set)",
+        to_do(source), path = path.display()
     )]
     NoCalibrations {
         /// The folder.
@@ -62,7 +62,7 @@ pub enum ServiceError {
         source: std::io::Error,
     },
     /// The token of the console in the browser cannot be had.
-    #[error("the token of the console in the browser, {path}: {source}", path = path.display())]
+    #[error("the console's token {path} cannot be read: {source}", path = path.display())]
     Token {
         /// Its file.
         path: PathBuf,
@@ -116,6 +116,16 @@ impl ServiceError {
             Self::Bus(error) => Exit::blaming(error.is_usage(), error.is_configuration()),
             _ => Exit::Failed,
         }
+    }
+}
+
+/// What to do about a folder that cannot be read.
+fn to_do(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "create it, or name another",
+        std::io::ErrorKind::NotADirectory => "name the folder, not a file",
+        std::io::ErrorKind::PermissionDenied => "let the service's user read it",
+        _ => "name another",
     }
 }
 

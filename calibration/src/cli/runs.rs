@@ -177,7 +177,8 @@ impl Reading {
                 folder.display()
             ),
             None => format!(
-                "{} is not a recording, and a text log needs --mapping FILE: examples are in config/mappings",
+                "{} is not a recording, and a text log needs --mapping FILE: make one with `isotherm-replay import {}`",
+                names(logs),
                 names(logs)
             ),
         }))

@@ -222,7 +222,7 @@ fn read_rows(lines: &mut impl BufRead, line: &mut u64) -> io::Result<Vec<LogTick
 /// The next frame behind its length.
 fn read_frame(bytes: &mut impl BufRead, frame: &mut Vec<u8>) -> io::Result<Option<CorrectedBatch>> {
     let other =
-        |words: String| io::Error::other(format!("{words}: is it a corrected log (MCAP, CSV or wire)?"));
+        |words: String| io::Error::other(format!("{words}: it is no corrected log (MCAP, CSV or wire)"));
     if bytes.fill_buf()?.is_empty() {
         return Ok(None);
     }

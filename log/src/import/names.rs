@@ -32,7 +32,7 @@ pub(super) struct Meaning {
     pub(super) rank: u8,
 }
 
-/// The name before its unit, and the unit in brackets at its end. A bracket with a number is an index.
+/// The name before its unit, and the unit at its end: in brackets, or after a slash between spaces. A bracket with a number is an index.
 fn bracketed(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -43,8 +43,11 @@ fn bracketed(name: &str) -> (&str, Option<&str>) {
             return (head.trim(), Some(tail.trim()));
         }
     }
-    (name, None)
+    name.split_once(" / ").map_or((name, None), |(head, tail)| (head.trim(), Some(tail.trim())))
 }
+
+/// Added to the rank of what is known by its unit alone.
+const BY_UNIT: u8 = 32;
 
 const GYROS: [&str; 9] = ["gyro", "gyr", "gyros", "gyroscope", "omega", "w", "g", "angrate", "rate"];
 /// Those that say enough without an axis.
@@ -81,14 +84,18 @@ const OTHERS: [&str; 22] = [
 pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     let (bare, own) = bracketed(name);
     let mut parts = parts(bare);
-    let axis = take_axis(&mut parts);
+    let stated =
+        own.or(of_row.map(|text| text.trim_matches(['(', ')', '[', ']']))).filter(|text| !text.is_empty());
+    let by_unit = kind_of_unit(stated);
+    let axis = take_axis(&mut parts, matches!(by_unit, Some(Kind::Gyro | Kind::Accel)));
     let has = |words: &[&str]| parts.iter().any(|part| words.contains(&part.as_str()));
     let pair = |first: &str, second: &str| {
         parts.windows(2).any(|pair| pair[0] == first && pair[1].starts_with(second))
     };
-    let stated =
-        own.or(of_row.map(|text| text.trim_matches(['(', ')', '[', ']']))).filter(|text| !text.is_empty());
-    let temperature = parts.iter().any(|part| part.starts_with("temp") || part.starts_with("thermo"));
+    let temperature = parts.iter().any(|part| part.starts_with("temp") || part.starts_with("thermo"))
+        || axis.is_none()
+            && (by_unit == Some(Kind::Temperature)
+                || matches!(parts.as_slice(), [_, .., last] if last == "degc"));
     let angle = pair("delta", "angle")
         || pair("d", "theta")
         || has(&["dtheta", "deltang", "dang", "deltaangle"])
@@ -110,10 +117,15 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         (Kind::Gyro, true)
     } else if velocity && axis.is_some() {
         (Kind::Accel, true)
+    } else if axis.is_some() && has(&ACCELS) && parts.last().is_some_and(|last| last == "g") {
+        // The last part is the unit.
+        (Kind::Accel, false)
     } else if axis.is_some() && (has(&GYROS) || has(&["angular"]) && has(&["vel", "velocity"])) {
         (Kind::Gyro, false)
     } else if axis.is_some() && has(&ACCELS) || axis.is_some() && pair("specific", "force") {
         (Kind::Accel, false)
+    } else if let (Some(kind @ (Kind::Gyro | Kind::Accel)), Some(_)) = (by_unit, axis) {
+        (kind, false)
     } else if axis.is_some() {
         return None;
     } else if parts.iter().any(|part| {
@@ -136,6 +148,12 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     };
     let (unit, scale) = scaled_unit(kind, increment, stated, &parts);
     let mut rank = u8::from(unit.is_none()) * 4;
+    let known = match kind {
+        Kind::Gyro => increment || has(&GYROS) || has(&["angular"]),
+        Kind::Accel => increment || has(&ACCELS) || pair("specific", "force"),
+        _ => true,
+    };
+    rank += u8::from(!known) * BY_UNIT;
     rank += u8::from(has(&["raw", "lsb"])) * 8 + u8::from(has(&["linear"])) * 2 + u8::from(increment) * 2;
     if kind == Kind::Time {
         // Of several clocks: the sensor's own, then any, then those of weeks and of the computer that wrote.
@@ -146,6 +164,25 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     let stem = parts.join(" ");
     let axis = axis.filter(|_| kind != Kind::Time);
     Some(Meaning { kind, axis, stem, increment, unit, scale, rank })
+}
+
+/// The quantity that is measured in a unit of angular rate, specific force or temperature.
+pub(super) fn kind_of_unit(stated: Option<&str>) -> Option<Kind> {
+    let is = |kind: &Kind| match scaled_unit(*kind, false, Some(stated?), &[]).0? {
+        "deg_per_s" | "rad_per_s" | "deg_per_h" | "m_per_s2" | "g" | "mg" | "deg_c" | "kelvin" => Some(()),
+        _ => None,
+    };
+    [Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().find(|kind| is(kind).is_some())
+}
+
+/// Whether a column is a gyro's, by its name.
+pub(super) fn is_gyro(name: &str) -> bool {
+    meaning(name, None).is_some_and(|meaning| meaning.kind == Kind::Gyro)
+}
+
+/// The quantity by the unit that a column's name states.
+pub(super) fn kind_by_unit(name: &str, of_row: Option<&str>) -> Option<Kind> {
+    kind_of_unit(bracketed(name).1.or(of_row))
 }
 
 /// Whether a cell is a unit of measure, and nothing else.
@@ -173,10 +210,11 @@ fn scaled_unit(
     scaled.unwrap_or((plain, None))
 }
 
-/// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word.
-fn take_axis(parts: &mut Vec<String>) -> Option<usize> {
+/// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word, or the second of two where
+/// the unit is one `of_sensors`.
+fn take_axis(parts: &mut Vec<String>, of_sensors: bool) -> Option<usize> {
     let letter = |text: &str| ["x", "y", "z"].iter().position(|axis| *axis == text);
-    if parts.iter().any(|part| part == "rate")
+    if parts.iter().any(|part| part == "rate" || part == "gyro")
         && let Some(at) = parts.iter().position(|part| ["roll", "pitch", "yaw"].contains(&part.as_str()))
     {
         let name = parts.remove(at);
@@ -196,6 +234,7 @@ fn take_axis(parts: &mut Vec<String>) -> Option<usize> {
         if letter(end).is_some()
             && (GYROS.contains(&stem)
                 || ACCELS.contains(&stem)
+                || of_sensors && stem.chars().count() == 1
                 || ["dtheta", "dvel", "deltang"].contains(&stem))
         {
             let axis = letter(end);
@@ -264,6 +303,7 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "v" | "volt" => Some("volt"),
             "counts" => Some("counts"),
             _ if raw => Some("raw"),
+            "" if parts.len() > 1 && parts.last().is_some_and(|last| last == "g") => Some("g"),
             "" if has("ms") || parts.windows(2).any(|pair| pair[0] == "m" && pair[1] == "s") => {
                 Some("m_per_s2")
             }
@@ -283,6 +323,7 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "degc" | "c" | "celsius" => Some("deg_c"),
             "k" | "kelvin" => Some("kelvin"),
             "v" | "volt" => Some("volt"),
+            "" if has("degc") => Some("deg_c"),
             "" | "-" | "deg" if !raw => None,
             // °F and all else is for the document to convert.
             _ => Some("raw"),
@@ -299,7 +340,19 @@ mod tests {
     #[test]
     fn names_of_many_makers_say_what_they_hold() {
         type Case = (&'static str, Option<&'static str>, Option<(Kind, Option<usize>, Option<&'static str>)>);
-        let cases: [Case; 60] = [
+        let cases: [Case; 72] = [
+            ("nx(g)", None, Some((Accel, Some(0), Some("g")))),
+            ("wz(dps)", None, Some((Gyro, Some(2), Some("deg_per_s")))),
+            ("tboard (°C)", None, Some((Temperature, None, Some("deg_c")))),
+            ("fx_g", None, Some((Accel, Some(0), Some("g")))),
+            ("omega_y_dps", None, Some((Gyro, Some(1), Some("deg_per_s")))),
+            ("T_case_degC", None, Some((Temperature, None, Some("deg_c")))),
+            ("Acceleration Z / g", None, Some((Accel, Some(2), Some("g")))),
+            ("Temperature / °C", None, Some((Temperature, None, Some("deg_c")))),
+            ("Drehrate Nick [°/s]", None, Some((Gyro, Some(1), Some("deg_per_s")))),
+            ("Beschl. längs [g]", None, None),
+            ("max [g]", None, None),
+            ("Vbat (V)", None, None),
             ("Drehrate X [°/s]", None, Some((Gyro, Some(0), Some("deg_per_s")))),
             ("Drehraten_z [Grad/s]", None, Some((Gyro, Some(2), Some("deg_per_s")))),
             ("Drehrate", None, Some((Gyro, None, None))),

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::clock::{UNITS_NS, rate_in, unit_of};
 use super::figures::{Figures, usual_size};
 use super::layout::{self, Found};
-use super::names::{Kind, Meaning, meaning};
+use super::names::{Kind, Meaning, kind_by_unit, meaning};
 use super::written::{FileText, Sensors, Temperature, Time, name_line};
 use super::{Hints, Proposal, Question, STAMP_UNITS, refuse};
 use crate::error::Error;
@@ -127,6 +127,9 @@ impl<'a> File<'a> {
             sensors.push(Sensors { kind, columns, unit, scale, counter, may_be_empty });
         }
         let temperatures = self.temperatures(&meanings, proposal);
+        let of_sensors = sensors.iter().flat_map(|it| it.columns).flatten();
+        let used = of_sensors.chain(temperatures.iter().map(|it| it.column)).chain(counter).chain(time.date);
+        self.unused(&used.chain(time.column).collect::<Vec<_>>(), &sensors, proposal);
         let name = named.then(|| self.name.to_owned());
         FileText {
             name,
@@ -135,6 +138,36 @@ impl<'a> File<'a> {
             time,
             sensors,
             temperatures,
+        }
+    }
+
+    /// Notes which columns with numbers are not used, and asks where one states a sensor's unit and such sensors lack.
+    fn unused(self, used: &[usize], sensors: &[Sensors], proposal: &mut Proposal) {
+        let given = &self.hints.columns;
+        let names = if given.is_empty() { self.found.header.as_deref().unwrap_or_default() } else { given };
+        let numbers = |index: usize| self.figures.columns.get(index).is_some_and(|column| column.numbers > 0);
+        let left: Vec<_> = (0..names.len().min(self.found.width))
+            .filter(|index| !used.contains(index) && numbers(*index) && names[*index] != "-")
+            .collect();
+        if left.is_empty() {
+            return;
+        }
+        proposal.notes.push(format!("not used: {}", self.listed(&left)));
+        let lacks = |kind: &str| {
+            let found = sensors.iter().find(|sensors| sensors.kind == kind);
+            found.is_none_or(|sensors| sensors.columns.iter().any(Option::is_none))
+        };
+        let asked = proposal.open.iter().any(|open| matches!(open, Question::Columns { .. }));
+        let is_sensor = |index: &usize| {
+            let row = self.found.units.get(*index).map(String::as_str).filter(|_| given.is_empty());
+            match kind_by_unit(&names[*index], row) {
+                Some(Kind::Gyro) => lacks("gyro"),
+                Some(Kind::Accel) => lacks("accel"),
+                _ => false,
+            }
+        };
+        if given.is_empty() && !asked && left.iter().any(is_sensor) {
+            proposal.open.push(self.ask_columns());
         }
     }
 

@@ -1,7 +1,7 @@
 //! Names of columns as words.
 
 /// How words of other languages begin, and what they are here.
-const WORDS: [(&str, &str); 40] = [
+const WORDS: [(&str, &str); 42] = [
     ("drehrate", "gyro"),
     ("drehgeschw", "gyro"),
     ("winkelgeschw", "gyro"),
@@ -12,6 +12,8 @@ const WORDS: [(&str, &str); 40] = [
     ("rollrate", "gyrox"),
     ("nickrate", "gyroy"),
     ("gierrate", "gyroz"),
+    ("nick", "pitch"),
+    ("gier", "yaw"),
     ("beschl", "acceleration"),
     ("accélér", "acceleration"),
     ("accelerazion", "acceleration"),

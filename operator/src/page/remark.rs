@@ -204,7 +204,7 @@ fn work(status: &Status, add: &mut impl FnMut(Level, String)) {
     if let Some(report) = status.self_test.as_ref().filter(|report| !report.passed) {
         let failed: Vec<_> =
             report.items.iter().filter(|item| !item.passed).map(|item| item.name.as_str()).collect();
-        add(Level::Fault, format!("self-test failed: {}", failed.join(", ")));
+        add(Level::Fault, format!("self-test failed: {}; repeat it to clear this", failed.join(", ")));
     }
     if let Some(progress) = &status.pre_launch {
         let (share, left) = figure::progress(progress);

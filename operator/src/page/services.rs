@@ -55,7 +55,10 @@ fn line(service: &ServiceStatus, gone: bool, columns: usize) -> Line<'static> {
     }
     match &service.store {
         Some(store) => {
-            let entries = format!("{} audit entries", grouped(store.audit_entries));
+            let entries = match store.audit_entries {
+                1 => "1 audit entry".to_owned(),
+                entries => format!("{} audit entries", grouped(entries)),
+            };
             parts.push((5, format!("state {} ({entries})", store.path)));
         }
         None => parts.push((5, "no state folder".to_owned())),

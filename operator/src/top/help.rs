@@ -21,7 +21,7 @@ const TEXT: &[(&str, &str)] = &[
     ("○", "standby, self-test or pre-launch calibration; the line is dim"),
     ("▲", "warning (yellow): outside the calibrated range, stale, no calibration,"),
     ("", "no raw ticks, or a counter that grew in the last minute"),
-    ("!", "fault (red): in the last minute, or as long as it lasts"),
+    ("!", "fault now (red): in the last minute, or as long as it lasts"),
     ("×", "gone: no service answers for the unit; the line is dim"),
     ("", ""),
     ("Columns", ""),

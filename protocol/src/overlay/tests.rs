@@ -266,7 +266,7 @@ const BROKEN: [Case; 19] = [
         "pre_launch.latitude_deg",
         "must be a number from -90 to 90",
     ),
-    ("[1.5, -0.5]", "[1.5]", "[1.5]", "pre_launch.pitch_roll_deg", "has 1 entries, must have 2"),
+    ("[1.5, -0.5]", "[1.5]", "[1.5]", "pre_launch.pitch_roll_deg", "has 1 entry, must have 2"),
     (
         "start_ns = 1000000000",
         "start_ns = 1.5",

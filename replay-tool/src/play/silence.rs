@@ -51,8 +51,7 @@ pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch
         }
         // One unit stands for the others that fell silent with it.
         if let Some((unit, ticks)) = silent.first() {
-            let status = presence::status(session, unit, ANSWER).await;
-            let text = words(unit, *ticks, status.as_ref());
+            let text = explained(session, unit, *ticks, QUIET).await;
             let others = match silent.len() - 1 {
                 0 => String::new(),
                 others => format!(" ({others} other units likewise)"),
@@ -62,22 +61,32 @@ pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch
     }
 }
 
-/// Why nothing comes back, as far as the unit's status tells.
-fn words(unit: &UnitId, ticks: u64, status: Option<&Status>) -> String {
+/// That nothing comes back of a unit, and why, as far as its status tells.
+pub(super) async fn explained(session: &Session, unit: &UnitId, ticks: u64, waited: Duration) -> String {
+    let status = presence::status(session, unit, ANSWER).await;
+    words(unit, ticks, waited, status.as_ref())
+}
+
+fn words(unit: &UnitId, ticks: u64, waited: Duration, status: Option<&Status>) -> String {
     let quiet =
-        format!("{unit}: nothing has come back for {} s, {ticks} ticks are in flight", QUIET.as_secs());
-    match status {
-        None => format!("{quiet}; the service has no status of the unit"),
-        Some(status) if !operation::State::from(status.state).is_running() => format!(
-            "{quiet}: the unit is in {}, where nothing is published; run it with `isotherm command {unit} run`, or \
-             play with --no-acknowledge",
-            operation::State::from(status.state)
-        ),
-        Some(status) if status.output == Output::Held => format!(
+        format!("{unit}: nothing has come back for {} s, {ticks} ticks are in flight", waited.as_secs());
+    let Some(status) = status else { return format!("{quiet}; the service has no status of the unit") };
+    let state = operation::State::from(status.state);
+    if !state.is_running() {
+        return format!(
+            "{quiet}: the unit is in {state}, where nothing is published; run it with `isotherm command {unit} run`, or \
+             play with --no-acknowledge"
+        );
+    }
+    if status.output == Output::Held {
+        return format!(
             "{quiet}: the unit has no calibration, and the service publishes nothing then (uncalibrated = \"hold\"); \
              give it one, or play with --no-acknowledge"
-        ),
-        Some(_) => {
+        );
+    }
+    match status.faults.iter().max_by_key(|fault| fault.last_unix_ms) {
+        Some(fault) => format!("{quiet}: {}", fault.first),
+        None => {
             format!("{quiet}; see the service's log and the unit's status, or play with --no-acknowledge")
         }
     }
@@ -85,7 +94,7 @@ fn words(unit: &UnitId, ticks: u64, status: Option<&Status>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use isotherm_protocol::status::State;
+    use isotherm_protocol::status::{Fault, State};
 
     use super::*;
 
@@ -94,15 +103,22 @@ mod tests {
         let unit = UnitId::new("ZLG-0001").unwrap();
         let status = |state, output| Status { state, output, ..Status::default() };
         let running = State::RunningWithReversal;
+        let refused = Fault {
+            kind: String::new(),
+            count: 1,
+            first: "the producer sends counts".to_owned(),
+            last_unix_ms: 0,
+        };
         let table = [
             (None, "has no status of the unit"),
             (Some(status(State::Standby, Output::Calibrated)), "is in standby"),
             (Some(status(State::SelfTest, Output::Calibrated)), "is in self-test"),
             (Some(status(running, Output::Held)), "uncalibrated = \"hold\""),
             (Some(status(running, Output::Calibrated)), "see the service's log"),
+            (Some(Status { faults: vec![refused], ..status(running, Output::Calibrated) }), "sends counts"),
         ];
         for (status, expected) in table {
-            let text = words(&unit, 300, status.as_ref());
+            let text = words(&unit, 300, QUIET, status.as_ref());
             assert!(text.contains(expected) && text.contains("300 ticks"), "{text}");
         }
     }

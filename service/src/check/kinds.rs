@@ -42,13 +42,14 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
             };
         }
     };
-    let kind = forced.or_else(|| recognise(path, &bytes));
+    let recognised = recognise(path, &bytes);
+    let kind = forced.or(recognised.ok());
     let checked = text(&bytes, &file).and_then(|text| match kind {
         Some(FileKind::Calibration) => check_calibration(text, &file, trusted),
         Some(FileKind::Overlay) => check_overlay(text, &file, trusted),
         Some(FileKind::Service) => check_service(text, path),
         Some(FileKind::Zenoh) => check_zenoh(text, &file),
-        None => Err(vec![unplaced(Some(&file), NO_KEYS.to_owned())]),
+        None => Err(vec![unplaced(Some(&file), recognised.err().unwrap_or_default().to_owned())]),
     });
     let (problems, warnings, summary) = match checked {
         Ok((summary, warnings)) => (Vec::new(), warnings, Some(summary)),
@@ -62,22 +63,31 @@ type Checked = Result<(Summary, Vec<Problem>), Vec<Problem>>;
 
 /// JSON by its extension; an overlay, then a calibration document, by a key that only it has; else a service configuration,
 /// unless there are no keys at all: a calibration document that was cut to nothing must not pass for a configuration of defaults.
-fn recognise(path: &Path, bytes: &[u8]) -> Option<FileKind> {
+///
+/// `Err`: what it is else.
+fn recognise(path: &Path, bytes: &[u8]) -> Result<FileKind, &'static str> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     if matches!(extension.as_deref(), Some("json" | "json5")) {
-        return Some(FileKind::Zenoh);
+        return Ok(FileKind::Zenoh);
     }
     let text = String::from_utf8_lossy(bytes);
     if is_overlay(&text) {
-        return Some(FileKind::Overlay);
+        return Ok(FileKind::Overlay);
     }
     // What has errors of syntax is recognised by what could be read nevertheless.
     let (root, errors) = parse_toml(&text);
     let root = root.get_ref();
-    if CALIBRATION_KEYS.iter().any(|key| root.contains_key(*key)) {
-        Some(FileKind::Calibration)
+    let is_list = |key: &str| root.get(key).is_some_and(|value| value.get_ref().is_array());
+    if is_list("file") {
+        Err("is a column mapping: `isotherm-replay info LOG --mapping FILE` checks it")
+    } else if is_list("unit") {
+        Err("is a mapping of topics: `isotherm-ros check FILE` checks it")
+    } else if CALIBRATION_KEYS.iter().any(|key| root.contains_key(*key)) {
+        Ok(FileKind::Calibration)
+    } else if root.is_empty() && errors.is_empty() {
+        Err(NO_KEYS)
     } else {
-        (!root.is_empty() || !errors.is_empty()).then_some(FileKind::Service)
+        Ok(FileKind::Service)
     }
 }
 

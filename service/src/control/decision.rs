@@ -333,8 +333,20 @@ fn jump(settings: &SwapSettings, candidate: &Document, active: &Revision, presen
                 )));
             }
         };
-    check(jump.angular_rate, settings.max_jump_rad_per_s, "the angular rate about", &deg_per_h, "°/h");
-    check(jump.specific_force, settings.max_jump_m_per_s2, "the specific force along", &milli_g, "mg");
+    check(
+        jump.angular_rate,
+        settings.max_jump_rad_per_s,
+        "the corrected angular rate about",
+        &deg_per_h,
+        "°/h",
+    );
+    check(
+        jump.specific_force,
+        settings.max_jump_m_per_s2,
+        "the corrected specific force along",
+        &milli_g,
+        "mg",
+    );
     doubts
 }
 

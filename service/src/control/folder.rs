@@ -179,8 +179,11 @@ impl Worker {
             }
             FolderEvent::Removed { file } => {
                 let before = self.folder.remove(&file);
-                let unit = before.as_ref().map(ToString::to_string).unwrap_or_default();
-                tracing::warn!(unit, "{} is gone; the calibration in force stays", file.display());
+                if let Some(unit) = &before {
+                    tracing::warn!(%unit, "{} is gone; the calibration in force stays", file.display());
+                } else {
+                    tracing::info!("{} is gone, which was no unit's document", file.display());
+                }
                 self.look_for_survivor(before.as_ref());
             }
             FolderEvent::FolderGone { reason } => {

@@ -58,6 +58,8 @@ kinds! {
     TwoSpeak = "two_services",
     /// Units that two producers seem to publish.
     TwoProducers = "two_producers",
+    /// Ticks that the calibration in force cannot take: another number of readings, or another kind.
+    Unfit = "ticks_unfit",
     /// An event thought impossible inside one unit's processing; the unit was reset.
     Alarm = "alarms",
 }
@@ -68,7 +70,7 @@ impl FaultKind {
     pub fn is_refusal(self) -> bool {
         use FaultKind as K;
 
-        !matches!(self, K::Unpublished | K::Alarm | K::OtherBits | K::TwoSpeak | K::TwoProducers)
+        !matches!(self, K::Unpublished | K::Alarm | K::OtherBits | K::TwoSpeak | K::TwoProducers | K::Unfit)
     }
 
     /// Those that units count; the others belong to the service.

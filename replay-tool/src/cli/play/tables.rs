@@ -13,8 +13,11 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
     };
     let uncalibrated =
         of(|unit| unit.returned.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
+            let returned = |unit: &UnitReport| unit.returned.ticks_uncalibrated;
+            let ticks: u64 = play.units.iter().filter_map(returned).sum();
             format!(
-                "{units}: the service had no calibration for some ticks and returned their readings unscaled"
+                "{units}: the service had no calibration for {ticks} ticks and returned them uncorrected; give it a \
+                 document that names the unit"
             )
         });
     let mixed = of(UnitReport::is_mixed).map(|units| {

@@ -27,7 +27,7 @@ const LENGTHS: std::ops::RangeInclusive<usize> = 32..=256;
 #[command(after_help = "\
 Examples:
   isotherm web --config /etc/isotherm/service.toml
-  isotherm web --state state
+  isotherm web --state state --metrics 127.0.0.1:9464
 
 Prints the address to open in a browser. The part after the # is the token: anyone who has it sees the console.")]
 pub struct WebArgs {
@@ -37,6 +37,9 @@ pub struct WebArgs {
     /// State folder of the service (default: as configured)
     #[arg(long, value_name = "FOLDER")]
     pub state: Option<PathBuf>,
+    /// Address of the console, as `serve --metrics` has it (default: as configured)
+    #[arg(long, value_name = "HOST:PORT")]
+    pub metrics: Option<SocketAddr>,
     /// Print JSON on stdout
     #[arg(long)]
     pub json: bool,
@@ -68,17 +71,23 @@ fn address(args: &WebArgs) -> Result<(String, String), ServiceError> {
     if args.state.is_some() {
         settings.state.clone_from(&args.state);
     }
+    if args.metrics.is_some() {
+        settings.metrics.listen = args.metrics;
+    }
     settings.web.enabled = true;
     settings.listen_for_web();
     let Some(file) = file(&settings) else {
-        let words =
-            "there is no state folder and no [web] token_file: such a service writes its token to its log";
+        let words = "give --config or --state of the service; one that has neither a state folder nor [web] token_file writes \
+                     its token to its log";
         return Err(ServiceError::Token {
             path: FILE.into(),
             source: io::Error::new(ErrorKind::InvalidData, words),
         });
     };
     let token = read(&file).map_err(|source| ServiceError::Token { path: file, source })?;
+    if args.config.is_none() && args.metrics.is_none() {
+        say("without --config or --metrics, the console's usual address is assumed");
+    }
     let listen = settings.metrics.listen.map(reached).unwrap_or_default();
     Ok((format!("http://{listen}/"), token))
 }
@@ -169,7 +178,8 @@ mod tests {
         let file = folder.path().join(FILE);
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
         assert_eq!(of_service(&settings(folder.path())).unwrap(), token, "it outlives a restart");
-        let args = WebArgs { config: None, state: Some(folder.path().to_owned()), json: false };
+        let args =
+            WebArgs { config: None, state: Some(folder.path().to_owned()), metrics: None, json: false };
         assert_eq!(address(&args).unwrap(), ("http://127.0.0.1:9464/".to_owned(), token));
     }
 
@@ -194,7 +204,7 @@ mod tests {
     fn where_nothing_is_kept_each_start_has_a_token_of_its_own() {
         let made = || of_service(&Settings::default()).unwrap();
         assert_ne!(made(), made());
-        let args = WebArgs { config: None, state: None, json: false };
+        let args = WebArgs { config: None, state: None, metrics: None, json: false };
         assert!(address(&args).unwrap_err().to_string().contains("log"));
     }
 

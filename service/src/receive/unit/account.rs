@@ -5,7 +5,7 @@ use std::time::{Instant, SystemTime};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::service_status::UnitSummary;
 use isotherm_protocol::status::{Counter, Latency, MAX_FAULTS, PreLaunchVerdict, Status, Swaps};
-use isotherm_protocol::stream::Edge;
+use isotherm_protocol::stream::{Edge, unfit};
 
 use super::{REFUSALS, UnitActor};
 use crate::observe::totals::UnitTotals;
@@ -47,6 +47,18 @@ impl UnitActor {
         if let Some(words) = self.arrivals.look(now, &counters) {
             self.fault(FaultKind::TwoProducers, 1, || words);
         }
+        self.look_for_unfit(&counters);
+    }
+
+    /// Reports ticks that the calibration in force cannot take.
+    fn look_for_unfit(&mut self, counters: &[Counter]) {
+        let value = |name| counters.iter().find(|counter| counter.name == name).map_or(0, |it| it.value);
+        let values = unfit::COUNTERS.map(value);
+        let more = values.iter().sum::<u64>().saturating_sub(self.faults.count(FaultKind::Unfit));
+        let Some((calibration, _)) = self.stream.unit().calibration().filter(|_| more > 0) else { return };
+        let named = unfit::COUNTERS.into_iter().zip(values).find(|(_, value)| *value > 0);
+        let words = named.and_then(|(name, _)| unfit::words(name, calibration)).unwrap_or_default();
+        self.fault(FaultKind::Unfit, more, || format!("ticks are refused: {words}"));
     }
 
     /// What the unit says of itself; `instance` is the service's name for itself.
