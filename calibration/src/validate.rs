@@ -108,6 +108,12 @@ pub fn validate(
             ));
         }
     }
+    if let Some(channels) = coverage.silent() {
+        return Err(Error::refused(format!(
+            "{name} follows the temperatures {channels}, of which the logs have no reading: is it the document of this \
+             unit?"
+        )));
+    }
     report.verdicts = Curve::verdicts(&report.residuals)
         .into_iter()
         .map(|verdict| verdict.stated_as(Figure::Rms))

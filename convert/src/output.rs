@@ -1,9 +1,9 @@
-//! Files that are written under another name until they are whole.
+//! Where outputs may go, and files that are compressed by their name.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use isotherm_log::file::{self, refuse_overwriting, refuse_replacing};
+use isotherm_log::file::{self, Partial, refuse_overwriting, refuse_replacing};
 use isotherm_protocol::key::UnitId;
 
 use isotherm_log::error::Error;
@@ -15,14 +15,6 @@ pub struct Place {
     pub overwrite: bool,
     /// Files that are read: none of them is ever written over.
     pub inputs: Vec<PathBuf>,
-}
-
-/// A file that is being written; removed when dropped before it is whole.
-#[derive(Debug)]
-pub(super) struct Partial {
-    path: PathBuf,
-    writing: PathBuf,
-    kept: bool,
 }
 
 impl Place {
@@ -69,9 +61,7 @@ impl Place {
             std::fs::create_dir_all(folder)
                 .map_err(|source| Error::file(folder, "create the folder", source))?;
         }
-        let mut writing = path.as_os_str().to_owned();
-        writing.push(".partial");
-        Ok(Partial { path: path.to_owned(), writing: writing.into(), kept: false })
+        Ok(Partial::of(path))
     }
 
     /// A file of text or bytes to be written, compressed where its name ends in `.gz`.
@@ -85,35 +75,6 @@ impl Place {
         let mut sink = self.sink(path)?;
         sink.write(|writer| writer.write_all(text.as_bytes()))?;
         sink.finish()
-    }
-}
-
-impl Partial {
-    /// Where it is written to.
-    pub(super) fn writing(&self) -> &Path {
-        &self.writing
-    }
-
-    /// Where it will be.
-    pub(super) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// It is whole: gives it its name.
-    pub(super) fn keep(mut self) -> Result<(), Error> {
-        std::fs::rename(&self.writing, &self.path)
-            .map_err(|source| Error::file(&self.path, "name the file", source))?;
-        self.kept = true;
-        Ok(())
-    }
-}
-
-impl Drop for Partial {
-    fn drop(&mut self) {
-        if !self.kept {
-            // It may never have been created.
-            let _ = std::fs::remove_file(&self.writing);
-        }
     }
 }
 

@@ -24,7 +24,9 @@ use isotherm_log::error::Error;
 use isotherm_log::streams::decoded::decode;
 use isotherm_protocol::key::UnitId;
 
-use super::output::{Partial, folder};
+use isotherm_log::file::Partial;
+
+use super::output::folder;
 use super::{Conversion, Converted, Found, Outcome};
 use streams::UnitTables;
 

@@ -3,7 +3,7 @@
 use std::fs::{File, Permissions, canonicalize};
 use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::PermissionsExt;
-use std::path::{Path, absolute};
+use std::path::{Path, PathBuf, absolute};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -89,6 +89,61 @@ pub fn write_whole(path: &Path, bytes: &[u8], overwrite: bool) -> io::Result<()>
     file.as_file().sync_all()?;
     let placed = if overwrite { file.persist(path) } else { file.persist_noclobber(path) };
     placed.map(drop).map_err(|failed| failed.error)
+}
+
+/// A file that is written under another name until it is whole; removed when dropped before.
+#[derive(Debug)]
+pub struct Partial {
+    path: PathBuf,
+    writing: PathBuf,
+    kept: bool,
+}
+
+impl Partial {
+    /// What will be at a path; a device is written to as it is.
+    #[must_use]
+    pub fn of(path: &Path) -> Self {
+        let mut writing = path.as_os_str().to_owned();
+        let kept = path.exists() && !path.is_file();
+        if !kept {
+            writing.push(".partial");
+        }
+        Self { path: path.to_owned(), writing: writing.into(), kept }
+    }
+
+    /// Where it is written to.
+    #[must_use]
+    pub fn writing(&self) -> &Path {
+        &self.writing
+    }
+
+    /// Where it will be.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// It is whole: gives it its name.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn keep(mut self) -> Result<(), Error> {
+        if !self.kept {
+            std::fs::rename(&self.writing, &self.path)
+                .map_err(|source| Error::file(&self.path, "name the file", source))?;
+            self.kept = true;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if !self.kept {
+            // It may never have been created.
+            let _ = std::fs::remove_file(&self.writing);
+        }
+    }
 }
 
 /// A file that is being written, compressed or not.

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use clap::ValueEnum;
-use isotherm_log::file::refuse_replacing;
+use isotherm_log::file::{Partial, refuse_replacing};
 
 pub use isotherm_log::offline::rows::{write_frame, write_header, write_tick};
 
@@ -27,6 +27,8 @@ pub struct Output {
     writer: BufWriter<Box<dyn Write>>,
     /// Name, for messages.
     name: String,
+    /// A file that is not whole yet; `None` for standard output.
+    partial: Option<Partial>,
 }
 
 impl std::fmt::Debug for Output {
@@ -41,13 +43,16 @@ impl Output {
     /// # Errors
     /// [`Error::Log`] where it cannot be created, or is there already and may not be replaced.
     pub fn create(path: &Path, overwrite: bool) -> Result<Self, Error> {
+        let mut partial = None;
         let writer: Box<dyn Write> = if path == Path::new("-") {
             Box::new(io::stdout())
         } else {
             refuse_replacing(path, overwrite)?;
-            Box::new(File::create(path).map_err(|source| Error::file(path, "create", source))?)
+            let writing = partial.insert(Partial::of(path)).writing();
+            Box::new(File::create(writing).map_err(|source| Error::file(path, "create", source))?)
         };
-        Ok(Self { writer: BufWriter::with_capacity(1 << 16, writer), name: path.display().to_string() })
+        let name = path.display().to_string();
+        Ok(Self { writer: BufWriter::with_capacity(1 << 16, writer), name, partial })
     }
 
     /// Writes whatever `write` does.
@@ -64,6 +69,7 @@ impl Output {
     /// # Errors
     /// [`Error::Log`] where it cannot be written.
     pub fn finish(mut self) -> Result<(), Error> {
-        self.write(|writer| writer.flush())
+        self.write(|writer| writer.flush())?;
+        self.partial.map_or(Ok(()), |partial| Ok(partial.keep()?))
     }
 }

@@ -93,6 +93,13 @@ impl Coverage {
         Ok(())
     }
 
+    /// Names of the channels, where there was no reading of any of them.
+    pub(super) fn silent(&self) -> Option<String> {
+        let names: Vec<_> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
+        let silent = self.channels.iter().all(|channel| channel.seen.is_none());
+        (silent && !names.is_empty()).then(|| names.join(", "))
+    }
+
     /// What is to be looked at: one sentence of each kind, however many channels or sensors it is about.
     pub(super) fn warnings(&self) -> Vec<String> {
         let silent: Vec<&str> =

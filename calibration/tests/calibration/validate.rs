@@ -192,6 +192,11 @@ fn what_cannot_be_judged_is_refused_in_words() {
         2,
         "latitude is 95°",
     );
+    let scenario = fibre_optic(5, "FOG-0001", 200.0);
+    let without =
+        crate::simulated_logs::events(&scenario).filter(|event| !matches!(event, LogEvent::Temperature(_)));
+    crate::simulated_logs::record_events(Path::new(&path("deaf.mcap")), "FOG-0001", without);
+    refused(&["validate", &good, &path("deaf.mcap")], 1, "of which the logs have no reading");
     // A dead gyro: not moving at all is no merit.
     let mut dead = fibre_optic(5, "FOG-0001", 600.0);
     dead.failures.push(Failure { sensor: FailingSensor::Gyro(1), at_s: 0.0, fault: Fault::Stuck });

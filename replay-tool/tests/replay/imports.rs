@@ -442,8 +442,12 @@ fn what_no_log_says_is_asked_for_with_its_option() {
     check(
         &replay(folder.path(), &["import", "bare.txt"]),
         2,
-        "bare.txt: which of the 7 columns are the gyros and the time?",
+        "bare.txt: which of the 7 columns are gyros, accelerometers, temperatures and the time?",
     );
+    // A column in a sensor's unit is not passed over while such sensors lack.
+    let row = |row| format!("{},1.5,2.5,{:.3},0.1,1.0", row * 10, noise(row, 14));
+    write("left.csv", &log("time_ms,gx [deg/s],gy [deg/s],gz [deg/s],lateral [g],vertical [g]\n", row));
+    check(&replay(folder.path(), &["import", "left.csv"]), 2, "left.csv: which of the 6 columns are gyros");
     write(
         "units.csv",
         &log("time_ms,gx,gy,gz\n", |row| format!("{},1.5,2.5,{:.3}", row * 10, noise(row, 13))),

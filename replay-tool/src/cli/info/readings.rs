@@ -1,5 +1,6 @@
 //! Figures of readings.
 
+use isotherm_correction::units::SpecificForce;
 use isotherm_log::info::{ReadingInfo, UnitInfo};
 
 use crate::cli::show;
@@ -22,7 +23,24 @@ pub(super) fn readings(unit: &UnitInfo) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    show::grid(["as sent", "unit", "readings", "minimum", "maximum", "mean", "missing"], rows, 2..)
+    let table =
+        show::grid(["as sent", "unit", "readings", "minimum", "maximum", "mean", "missing"], rows, 2..);
+    table + &wrong_unit(&unit.accelerometers).unwrap_or_default()
+}
+
+/// That three accelerometers in m/s² mean something else than the gravity in which instruments mostly rest.
+fn wrong_unit(accelerometers: &[ReadingInfo]) -> Option<String> {
+    let [x, y, z] = accelerometers else { return None };
+    if [x, y, z].iter().any(|sensor| sensor.unit != "m/s²" || sensor.readings == 0) {
+        return None;
+    }
+    let mean = (x.mean * x.mean + y.mean * y.mean + z.mean * z.mean).sqrt();
+    let gravities = SpecificForce::from_m_per_s2(mean).as_g();
+    (!(0.5..2.0).contains(&gravities)).then(|| {
+        format!(
+            "accelerometers: {mean:.2} m/s² in the mean is {gravities:.2} g: check their unit of measure\n"
+        )
+    })
 }
 
 /// A number in seven digits, without an exponent where it needs none.
@@ -46,6 +64,20 @@ fn figure(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_force_that_is_not_gravity_has_another_unit() {
+        let of = |unit: &str, z: f64| {
+            let sensor =
+                |mean| ReadingInfo { unit: unit.to_owned(), readings: 1, mean, ..ReadingInfo::default() };
+            wrong_unit(&[0.1, -0.2, z].map(sensor))
+        };
+        for (unit, z, is_wrong) in
+            [("m/s²", -9.81, false), ("m/s²", 93.3, true), ("m/s²", 1.0, true), ("V", 1.0, false)]
+        {
+            assert_eq!(of(unit, z).is_some(), is_wrong, "{z} {unit}");
+        }
+    }
 
     #[test]
     fn numbers_keep_seven_digits() {
