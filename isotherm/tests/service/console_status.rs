@@ -130,7 +130,7 @@ async fn status_prints_units_pages_and_json() {
     let unknown = served.ask(&["status", "STATUS-9"]);
     assert_eq!(unknown.status.code(), Some(1));
     let error = words(&unknown.stderr);
-    assert!(error.contains("no unit STATUS-9; it has STATUS-1, STATUS-2, STATUS-3"), "{error}");
+    assert!(error.contains("no unit STATUS-9; it has heard STATUS-1, STATUS-2, STATUS-3"), "{error}");
     assert!(unknown.stdout.is_empty());
 }
 

@@ -117,7 +117,7 @@ fn what_is_no_corrected_log_is_refused_with_its_place() {
     let text = std::fs::read_to_string(&good).unwrap();
     for (name, bytes, words) in [
         ("x.csv", text.replacen("-0.3333333333333333", "x", 1), "line 3: column delta_angle_y_rad has \"x\""),
-        ("y.bin", "sequence of something else".to_owned(), "is it a corrected log"),
+        ("y.bin", "sequence of something else".to_owned(), "it is no corrected log"),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();

@@ -86,6 +86,10 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     let mut parts = parts(bare);
     let stated =
         own.or(of_row.map(|text| text.trim_matches(['(', ')', '[', ']']))).filter(|text| !text.is_empty());
+    // "T_case_degC": the unit is the name's end.
+    let celsius = stated.is_none() && parts.len() > 2 && parts.ends_with(&["deg".to_owned(), "c".to_owned()]);
+    let stated = if celsius { Some("degC") } else { stated };
+    parts.truncate(parts.len() - 2 * usize::from(celsius));
     let by_unit = kind_of_unit(stated);
     let axis = take_axis(&mut parts, matches!(by_unit, Some(Kind::Gyro | Kind::Accel)));
     let has = |words: &[&str]| parts.iter().any(|part| words.contains(&part.as_str()));
@@ -93,9 +97,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         parts.windows(2).any(|pair| pair[0] == first && pair[1].starts_with(second))
     };
     let temperature = parts.iter().any(|part| part.starts_with("temp") || part.starts_with("thermo"))
-        || axis.is_none()
-            && (by_unit == Some(Kind::Temperature)
-                || matches!(parts.as_slice(), [_, .., last] if last == "degc"));
+        || axis.is_none() && by_unit == Some(Kind::Temperature);
     let angle = pair("delta", "angle")
         || pair("d", "theta")
         || has(&["dtheta", "deltang", "dang", "deltaangle"])
@@ -323,7 +325,6 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "degc" | "c" | "celsius" => Some("deg_c"),
             "k" | "kelvin" => Some("kelvin"),
             "v" | "volt" => Some("volt"),
-            "" if has("degc") => Some("deg_c"),
             "" | "-" | "deg" if !raw => None,
             // °F and all else is for the document to convert.
             _ => Some("raw"),

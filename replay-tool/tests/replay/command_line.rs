@@ -265,7 +265,7 @@ fn ticks_that_the_calibration_refuses_are_a_loss() {
     let folder = simulated();
     let laser = fs::canonicalize(root().join("config/calibration/ZLG-0001.toml")).unwrap();
     let correct = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", laser.to_str().unwrap()];
-    check(&replay(folder.path(), &correct), 3, "refused: the calibration takes means, but counts come");
+    check(&replay(folder.path(), &correct), 3, "refused: the calibration takes counts, but means come");
 }
 
 #[test]
