@@ -39,6 +39,10 @@ python:
 typescript:
     .ci/run typescript
 
+# Read recordings as Foxglove does (needs npm)
+foxglove:
+    .ci/run foxglove
+
 # Kill the speaking service of a pair 100 times, stop it 50 times, cut the links of one 50 times, with 20 units at 200 Hz; print the
 # pauses (a quarter of an hour; ISOTHERM_PAIR=UNITS,KILLS,STOPS,CUTS)
 pair:

@@ -21,5 +21,6 @@ step() {
 step kernel kernel "${rounds[@]}"
 step chain chain --subject relay,keyed,service,python "${quick[@]}"
 step profiles chain --measure latency --units 20 --rate 1000 --subject relay,service "${quick[@]}" \
-    --profile default --profile pool-2 --profile rx-1 --profile batching-1ms
-step scale scale "${quick[@]}"
+    --profile default --profile pool-2 --profile rx-1
+step units chain --measure units --subject keyed,service --rounds 3 "${quick[@]}"
+step offline offline "${quick[@]}"

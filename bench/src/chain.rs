@@ -7,8 +7,8 @@ mod case;
 mod check;
 mod page;
 mod profile;
-pub(crate) mod python;
-pub(crate) mod round;
+mod python;
+mod round;
 mod row;
 mod subject;
 mod swap;
@@ -17,15 +17,14 @@ mod table;
 use isotherm_cli::Bar;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use case::{Beside, Case};
-pub(crate) use profile::Profile;
-pub(crate) use row::Row;
-pub(crate) use subject::Subject;
-pub(crate) use table::{middle, table};
+use case::{Beside, Case};
+use profile::Profile;
+use row::Row;
+use subject::Subject;
+pub(crate) use table::table;
 
 use crate::error::Error;
 use crate::machine::Machine;
-use crate::part::Pace;
 
 /// What of a chain is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -34,6 +33,8 @@ pub(crate) enum Measure {
     Latency,
     /// Throughput where nothing waits.
     Saturation,
+    /// Memory, start-up, swaps and cost by number of units.
+    Units,
     /// Latency while every unit is given another calibration each second, beside latency without.
     Swap,
     /// Latency of a pair to a sink that takes each tick from the service that sends it first, beside latency of one service.
@@ -44,12 +45,11 @@ pub(crate) enum Measure {
 
 /// Arguments of `chain`.
 #[derive(Debug, Clone, clap::Args)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(crate) struct ChainArgs {
     /// What is measured
     #[arg(long, value_delimiter = ',', default_values = ["latency", "saturation", "swap"])]
     measure: Vec<Measure>,
-    /// What stands in the middle; the relay is always among them
+    /// What stands in the middle; a relay is always among them
     #[arg(long, value_delimiter = ',', default_values = ["relay", "service", "python"])]
     subject: Vec<Subject>,
     /// Numbers of units; with `--rate` and `--batch` instead of the usual cases
@@ -70,19 +70,10 @@ pub(crate) struct ChainArgs {
     /// One round of a second for each case: whether all works, not how fast
     #[arg(long)]
     quick: bool,
-    /// Units one after the other over their period instead of all at once
-    #[arg(long)]
-    spread: bool,
-    /// Settings of Zenoh, a name or NAME;runtime=RON;key/of/zenoh=JSON; several are compared with one another, the first is
-    /// the reference
-    #[arg(long, value_name = "PROFILE")]
+    /// Threads of Zenoh in the middle, a name or what `ZENOH_RUNTIME` is to be (RON); several are compared with one another, the
+    /// first is the reference
+    #[arg(long, value_name = "PROFILE", default_value = "default")]
     profile: Vec<Profile>,
-    /// Threads of Zenoh's runtimes in the middle (RON), as the environment variable `ZENOH_RUNTIME` has them
-    #[arg(long, value_name = "RON")]
-    zenoh_runtime: Option<String>,
-    /// Source and sink have the settings too
-    #[arg(long)]
-    ends_too: bool,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -105,6 +96,13 @@ pub(crate) struct Report {
 const SATURATED_TICKS: [(usize, usize); 2] = [(1, 1_500_000), (32, 6_400_000)];
 /// How long the source goes on there at most (s).
 const SATURATED_S: f64 = 5.0;
+/// Numbers of units that are compared, the ticks of all of them, of a message, and how long the source goes on at most (s).
+const UNITS: [u32; 5] = [1, 10, 100, 1000, 5000];
+const TICKS_OF_UNITS: usize = 2_000_000;
+const BATCH_OF_UNITS: usize = 20;
+const UNITS_S: f64 = 10.0;
+/// Swaps that are timed there.
+const SWAPS: usize = 50;
 
 impl ChainArgs {
     /// All cases, each as a list of variants that are to be compared.
@@ -131,8 +129,7 @@ impl ChainArgs {
                 at(200).into_iter().chain(at(1000)).chain([(100, 1000, 10)]).collect()
             };
             cases.extend(loads.into_iter().map(|(units, rate, batch)| {
-                let pace = if self.spread { Pace::Spread } else { Pace::Burst };
-                (Measure::Latency, vec![Case { pace, ..Case::paced(units, rate, batch, seconds) }])
+                (Measure::Latency, vec![Case::paced(units, rate, batch, seconds)])
             }));
         }
         if self.measure.contains(&Measure::Saturation) {
@@ -142,6 +139,15 @@ impl ChainArgs {
                     let ticks = if self.quick { ticks / 10 } else { ticks };
                     (Measure::Saturation, vec![Case::saturated(*units, batch, ticks, SATURATED_S)])
                 })
+            }));
+        }
+        if self.measure.contains(&Measure::Units) {
+            let units = if self.units.is_empty() { UNITS.as_slice() } else { &self.units };
+            let ticks = if self.quick { TICKS_OF_UNITS / 10 } else { TICKS_OF_UNITS };
+            cases.extend(units.iter().filter(|units| !self.quick || **units <= 100).map(|units| {
+                let case = Case::saturated(*units as usize, BATCH_OF_UNITS, ticks, UNITS_S);
+                let case = Case { rate_hz: 200, state: false, timed_swaps: SWAPS, ..case };
+                (Measure::Units, vec![case])
             }));
         }
         // What goes on beside the ticks, and how many units it takes to show.
@@ -162,18 +168,6 @@ impl ChainArgs {
         }
         cases
     }
-
-    /// Settings that are compared.
-    fn profiles(&self) -> Vec<Profile> {
-        let mut profiles = self.profile.clone();
-        if let Some(runtime) = &self.zenoh_runtime {
-            profiles.push(Profile::of_runtime(runtime));
-        }
-        if profiles.is_empty() {
-            profiles.push(Profile::own());
-        }
-        profiles
-    }
 }
 
 /// Runs the chain; a case that goes wrong is told in the report, and the others are measured all the same.
@@ -181,7 +175,9 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
     let machine = Machine::look();
     let (mut rows, mut skipped, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     let mut subjects = args.subject.clone();
-    subjects.push(Subject::Relay);
+    if !subjects.contains(&Subject::Keyed) {
+        subjects.push(Subject::Relay);
+    }
     subjects.sort_unstable();
     subjects.dedup();
     if subjects.contains(&Subject::Python)
@@ -190,12 +186,12 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
         skipped.push(format!("{error}"));
         subjects.retain(|subject| *subject != Subject::Python);
     }
-    let (cases, profiles) = (args.cases(), args.profiles());
+    let cases = args.cases();
     let rounds = if args.quick { 1 } else { args.rounds.max(1) };
-    let runs: Vec<_> = cases.iter().map(|(_, variants)| runs(variants, &profiles, &subjects)).collect();
+    let runs: Vec<_> = cases.iter().map(|(_, variants)| runs(variants, &args.profile, &subjects)).collect();
     let bar = Bar::counting("", runs.iter().map(|runs| runs.len() * rounds).sum());
     for ((measure, _), runs) in cases.iter().zip(runs) {
-        let outcomes = match take_turns(&runs, rounds, args.ends_too, &bar) {
+        let outcomes = match take_turns(&runs, rounds, &bar) {
             Ok(outcomes) => outcomes,
             Err(error) => {
                 // The other cases are as good as they were.
@@ -219,20 +215,15 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
 }
 
 /// What is run: a load, settings, and what stands in the middle.
-pub(crate) type Run = (Case, Profile, Subject);
+type Run = (Case, Profile, Subject);
 
 /// Every run once in each of so many rounds; the outcomes of each.
-pub(crate) fn take_turns(
-    runs: &[Run],
-    rounds: usize,
-    ends_too: bool,
-    bar: &Bar,
-) -> Result<Vec<Vec<round::Outcome>>, Error> {
+fn take_turns(runs: &[Run], rounds: usize, bar: &Bar) -> Result<Vec<Vec<round::Outcome>>, Error> {
     let mut outcomes = vec![Vec::with_capacity(rounds); runs.len()];
     for _ in 0..rounds {
         for ((case, profile, subject), outcomes) in runs.iter().zip(&mut outcomes) {
             bar.say(format!("{}: {}", case.words(), subject.name()));
-            let outcome = round::run(case, *subject, profile, ends_too.then_some(profile))?;
+            let outcome = round::run(case, *subject, profile)?;
             check_swaps(case, *subject, &outcome)?;
             outcomes.push(outcome);
             bar.done_one();

@@ -11,8 +11,8 @@ use crate::chain::{self, ChainArgs};
 use crate::error::Error;
 use crate::instructions::{self, Figures};
 use crate::kernel;
+use crate::offline;
 use crate::part::{self, Role};
-use crate::scale::{self, ScaleArgs};
 
 /// How fast Isotherm is, as ratios to named references
 #[derive(Debug, Parser)]
@@ -47,8 +47,18 @@ enum Command {
     },
     /// Latency, throughput and loss through the service, beside a bare relay and a Python script
     Chain(ChainArgs),
-    /// How cost, memory, start-up and swaps grow with the number of units; offline correction beside numpy
-    Scale(ScaleArgs),
+    /// Ticks per second that `isotherm-replay correct` does on one core
+    Offline {
+        /// Rounds
+        #[arg(long, default_value_t = 3)]
+        rounds: usize,
+        /// One round of a short log: whether all works, not how fast
+        #[arg(long)]
+        quick: bool,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Play one part of a chain
     #[command(hide = true)]
     Part {
@@ -125,9 +135,15 @@ fn run(command: Command) -> Result<String, Error> {
             let _ = to_stdout(text.as_bytes());
             Err(Error::Failed(report.failed))
         }
-        Command::Scale(args) => {
-            let report = scale::measure(&args)?;
-            Ok(if args.json { as_json(&report) } else { scale::table(&report) })
+        Command::Offline { rounds, quick, json } => {
+            let offline = offline::measure(rounds, quick)?;
+            if json {
+                return Ok(as_json(&offline));
+            }
+            let mut table = plain(&["correct, one core", "ticks/s"]);
+            table.add_row(["from a recording".to_owned(), format!("{:.0}", offline.correct_per_s)]);
+            table.add_row(["not compressed".to_owned(), format!("{:.0}", offline.uncompressed_per_s)]);
+            Ok(format!("{table}\n"))
         }
         Command::Part { role, plan } => part::run(role, &plan).map(|()| String::new()),
         Command::Pass { index } => instructions::pass(index).map(|()| String::new()),

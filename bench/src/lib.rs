@@ -19,10 +19,10 @@ mod error;
 mod instructions;
 mod kernel;
 mod machine;
+mod offline;
 mod part;
 mod process;
 mod rounds;
-mod scale;
 
 pub use cli::main;
 pub use error::Error;

@@ -64,8 +64,7 @@ pub(crate) fn run(role: Role, plan: &Path) -> Result<(), Error> {
 
 /// Opens a session as the project's programs do, and connects it where the plan says so.
 pub(crate) fn open(plan: &Plan) -> Result<Session, Error> {
-    let (config, connect) = (plan.zenoh_config.clone(), plan.connect.clone());
-    let options = SessionOptions { config, connect, ..SessionOptions::default() };
+    let options = SessionOptions { connect: plan.connect.clone(), ..SessionOptions::default() };
     let session = zenoh::open(options.to_config()?).wait();
     session.map_err(|source| Error::Bus(isotherm_bus::BusError::Open(source)))
 }

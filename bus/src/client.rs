@@ -185,15 +185,13 @@ impl Stated {
             && options.connect.len() == 1
             && options.listen.is_empty()
         {
-            set(&mut config, "mode", "client")?;
-            set(&mut config, "listen/endpoints", Vec::<String>::new())?;
+            as_client(&mut config)?;
         }
         let mut any_of = Vec::new();
         match options.connect.len() {
             0 => {}
             _ if options.config.is_some() => {}
-            // Once: what does not answer is reported at once, not after many trials.
-            1 => set(&mut config, "connect/timeout_ms", 0)?,
+            1 => once(&mut config)?,
             _ => {
                 set(&mut config, "connect/timeout_ms", -1)?;
                 set(&mut config, "connect/exit_on_failure", false)?;
@@ -205,7 +203,31 @@ impl Stated {
     }
 }
 
+/// Makes a client of a peer.
+fn as_client(config: &mut Config) -> Result<(), BusError> {
+    set(config, "mode", "client")?;
+    set(config, "listen/endpoints", Vec::<String>::new())
+}
+
+/// Has what does not answer reported at once, not after many trials.
+fn once(config: &mut Config) -> Result<(), BusError> {
+    set(config, "connect/timeout_ms", 0)
+}
+
 impl Way {
+    /// The way to one endpoint, as a client, with all else that a session's options say.
+    ///
+    /// # Errors
+    /// As [`SessionOptions::to_config`].
+    pub fn to(options: &SessionOptions, endpoint: &str) -> Result<Self, BusError> {
+        let options =
+            SessionOptions { connect: vec![endpoint.to_owned()], listen: Vec::new(), ..options.clone() };
+        let mut config = options.to_config()?;
+        as_client(&mut config)?;
+        once(&mut config)?;
+        Ok(Self { config, said_by: None, name: None, any_of: Vec::new() })
+    }
+
     /// Endpoints at which the service is looked for, and who says so, in words.
     #[must_use]
     pub fn tried(&self) -> String {
@@ -243,6 +265,13 @@ impl Way {
         }
     }
 
+    /// Whether anything listens at one of its endpoints.
+    pub async fn listens(&self) -> bool {
+        let endpoints = endpoints(&self.config, "connect/endpoints");
+        let listens = tokio::task::spawn_blocking(move || endpoints.iter().any(|it| obstacle::listens(it)));
+        listens.await.unwrap_or(true)
+    }
+
     /// Whether one of several endpoints answers within the limit; the others get a moment to answer too.
     async fn is_connected(&self, session: &Session, limit: Duration) -> bool {
         let all = &self.any_of;
@@ -251,10 +280,7 @@ impl Way {
         }
         let mut count = connected_to(session, all, 1, limit.min(AT_ONCE)).await;
         if count == 0 {
-            let endpoints = all.clone();
-            let listens =
-                tokio::task::spawn_blocking(move || endpoints.iter().any(|it| obstacle::listens(it)));
-            if !listens.await.unwrap_or(true) {
+            if !self.listens().await {
                 return false;
             }
             count = connected_to(session, all, 1, limit).await;
@@ -276,7 +302,8 @@ impl Way {
                 if self.is_connected(&session, limit.saturating_sub(started.elapsed())).await {
                     return Ok(session);
                 }
-                close(session, CLOSING).await?;
+                // Why nobody answers is what counts.
+                let _ = close(session, CLOSING).await;
                 not_connected(limit)
             }
             Ok(Ok(Err(source))) => source,

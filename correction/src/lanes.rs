@@ -27,6 +27,12 @@ pub(crate) fn put<const N: usize>(lanes: &mut Lanes, values: [f64; N]) {
     }
 }
 
+/// Whether every reading is a number below its sensor's limit.
+#[inline]
+pub(crate) fn within<const N: usize>(readings: &[f64; N], limits: &[f64; N]) -> bool {
+    readings.iter().zip(limits).fold(true, |sound, (reading, limit)| sound & (reading.abs() < *limit))
+}
+
 /// What the sensors of a kind read in one tick, in the order of the calibration: a list of at most [`MAX_SENSORS`] numbers that are
 /// lanes already.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -41,6 +47,18 @@ impl Readings {
     /// The first `N` lanes; 0 where there is no sensor.
     pub(crate) const fn lanes<const N: usize>(&self) -> &[f64; N] {
         narrow(&self.lanes)
+    }
+
+    /// How many there are; what the slice says of itself it asks of its bounds first.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.count == 0
     }
 
     /// Has so many readings, at most [`MAX_SENSORS`]: those that are new are 0.

@@ -3,9 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, put};
 use crate::sample::{LasingMode, MAX_SENSORS, SensorFlags, TickFlags};
 use crate::units::{Span, Timestamp};
+
+/// Flags of the sensors in a tick with nothing to say of any.
+pub(crate) const SOUND: [SensorFlags; MAX_SENSORS] = [SensorFlags::VALID; MAX_SENSORS];
 
 /// One gyro in one tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,6 +48,22 @@ pub struct GyroLanes {
 }
 
 impl GyroLanes {
+    /// Notes readings, rates with the bias still in them, and biases of a tick.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    pub(crate) fn note<const N: usize>(
+        &mut self,
+        [readings, rates, biases]: [[f64; N]; 3],
+        count: usize,
+        flags: [SensorFlags; MAX_SENSORS],
+    ) {
+        self.count = count;
+        put(&mut self.reading, readings);
+        put(&mut self.rate, rates);
+        put(&mut self.bias, biases);
+        self.flags = flags;
+    }
+
     /// Gyro by gyro.
     pub fn iter(&self) -> impl Iterator<Item = GyroSeen> + '_ {
         (0..self.count).map_while(|lane| self.get(lane))

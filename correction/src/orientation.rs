@@ -322,27 +322,23 @@ impl Inverse {
     pub fn apply(&self, readings: &[f64]) -> [f64; 3] {
         let used = |(index, s): (usize, &f64)| if self.mask.contains(index) { *s } else { 0.0 };
         let readings: Readings = readings.iter().enumerate().map(used).collect();
-        self.lerp_apply::<MAX_SENSORS>(self, 1.0, readings.lanes())
+        sum_of_columns::<MAX_SENSORS>(&self.columns, readings.lanes())
     }
 
-    /// What [`lerp`](Self::lerp) to `other` and then [`apply`](Self::apply) give, without the matrix in between; the readings of
-    /// sensors outside the mask must be zero.
+    /// The columns of what [`lerp`](Self::lerp) to `other` gives at `u` from 0 on, of the first `N` sensors.
     #[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
     #[inline(always)]
-    pub(crate) fn lerp_apply<const N: usize>(&self, other: &Self, u: f64, readings: &[f64; N]) -> [f64; 3] {
-        let mut sum = [0.0; 4];
-        let mut add =
-            |column: [f64; 4], reading| sum = array::from_fn(|axis| sum[axis] + column[axis] * reading);
-        let columns = self.columns.iter().zip(&other.columns).zip(readings);
-        if self.leads_to(other, u) {
-            columns.for_each(|((from, to), reading)| {
-                add(array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u), *reading);
+    pub(crate) fn columns_to<const N: usize>(&self, other: &Self, u: f64) -> [[f64; 4]; N] {
+        let mut columns = [[0.0; 4]; N];
+        let ends = self.columns.iter().zip(&other.columns);
+        if self.mask == other.mask && u < 1.0 {
+            columns.iter_mut().zip(ends).for_each(|(column, (from, to))| {
+                *column = array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u);
             });
         } else {
-            columns.for_each(|((_, to), reading)| add(*to, *reading));
+            columns.iter_mut().zip(ends).for_each(|(column, (_, to))| *column = *to);
         }
-        let [x, y, z, _] = sum;
-        [x, y, z]
+        columns
     }
 
     /// The matrix a fraction `u` of the way from this one to `other`, u clamped to 0…1.
@@ -351,23 +347,20 @@ impl Inverse {
     /// blend would still use the sensor that was just taken out.
     #[must_use]
     pub fn lerp(&self, other: &Self, u: f64) -> Self {
-        if !self.leads_to(other, u) {
-            return *other;
-        }
-        let u = u.max(0.0);
-        let mut columns = self.columns;
-        for (column, target) in columns.iter_mut().zip(&other.columns) {
-            for (c, target) in column.iter_mut().zip(target) {
-                *c += (target - *c) * u;
-            }
-        }
-        Self { columns, mask: self.mask }
+        Self { columns: self.columns_to(other, u.max(0.0)), mask: other.mask }
     }
+}
 
-    /// Whether there is a way from this matrix to `other`, and `u` is not at its end yet.
-    fn leads_to(&self, other: &Self, u: f64) -> bool {
-        self.mask == other.mask && u < 1.0
-    }
+/// What readings give along the case axes, by the columns of an inverse; those of sensors that take no part must be zero.
+#[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
+#[inline(always)]
+pub(crate) fn sum_of_columns<const N: usize>(columns: &[[f64; 4]; N], readings: &[f64; N]) -> [f64; 3] {
+    let mut sum = [0.0; 4];
+    columns.iter().zip(readings).for_each(|(column, reading)| {
+        sum = array::from_fn(|axis| sum[axis] + column[axis] * reading);
+    });
+    let [x, y, z, _] = sum;
+    [x, y, z]
 }
 
 #[cfg(test)]

@@ -31,6 +31,7 @@ pub use parts::{
 pub(crate) use restoration::{Gain, Restoration};
 pub use window::MIN_ADAPTIVE_READINGS;
 
+use crate::lanes::Lanes;
 use crate::later::Later;
 use crate::sample::{LasingMode, MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
@@ -128,14 +129,27 @@ impl Substitution {
     /// from here. Ticks missing inside a transition count as ticks of it.
     #[inline]
     pub fn tick(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
-        if !self.is_settled() || input.restart || self.may_switch(&input) {
+        if !self.passes(&input) {
             return self.bridge(reversal, input, increments);
         }
+        self.pass(&input, rates(increments, input.duration));
+        TickFlags::empty()
+    }
+
+    /// Whether a tick has nothing to do with a switch: it [passes](Self::pass) as it is.
+    #[inline]
+    pub(crate) fn passes(&self, input: &TickInput) -> bool {
+        self.is_settled() && !input.restart && !self.may_switch(input)
+    }
+
+    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); NaN where there is no sensor.
+    #[expect(clippy::inline_always, reason = "once per tick: the reading is made where it is put")]
+    #[inline(always)]
+    pub(crate) fn pass(&mut self, input: &TickInput, rates: Lanes) {
         self.change_due = false;
-        if let Some(reading) = Reading::new(input.end_time, input.duration, increments) {
+        if let Some(reading) = Reading::of(input.end_time, input.duration, rates) {
             self.history.push(reading);
         }
-        TickFlags::empty()
     }
 
     /// Takes a tick in or about a switch.
@@ -226,7 +240,7 @@ impl Substitution {
         increments: &mut [f64],
         flags: &mut TickFlags,
     ) -> bool {
-        let reading = Reading::new(input.end_time, input.duration, increments);
+        let reading = Reading::of(input.end_time, input.duration, rates(increments, input.duration));
         let mut resolved = true;
         if self.is_overdue(reversal, input, reading.as_ref()) {
             resolved = self.resolve(reversal);
@@ -361,6 +375,13 @@ impl Substitution {
         }
         resolved
     }
+}
+
+/// Rates (rad/s) of the sensors that gained these angles (rad) in a tick; NaN where there is no sensor.
+fn rates(increments: &[f64], duration: Span) -> Lanes {
+    let (mut rates, duration_s) = ([f64::NAN; MAX_SENSORS], duration.as_s());
+    rates.iter_mut().zip(increments).for_each(|(rate, increment)| *rate = increment / duration_s);
+    rates
 }
 
 /// How far a reading may be from a lost tick to say something about it (s), at ticks of a duration.

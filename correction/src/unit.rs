@@ -223,6 +223,7 @@ impl Unit {
         }
     }
 
+    #[inline(never)]
     fn release_waiting<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, flushing: bool, emit: &mut E) {
         let window = self.pipeline.settings.pairing_window;
         while let Some(front) = self.gyros.front(window, flushing) {

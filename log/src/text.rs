@@ -2,6 +2,7 @@
 
 mod assemble;
 mod cells;
+mod dates;
 mod error;
 mod file;
 mod input;
@@ -26,8 +27,8 @@ use crate::mapping::{Delimiter, Encoding, Mapping};
 use crate::progress::Progress;
 use file::FileReader;
 
+pub(crate) use dates::{is_date, says_order, stamp_ns};
 pub(crate) use input::open as open_raw;
-pub(crate) use number::date_time_ns;
 
 pub use error::{LogError, LogFault, Reason};
 pub use window::Window;

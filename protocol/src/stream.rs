@@ -294,7 +294,12 @@ impl UnitStream {
 
     /// Makes the next frame of corrected ticks, all of one revision, in the place of `frame`, whose capacity the stream keeps
     /// for the one after it; how many ticks are in it, `None` where there is none.
+    #[inline]
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> Option<usize> {
+        // Asked for after every message: mostly there is none.
+        if self.outgoing.is_empty() {
+            return None;
+        }
         let Self { id, unit, revisions, outgoing, .. } = self;
         let (last, ticks) =
             outgoing.next_frame(frame, unit.temperature_changes(), |head, counter, ticks| {

@@ -39,6 +39,11 @@ pub enum Error {
         /// What was waited for, and what else could be done.
         words: String,
     },
+    /// A log without a message to play.
+    #[error(
+        "nothing was played: there is no raw message of these units, topics and times; `isotherm-replay list LOG` shows what there is"
+    )]
+    NothingPlayed,
     /// The asynchronous runtime does not start.
     #[error("cannot start the runtime: {source}")]
     Runtime {

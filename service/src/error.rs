@@ -75,6 +75,15 @@ pub enum ServiceError {
     /// Something about the Zenoh session.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// The other instance of a pair does not connect to this one.
+    #[error(
+        "the other instance at {other} (pair.other) does not connect to this one: state this one's address there \
+         (zenoh.connect)"
+    )]
+    NotConnected {
+        /// Its address.
+        other: String,
+    },
     /// A subscriber or queryable cannot be declared.
     #[error("cannot declare {key}: {words}", words = isotherm_bus::words(source))]
     Declare {

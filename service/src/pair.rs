@@ -3,11 +3,13 @@
 //! | module | holds |
 //! |---|---|
 //! | `watch` | the thread that notices a silent instance, and hears the journals of others |
+//! | `join` | who is there at the start |
 //! | `ask` | memories, histories and documents of the instance that speaks, asked for |
 //! | [`crate::receive::unit`] `speech` | one unit: what is kept, compared and published in the other's place |
 //! | [`crate::control`] `carry` | histories and documents, written down here too |
 
 mod ask;
+mod join;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,10 +17,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
+use isotherm_operator::status::unix_ms;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{Member, Mode, PairReport};
+use zenoh::Session;
 
+use crate::ServiceError;
 use crate::config::{PairSettings, Settings};
 use crate::receive::intake::Intake;
 use crate::receive::unit::{Footing, Standing, UnitActor};
@@ -55,6 +60,13 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
+    /// Joins those that are there.
+    pub(crate) async fn join(settings: &Settings, session: &Session) -> Result<Self, ServiceError> {
+        // Asked before the start is stamped: of two the earlier goes before.
+        let others = Box::pin(join::others(settings, session, &group(settings))).await?;
+        Ok(Self::new(settings, session.zid().to_string(), unix_ms(), others))
+    }
+
     /// `instance` is this one's Zenoh id as text; `others` are those that were there before it.
     pub(crate) fn new(
         settings: &Settings,
@@ -64,9 +76,7 @@ impl Pair {
     ) -> Self {
         let PairSettings { name, mode, priority, takeover, .. } = settings.pair.clone();
         let name = name.unwrap_or_else(|| instance.chars().take(8).collect());
-        let group = Digest::of(settings.units.join("\n").as_bytes()).to_string().chars().take(8).collect();
-        let me = Member { instance, name, mode, priority, started_unix_ms, group };
-        let others: Vec<_> = others.into_iter().filter(|other| other.group == me.group).collect();
+        let me = Member { instance, name, mode, priority, started_unix_ms, group: group(settings) };
         let alone = others.is_empty().then(Instant::now);
         Self {
             me,
@@ -234,6 +244,11 @@ impl Pair {
             passed_over: passed_over.keys().cloned().collect(),
         }
     }
+}
+
+/// Of the units that an instance takes.
+fn group(settings: &Settings) -> String {
+    Digest::of(settings.units.join("\n").as_bytes()).to_string().chars().take(8).collect()
 }
 
 #[cfg(test)]

@@ -163,7 +163,10 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
         _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
     };
     let locators = isotherm_bus::locators(&session);
-    let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
+    let service = tokio::select! {
+        service = start_on(settings, Calibrations::default(), state, metrics, session) => service?,
+        _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
+    };
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
     announce(&args, &locators, service.metrics())?;
     let ready = format!("correcting, on {}", locators.join(" "));

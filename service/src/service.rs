@@ -7,9 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use isotherm_bus::receipt;
-use isotherm_operator::status::unix_ms;
-use isotherm_protocol::key::{self, UnitId};
-use isotherm_protocol::pair::Member;
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Status;
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
@@ -32,9 +30,6 @@ use crate::receive::pulse::{Pulse, Stuck};
 use crate::receive::unit::UnitActor;
 use crate::signing::read_trusted_keys;
 use declare::Declared;
-
-/// How long other instances may take to show themselves.
-const MEMBERS_LIMIT: std::time::Duration = std::time::Duration::from_millis(500);
 
 /// The part of the time for a stop that is kept for closing the session, one in so many.
 const CLOSE_SHARE: u32 = 10;
@@ -103,9 +98,7 @@ pub(crate) async fn start_on(
     let outlets = declare::outlets(session.clone(), settings.congestion);
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(inbox.clone());
     let intake = intake.journaling_to(declare::journal(session.clone(), settings.congestion));
-    isotherm_bus::connected(&session, &settings.zenoh.session, MEMBERS_LIMIT).await?;
-    let pair = Pair::new(&settings, session.zid().to_string(), unix_ms(), members(&session).await?);
-    let pair = Arc::new(pair);
+    let pair = Arc::new(Pair::join(&settings, &session).await?);
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
     let pulse = Arc::new(Pulse::new(settings.congestion));
 
@@ -156,17 +149,6 @@ pub(crate) async fn start_on(
         metrics,
         asking,
     })
-}
-
-/// Other instances that are there.
-async fn members(session: &Session) -> Result<Vec<Member>, ServiceError> {
-    let declare = |source| ServiceError::Declare { key: key::ALL_MEMBERS, source };
-    let replies = session.liveliness().get(key::ALL_MEMBERS).timeout(MEMBERS_LIMIT).await.map_err(declare)?;
-    let mut members = Vec::new();
-    while let Ok(reply) = replies.recv_async().await {
-        members.extend(reply.into_result().ok().and_then(|sample| Member::parse(sample.key_expr().as_str())));
-    }
-    Ok(members)
 }
 
 /// Opens the state folder, or its stand-in.

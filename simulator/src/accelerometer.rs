@@ -22,15 +22,19 @@ pub struct Accelerometer {
     /// Thermal node behind the housing.
     pub node: Node,
     /// Reference temperature T₀ of K, S and r (°C).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub reference_deg_c: f64,
     /// K (V per m/s²) by powers of T − T₀, 0…2.
+    #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub scale_v_per_m_per_s2: [f64; 3],
     /// S (V) by powers of T − T₀, 0…2.
+    #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub bias_v: [f64; 3],
     /// r (dimensionless) by powers of the board's T − T₀, 0…2; the first is 1.
     pub board_ratio: [f64; 3],
     /// Velocity random walk (m/s/√s, ≥ 0).
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub velocity_random_walk_m_per_s_per_sqrt_s: f64,
 }
 
@@ -41,6 +45,7 @@ pub enum AccelerometerOutput {
     /// Counts of a voltage-to-frequency converter over the tick.
     Counts {
         /// Converter gain (Hz/V, > 0): a corrector that takes counts as U·Δt has K and S times this.
+        #[schemars(range(min = 1e-12, max = 1e12))]
         hz_per_v: f64,
         /// Whole counts, with the fraction carried over; otherwise exact reals.
         quantised: bool,
@@ -56,6 +61,7 @@ pub struct Accelerometers {
     /// What leaves them.
     pub output: AccelerometerOutput,
     /// The sensors, 3…8.
+    #[schemars(length(min = 3, max = 8))]
     pub sensors: Vec<Accelerometer>,
     /// Their input axes.
     pub orientation: Orientation,

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Profile {
     /// Temperature at the start (°C, −100…200).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub start_deg_c: f64,
     /// What the chamber does, in order.
     #[serde(default)]
@@ -21,13 +22,16 @@ pub enum Segment {
     /// Temperature changes linearly with time.
     Ramp {
         /// Temperature at the end of the ramp (°C, −100…200).
+        #[schemars(range(min = -100.0, max = 200.0))]
         to_deg_c: f64,
         /// Rate of change, its sign given by the direction (°C/min, > 0).
+        #[schemars(range(min = 1e-3, max = 1e3))]
         rate_deg_c_per_min: f64,
     },
     /// Temperature stays.
     Hold {
         /// For how long (min, ≥ 0).
+        #[schemars(range(min = 0.0, max = 1e7))]
         minutes: f64,
     },
 }

@@ -1,194 +1,129 @@
-//! Validation of a scenario: all that is wrong, at once.
+//! Checks a scenario before it runs: the limits that its keys state, and what concerns several keys.
 
-use isotherm_correction::sample::{MAX_CHANNEL_NAME, MAX_SENSORS, MIN_SENSORS};
+use std::sync::LazyLock;
 
-use crate::chamber::{Profile, Segment};
-use crate::error::{Key, ScenarioError};
+use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS};
+use isotherm_document::{Form, Reader};
+
+use crate::error::ScenarioError;
 use crate::failure::{FailingSensor, Failure, Fault};
-use crate::instrument::Instrument;
-use crate::motion::{Motion, Path};
+use crate::instrument::{Gyros, Instrument};
+use crate::motion::Path;
+use crate::noise::GyroNoise;
 use crate::orientation::Orientation;
+use crate::reversal::Reversal;
 use crate::scenario::Scenario;
 use crate::temperature::Place;
 use crate::vector::norm;
 
-/// Collects errors. Every check states its key first.
-#[derive(Debug, Default)]
-pub(crate) struct Report(pub(crate) Vec<ScenarioError>);
-
-/// Any finite number.
-pub(crate) const ANY: (f64, f64) = (-1e12, 1e12);
-/// Zero or more.
-pub(crate) const NOT_NEGATIVE: (f64, f64) = (0.0, 1e12);
-/// More than zero.
-pub(crate) const POSITIVE: (f64, f64) = (1e-12, 1e12);
-/// Temperatures of chambers and their references (°C).
-pub(crate) const DEG_C: (f64, f64) = (-100.0, 200.0);
-
-pub(crate) const fn at(path: &'static str) -> Key {
-    Key { path, index: None }
-}
-
-pub(crate) const fn nth(path: &'static str, index: usize) -> Key {
-    Key { path, index: Some(index) }
-}
-
-impl Report {
-    pub(crate) fn number(&mut self, key: Key, got: f64, (low, high): (f64, f64)) {
-        if !(low..=high).contains(&got) {
-            self.0.push(ScenarioError::OutOfRange { key, got, low, high });
-        }
-    }
-
-    pub(crate) fn numbers(&mut self, key: Key, got: &[f64], limits: (f64, f64)) {
-        for &got in got {
-            self.number(key, got, limits);
-        }
-    }
-
-    pub(crate) fn channel_name(&mut self, key: Key, name: &str) {
-        if !(1..=MAX_CHANNEL_NAME).contains(&name.len()) {
-            self.0.push(ScenarioError::ChannelName { key, got: name.len() });
-        }
-    }
-
-    pub(crate) fn sensors(&mut self, key: Key, got: usize) {
-        if !(MIN_SENSORS..=MAX_SENSORS).contains(&got) {
-            self.0.push(ScenarioError::SensorCount { key, got });
-        }
-    }
-
-    fn axis(&mut self, path: &'static str, axis: [f64; 3]) {
-        self.numbers(at(path), &axis, ANY);
-        if norm(axis).partial_cmp(&1e-9) == Some(core::cmp::Ordering::Less) {
-            self.0.push(ScenarioError::NoDirection { key: at(path) });
-        }
-    }
-
-    pub(crate) fn orientation(&mut self, path: &'static str, orientation: &Orientation, sensors: usize) {
-        self.number(at(path), orientation.reference_deg_c, DEG_C);
-        for (got, may_be_empty) in [(orientation.rows.len(), false), (orientation.rows_per_k.len(), true)] {
-            if got != sensors && !(may_be_empty && got == 0) {
-                self.0.push(ScenarioError::Length { key: at(path), got, expected: sensors });
-            }
-        }
-        for (index, row) in orientation.rows.iter().enumerate() {
-            let got = norm(*row);
-            if (got - 1.0).abs() > 1e-9 || got.is_nan() {
-                self.0.push(ScenarioError::RowNotUnit { key: nth(path, index), got });
-            }
-        }
-        for (index, row) in orientation.rows_per_k.iter().enumerate() {
-            self.numbers(nth(path, index), row, (-1e-3, 1e-3));
-        }
-        let spread = orientation.spread();
-        if spread < 1e-6 || spread.is_nan() {
-            self.0.push(ScenarioError::AxesInPlane { key: at(path) });
-        }
-    }
-}
+/// The limits that the keys state.
+static FORM: LazyLock<Form> = LazyLock::new(Form::of::<Scenario>);
 
 impl Scenario {
-    /// All that is wrong with the scenario, in the order of its keys; empty where it can be simulated.
+    /// Everything that is wrong with the scenario, of all its parts at once.
     #[must_use]
     pub fn check(&self) -> Vec<ScenarioError> {
-        let mut report = Report::default();
-        report.number(at("duration_s"), self.duration_s, (0.0, 1e9));
+        let mut report = Report(self.beyond_limits());
+        // Exact: both are far below 2⁵³ where they are within their limits.
         #[expect(clippy::cast_precision_loss, reason = "the limits are far below 2⁵³")]
         let (tick_ns, jitter_ns) = (self.tick_ns as f64, self.tick_jitter_ns as f64);
-        report.number(at("tick_ns"), tick_ns, (1e5, 1e9));
-        report.number(at("tick_jitter_ns"), jitter_ns, (0.0, 0.25 * tick_ns.max(0.0)));
-        chamber(&mut report, &self.chamber);
-        motion(&mut report, &self.motion);
-        crate::check_instrument::instrument(&mut report, &self.instrument, tick_ns * 1e-9);
-        thermometers(&mut report, &self.instrument, tick_ns * 1e-9);
+        report.number("tick_jitter_ns", jitter_ns, [0.0, 0.25 * tick_ns.max(0.0)]);
+        match self.motion.path {
+            Path::Rest | Path::Coning { .. } => {}
+            Path::ConstantRate { axis, .. } => report.axis("motion.path.constant_rate.axis", axis),
+            Path::Sine { axis, .. } => report.axis("motion.path.sine.axis", axis),
+            Path::Sculling { axis, vibration_axis, .. } => {
+                report.axis("motion.path.sculling.axis", axis);
+                report.axis("motion.path.sculling.vibration_axis", vibration_axis);
+            }
+        }
+        instrument(&mut report, &self.instrument, tick_ns * 1e-9);
         for (index, failure) in self.failures.iter().enumerate() {
-            failing(&mut report, &self.instrument, nth("failures", index), failure);
+            failing(&mut report, &self.instrument, &format!("failures[{index}]"), failure);
         }
         report.0
     }
-}
 
-fn chamber(report: &mut Report, profile: &Profile) {
-    report.number(at("chamber.start_deg_c"), profile.start_deg_c, DEG_C);
-    for (index, segment) in profile.segments.iter().enumerate() {
-        match *segment {
-            Segment::Ramp { to_deg_c, rate_deg_c_per_min } => {
-                report.number(nth("chamber.segments.ramp.to_deg_c", index), to_deg_c, DEG_C);
-                let key = nth("chamber.segments.ramp.rate_deg_c_per_min", index);
-                report.number(key, rate_deg_c_per_min, (1e-3, 1e3));
-            }
-            Segment::Hold { minutes } => {
-                report.number(nth("chamber.segments.hold.minutes", index), minutes, (0.0, 1e7));
-            }
-        }
-    }
-}
-
-fn motion(report: &mut Report, motion: &Motion) {
-    report.number(at("motion.latitude_deg"), motion.latitude_deg, (-90.0, 90.0));
-    report.number(at("motion.earth_rate_rad_per_s"), motion.earth_rate_rad_per_s, (-1.0, 1.0));
-    report.number(at("motion.gravity_m_per_s2"), motion.gravity_m_per_s2, (0.0, 20.0));
-    report.number(at("motion.heading_deg"), motion.heading_deg, (-360.0, 360.0));
-    report.number(at("motion.pitch_deg"), motion.pitch_deg, (-360.0, 360.0));
-    report.number(at("motion.roll_deg"), motion.roll_deg, (-360.0, 360.0));
-    let frequency = (0.0, 1000.0);
-    let angle = (-360.0, 360.0);
-    match motion.path {
-        Path::Rest => {}
-        Path::ConstantRate { axis, rate_deg_per_s } => {
-            report.axis("motion.path.constant_rate.axis", axis);
-            report.number(at("motion.path.constant_rate.rate_deg_per_s"), rate_deg_per_s, (-1e4, 1e4));
-        }
-        Path::Sine { axis, amplitude_deg, frequency_hz, phase_deg } => {
-            report.axis("motion.path.sine.axis", axis);
-            report.number(at("motion.path.sine.amplitude_deg"), amplitude_deg, angle);
-            report.number(at("motion.path.sine.frequency_hz"), frequency_hz, frequency);
-            report.number(at("motion.path.sine.phase_deg"), phase_deg, angle);
-        }
-        Path::Coning { half_angle_deg, frequency_hz } => {
-            report.number(at("motion.path.coning.half_angle_deg"), half_angle_deg, (-90.0, 90.0));
-            report.number(at("motion.path.coning.frequency_hz"), frequency_hz, frequency);
-        }
-        Path::Sculling {
-            axis,
-            amplitude_deg,
-            frequency_hz,
-            vibration_axis,
-            vibration_m_per_s2,
-            vibration_phase_deg,
-        } => {
-            report.axis("motion.path.sculling.axis", axis);
-            report.axis("motion.path.sculling.vibration_axis", vibration_axis);
-            report.number(at("motion.path.sculling.amplitude_deg"), amplitude_deg, angle);
-            report.number(at("motion.path.sculling.frequency_hz"), frequency_hz, frequency);
-            report.number(at("motion.path.sculling.vibration_m_per_s2"), vibration_m_per_s2, (-1e3, 1e3));
-            report.number(at("motion.path.sculling.vibration_phase_deg"), vibration_phase_deg, angle);
-        }
-    }
-}
-
-fn thermometers(report: &mut Report, instrument: &Instrument, tick_s: f64) {
-    let thermometers = &instrument.thermometers;
-    report.number(at("instrument.thermometers.period_s"), thermometers.period_s, (tick_s.max(1e-4), 1e6));
-    for (index, channel) in thermometers.channels.iter().enumerate() {
-        let key = nth("instrument.thermometers.channels", index);
-        report.channel_name(key, &channel.name);
-        if thermometers.channels.iter().take(index).any(|earlier| earlier.name == channel.name) {
-            report.0.push(ScenarioError::ChannelTwice { key });
-        }
-        let known = match channel.place {
-            Place::Chamber | Place::Housing | Place::Board => true,
-            Place::Gyro(index) => index < instrument.gyros.count(),
-            Place::Accelerometer(index) => index < accelerometers(instrument),
+    /// What is beyond the limit of its key: judged as a document of the scenario would be.
+    fn beyond_limits(&self) -> Vec<ScenarioError> {
+        // A document has no whole number as large as a seed may be.
+        let text = match toml::to_string(&Self { seed: 0, ..self.clone() }) {
+            Ok(text) => text,
+            Err(error) => return vec![ScenarioError { key: String::new(), message: error.to_string() }],
         };
-        if !known {
-            report.0.push(ScenarioError::UnknownPlace { key, place: channel.place });
+        let mut reader = Reader::new(&text, None);
+        let _: Option<Self> = reader.read(&FORM);
+        let problems = reader.into_problems().unwrap_or_default().into_iter();
+        problems.map(|problem| ScenarioError { key: problem.key, message: problem.message }).collect()
+    }
+}
+
+/// Everything that is wrong, as it is found.
+struct Report(Vec<ScenarioError>);
+
+impl Report {
+    fn add(&mut self, key: &str, message: impl Into<String>) {
+        self.0.push(ScenarioError { key: key.to_owned(), message: message.into() });
+    }
+
+    fn number(&mut self, key: &str, got: f64, [low, high]: [f64; 2]) {
+        if !(low..=high).contains(&got) {
+            self.add(key, format!("is {got}, must be from {low} to {high}"));
         }
-        report.number(key, channel.raw_at_0_deg_c, ANY);
-        report.number(key, channel.raw_per_deg_c.abs(), POSITIVE);
-        report.number(key, channel.noise_deg_c, NOT_NEGATIVE);
-        report.number(key, channel.resolution_raw, NOT_NEGATIVE);
+    }
+
+    fn length(&mut self, key: &str, got: usize, sensors: usize) {
+        if got != sensors {
+            self.add(key, format!("has {got} entries for {sensors} sensors"));
+        }
+    }
+
+    fn axis(&mut self, key: &str, axis: [f64; 3]) {
+        if norm(axis) < 1e-9 {
+            self.add(key, "has no direction");
+        }
+    }
+
+    fn orientation(&mut self, key: &str, orientation: &Orientation, sensors: usize) {
+        self.length(&format!("{key}.rows"), orientation.rows.len(), sensors);
+        if !orientation.rows_per_k.is_empty() {
+            self.length(&format!("{key}.rows_per_k"), orientation.rows_per_k.len(), sensors);
+        }
+        for (index, row) in orientation.rows.iter().enumerate() {
+            let length = norm(*row);
+            if (length - 1.0).abs() > 1e-9 || length.is_nan() {
+                self.add(&format!("{key}.rows[{index}]"), format!("has the length {length}, must have 1"));
+            }
+        }
+        let spread = orientation.spread();
+        if spread < 1e-6 || spread.is_nan() {
+            self.add(key, "has input axes in one plane");
+        }
+    }
+
+    /// κ1 and κ2 of a scale factor.
+    fn scale_per_k(&mut self, key: &str, [first, second]: [f64; 2]) {
+        self.number(&format!("{key}.scale_per_k[0]"), first, [-2e-3, 2e-3]);
+        self.number(&format!("{key}.scale_per_k[1]"), second, [-5e-6, 5e-6]);
+    }
+
+    fn noise(&mut self, key: &str, noise: &GyroNoise) {
+        if noise.markov_drift_rad_per_s > 0.0 {
+            self.number(
+                &format!("{key}.noise.markov_correlation_s"),
+                noise.markov_correlation_s,
+                [1e-12, 1e12],
+            );
+        }
+    }
+
+    fn reversal(&mut self, reversal: &Reversal, tick_s: f64) {
+        let key = "instrument.gyros.zeeman.reversal";
+        self.number(&format!("{key}.lost_max_s"), reversal.lost_max_s, [reversal.lost_min_s, 1.0]);
+        if reversal.period_s.total_cmp(&0.0).is_ne() {
+            let shortest_s = reversal.lost_max_s + 8.0 * tick_s;
+            self.number(&format!("{key}.period_s"), reversal.period_s, [shortest_s, 1e6]);
+        }
     }
 }
 
@@ -196,23 +131,99 @@ fn accelerometers(instrument: &Instrument) -> usize {
     instrument.accelerometers.as_ref().map_or(0, |block| block.sensors.len())
 }
 
-fn failing(report: &mut Report, instrument: &Instrument, key: Key, failure: &Failure) {
-    report.number(key, failure.at_s, NOT_NEGATIVE);
-    let sensor = failure.sensor;
-    let known = match sensor {
+fn instrument(report: &mut Report, instrument: &Instrument, tick_s: f64) {
+    let count = instrument.gyros.count();
+    if !(MIN_SENSORS..=MAX_SENSORS).contains(&count) {
+        let message = format!("has {count} sensors, must have {MIN_SENSORS} to {MAX_SENSORS}");
+        report.add("instrument.gyros", message);
+    }
+    report.orientation("instrument.gyro_orientation", &instrument.gyro_orientation, count);
+    let mut gyro = |key: &str, index: usize, scale_per_k, noise| {
+        let key = format!("instrument.gyros.{key}[{index}]");
+        report.scale_per_k(&key, scale_per_k);
+        report.noise(&key, noise);
+    };
+    match &instrument.gyros {
+        Gyros::Zeeman(unit) => {
+            let gyros = unit.gyros.iter().enumerate();
+            gyros.for_each(|(index, it)| gyro("zeeman.gyros", index, it.scale_per_k, &it.noise));
+            report.reversal(&unit.reversal, tick_s);
+        }
+        Gyros::FibreOptic(gyros) => {
+            let gyros = gyros.iter().enumerate();
+            gyros.for_each(|(index, it)| gyro("fibre_optic", index, it.scale_per_k, &it.noise));
+        }
+        Gyros::Mems(gyros) => {
+            let gyros = gyros.iter().enumerate();
+            gyros.for_each(|(index, it)| gyro("mems", index, it.scale_per_k, &it.noise));
+        }
+    }
+    if let Some(block) = &instrument.accelerometers {
+        let key = "instrument.accelerometers";
+        report.orientation(&format!("{key}.orientation"), &block.orientation, block.sensors.len());
+        for (index, sensor) in block.sensors.iter().enumerate() {
+            let [ratio, rest @ ..] = sensor.board_ratio;
+            let at = |field: &str| format!("{key}.sensors[{index}].{field}");
+            let scale = sensor.scale_v_per_m_per_s2[0].abs();
+            report.number(&at("scale_v_per_m_per_s2"), scale, [1e-12, 1e12]);
+            report.number(&at("board_ratio[0]"), ratio, [1e-3, 1e3]);
+            for ratio in rest {
+                report.number(&at("board_ratio"), ratio, [-1e-3, 1e-3]);
+            }
+        }
+    }
+    thermometers(report, instrument, tick_s);
+    let effects = &instrument.effects;
+    for (key, got, sensors) in [
+        ("instrument.effects.gyros", effects.gyros.len(), count),
+        ("instrument.effects.accelerometers", effects.accelerometers.len(), accelerometers(instrument)),
+    ] {
+        if got > 0 {
+            report.length(key, got, sensors);
+        }
+    }
+}
+
+fn thermometers(report: &mut Report, instrument: &Instrument, tick_s: f64) {
+    let thermometers = &instrument.thermometers;
+    report.number("instrument.thermometers.period_s", thermometers.period_s, [tick_s, 1e6]);
+    let mut names: Vec<&str> =
+        instrument.effects.supply.iter().map(|supply| supply.channel.as_str()).collect();
+    for (index, channel) in thermometers.channels.iter().enumerate() {
+        let key = format!("instrument.thermometers.channels[{index}]");
+        if names.contains(&&*channel.name) {
+            report.add(&format!("{key}.name"), "is also the name of another channel");
+        }
+        names.push(&channel.name);
+        let known = match channel.place {
+            Place::Chamber | Place::Housing | Place::Board => true,
+            Place::Gyro(index) => index < instrument.gyros.count(),
+            Place::Accelerometer(index) => index < accelerometers(instrument),
+        };
+        if !known {
+            report
+                .add(&format!("{key}.place"), format!("is {:?}: the unit has no such place", channel.place));
+        }
+        let raw_per_deg_c = channel.raw_per_deg_c.abs();
+        report.number(&format!("{key}.raw_per_deg_c"), raw_per_deg_c, [1e-12, 1e12]);
+    }
+}
+
+fn failing(report: &mut Report, instrument: &Instrument, key: &str, failure: &Failure) {
+    let known = match failure.sensor {
         FailingSensor::Gyro(index) => index < instrument.gyros.count(),
         FailingSensor::Accelerometer(index) => index < accelerometers(instrument),
     };
     if !known {
-        report.0.push(ScenarioError::UnknownSensor { key, sensor });
+        report.add(&format!("{key}.sensor"), format!("is {:?}: the unit has no such sensor", failure.sensor));
     }
-    match (failure.fault, sensor) {
-        (Fault::Stuck | Fault::NotFinite, _) => {}
-        (Fault::RateJump { rad_per_s }, FailingSensor::Gyro(_)) => report.number(key, rad_per_s, ANY),
-        (Fault::ForceJump { m_per_s2 }, FailingSensor::Accelerometer(_)) => report.number(key, m_per_s2, ANY),
-        (Fault::RateJump { .. } | Fault::ForceJump { .. }, _) => {
-            report.0.push(ScenarioError::WrongFault { key });
+    match (failure.fault, failure.sensor) {
+        (Fault::RateJump { .. }, FailingSensor::Accelerometer(_))
+        | (Fault::ForceJump { .. }, FailingSensor::Gyro(_)) => {
+            let message = "a rate jump is for gyros, a force jump for accelerometers";
+            report.add(&format!("{key}.fault"), message);
         }
+        _ => {}
     }
 }
 

@@ -9,18 +9,25 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Slab {
     /// Layers of fibre (4…400).
+    #[schemars(range(min = 4, max = 400))]
     pub layers: u32,
     /// Finite volumes per layer (1…16).
+    #[schemars(range(min = 1, max = 16))]
     pub cells_per_layer: u32,
     /// Thickness of one layer (m, > 0).
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub layer_thickness_m: f64,
     /// Thermal conductivity across the layers (W/(m·K), > 0).
+    #[schemars(range(min = 1e-12, max = 1e12))]
     pub conductivity_w_per_m_k: f64,
     /// Heat capacity by volume (J/(m³·K), > 0).
+    #[schemars(range(min = 1e-12, max = 1e12))]
     pub heat_capacity_j_per_m3_k: f64,
     /// Conductance from the housing to the outer face (W/(m²·K), ≥ 0; 0 insulates).
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub outer_contact_w_per_m2_k: f64,
     /// Conductance from the housing to the inner face (W/(m²·K), ≥ 0; 0 insulates).
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub inner_contact_w_per_m2_k: f64,
 }
 

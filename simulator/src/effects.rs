@@ -50,22 +50,30 @@ impl Effects {
 #[serde(deny_unknown_fields, default)]
 pub struct GyroEffects {
     /// Drift by the specific force along each case axis (rad/s per m/s²); adds to the input rate [IEEE 528].
+    #[schemars(inner(range(min = -1.0, max = 1.0)))]
     pub acceleration_rad_per_s_per_m_per_s2: [f64; 3],
     /// Its change with the gyro's temperature (rad/s per m/s² per K).
+    #[schemars(inner(range(min = -1.0, max = 1.0)))]
     pub acceleration_per_k: [f64; 3],
     /// Temperature to which the former refers (°C).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub reference_deg_c: f64,
     /// Asymmetry a of the scale (dimensionless): the gyro senses R·(1 + a) of a positive rate, R·(1 − a) of a negative one.
+    #[schemars(range(min = -0.1, max = 0.1))]
     pub scale_asymmetry: f64,
     /// Curvature c of the scale over the rate ((rad/s)⁻²): the gyro senses R·(1 + c·R²), R the mean rate of the tick.
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub scale_curvature_s2_per_rad2: f64,
     /// By how much of a tick its reading lags: a tick's is that of a span so much earlier.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub delay_ticks: f64,
     /// Friction in what follows temperature.
     pub play: Option<Play>,
     /// Bias by the gradient across it, its own temperature less that of the housing (rad/s per K).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub gradient_rad_per_s_per_k: f64,
     /// Bias by the supply voltage beyond its nominal value (rad/s per V).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub supply_rad_per_s_per_v: f64,
 }
 
@@ -74,16 +82,21 @@ pub struct GyroEffects {
 #[serde(deny_unknown_fields, default)]
 pub struct AccelerometerEffects {
     /// Where it sits from the point whose motion is the truth, in case axes (m).
+    #[schemars(inner(range(min = -10.0, max = 10.0)))]
     pub position_m: [f64; 3],
     /// Second-order term K2 (1/(m/s²)): it senses f + K2·f², f along its axis at every instant.
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub second_order_s2_per_m: f64,
     /// By how much of a tick its reading lags, as for gyros.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub delay_ticks: f64,
     /// Friction in what follows temperature.
     pub play: Option<Play>,
     /// Error by the gradient across it, its own temperature less that of the housing (m/s² per K).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub gradient_m_per_s2_per_k: f64,
     /// Error by the supply voltage beyond its nominal value (m/s² per V).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub supply_m_per_s2_per_v: f64,
 }
 
@@ -92,12 +105,16 @@ pub struct AccelerometerEffects {
 #[serde(deny_unknown_fields)]
 pub struct Supply {
     /// Name of its channel, 1…24 bytes.
+    #[schemars(length(min = 1, max = 24))]
     pub channel: String,
     /// Nominal voltage (V), about which it swings.
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub nominal_v: f64,
     /// Amplitude of the swing (V).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub swing_v: f64,
     /// Period of the swing (s, > 0).
+    #[schemars(range(min = 1e-12, max = 1e12))]
     pub period_s: f64,
 }
 
@@ -121,8 +138,10 @@ impl Supply {
 #[serde(deny_unknown_fields)]
 pub struct Play {
     /// Half width w of the slack (K, > 0).
+    #[schemars(range(min = 1e-12, max = 1e12))]
     pub half_width_k: f64,
     /// Error g by which the sensor is off per kelvin that the play is behind (rad/s or m/s² per K).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub per_k: f64,
 }
 
@@ -131,8 +150,10 @@ pub struct Play {
 #[serde(deny_unknown_fields)]
 pub struct AxesPlay {
     /// Half width w of the slack (K, > 0).
+    #[schemars(range(min = 1e-12, max = 1e12))]
     pub half_width_k: f64,
     /// Share of the turning.
+    #[schemars(range(min = -10.0, max = 10.0))]
     pub share: f64,
 }
 

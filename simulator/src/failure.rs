@@ -10,6 +10,7 @@ pub struct Failure {
     /// Which sensor.
     pub sensor: FailingSensor,
     /// When, from the start of the run (s, ≥ 0).
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub at_s: f64,
     /// How.
     pub fault: Fault,
@@ -34,11 +35,13 @@ pub enum Fault {
     /// This is added to a gyro's input rate (rad/s).
     RateJump {
         /// By how much (rad/s).
+        #[schemars(range(min = -1e12, max = 1e12))]
         rad_per_s: f64,
     },
     /// This is added to an accelerometer's input (m/s²).
     ForceJump {
         /// By how much (m/s²).
+        #[schemars(range(min = -1e12, max = 1e12))]
         m_per_s2: f64,
     },
     /// The reading is not a number.

@@ -21,8 +21,10 @@ pub struct FibreOpticGyro {
     /// The fibre in it.
     pub fibre: Fibre,
     /// Reference temperature T₀ of scale, static bias and thermo-optic coefficient (°C).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub reference_deg_c: f64,
     /// K at the reference temperature: true rate per indicated rate (dimensionless, near 1).
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub scale: f64,
     /// κ1 (1/K) and κ2 (1/K²): K(T) = K0·(1 + κ1·(T − T₀) + κ2·(T − T₀)²).
     #[serde(default)]
@@ -41,12 +43,16 @@ pub struct FibreOpticGyro {
 #[serde(deny_unknown_fields, default)]
 pub struct OpticsBias {
     /// Offset b (rad/s).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub offset_rad_per_s: f64,
     /// Amplitude a of the ripple (rad/s).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub ripple_rad_per_s: f64,
     /// Change of temperature P for one fringe (K, > 0).
+    #[schemars(range(min = 1e-3, max = 1e6))]
     pub ripple_period_k: f64,
     /// Phase p at the reference temperature (rad).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub ripple_phase_rad: f64,
 }
 

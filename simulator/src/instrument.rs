@@ -19,6 +19,7 @@ use crate::zeeman::Zeeman;
 pub struct Instrument {
     /// Step of the thermal clock (s, 0.001…10). Between its steps all temperatures and slow drifts are linear in
     /// time, and that is the truth, not an approximation of it.
+    #[schemars(range(min = 1e-3, max = 10.0))]
     pub thermal_step_s: f64,
     /// Start with all parts at the chamber's temperature instead of at their own steady ones.
     #[serde(default)]

@@ -40,7 +40,6 @@
 pub mod accelerometer;
 pub mod chamber;
 mod check;
-mod check_instrument;
 pub mod coil;
 mod counter;
 pub mod effects;

@@ -17,16 +17,20 @@ pub struct MemsGyro {
     /// Thermal node behind the housing.
     pub node: Node,
     /// Reference temperature T₀ (°C).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub reference_deg_c: f64,
     /// K at the reference temperature: true rate per indicated rate (dimensionless, near 1).
+    #[schemars(range(min = 1e-6, max = 1e6))]
     pub scale: f64,
     /// κ1 (1/K) and κ2 (1/K²): K(T) = K0·(1 + κ1·(T − T₀) + κ2·(T − T₀)²).
     #[serde(default)]
     pub scale_per_k: [f64; 2],
     /// Bias (rad/s) by powers of T − T₀, 0…3.
+    #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub bias_rad_per_s: [f64; 4],
     /// Step of the digital output (rad/s, ≥ 0; 0 for none).
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub resolution_rad_per_s: f64,
     /// Noise.
     #[serde(default)]

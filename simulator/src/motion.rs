@@ -15,20 +15,26 @@ pub const EARTH_RATE_RAD_PER_S: f64 = 7.292_115e-5;
 #[serde(deny_unknown_fields)]
 pub struct Motion {
     /// Geodetic latitude (°, −90…90).
+    #[schemars(range(min = -90.0, max = 90.0))]
     pub latitude_deg: f64,
     /// Rate of the Earth (rad/s, −1…1); zero switches it off, which coning and sculling checks want.
     #[serde(default = "earth_rate")]
+    #[schemars(range(min = -1.0, max = 1.0))]
     pub earth_rate_rad_per_s: f64,
     /// Gravity at the place (m/s², 0…20); see [`normal_gravity_m_per_s2`].
+    #[schemars(range(min = 0.0, max = 20.0))]
     pub gravity_m_per_s2: f64,
     /// Heading of the case's x axis from north (°).
     #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0))]
     pub heading_deg: f64,
     /// Pitch of the case's x axis above the horizon (°).
     #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0))]
     pub pitch_deg: f64,
     /// Roll about the case's x axis (°).
     #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0))]
     pub roll_deg: f64,
     /// Movement from that attitude.
     pub path: Path,
@@ -47,44 +53,58 @@ pub enum Path {
     /// Rotation about a fixed axis at a constant rate.
     ConstantRate {
         /// Axis of the rotation.
+        #[schemars(inner(range(min = -1e12, max = 1e12)))]
         axis: [f64; 3],
         /// Rate about it (°/s, −10 000…10 000).
+        #[schemars(range(min = -1e4, max = 1e4))]
         rate_deg_per_s: f64,
     },
     /// Angle A·sin(2πft + p) about a fixed axis.
     Sine {
         /// Axis of the rotation.
+        #[schemars(inner(range(min = -1e12, max = 1e12)))]
         axis: [f64; 3],
         /// Amplitude A (°, −360…360).
+        #[schemars(range(min = -360.0, max = 360.0))]
         amplitude_deg: f64,
         /// Frequency f (Hz, 0…1000).
+        #[schemars(range(min = 0.0, max = 1000.0))]
         frequency_hz: f64,
         /// Phase p at the start (°).
         #[serde(default)]
+        #[schemars(range(min = -360.0, max = 360.0))]
         phase_deg: f64,
     },
     /// The z axis goes round a cone: attitude by the rotation vector a·(cos 2πft, sin 2πft, 0).
     Coning {
         /// Angle a between the z axis and the axis of the cone (°, −90…90).
+        #[schemars(range(min = -90.0, max = 90.0))]
         half_angle_deg: f64,
         /// Frequency f (Hz, 0…1000).
+        #[schemars(range(min = 0.0, max = 1000.0))]
         frequency_hz: f64,
     },
     /// Angle A·sin(2πft) about one axis and specific force B·sin(2πft + p) along another: where the axes are
     /// at right angles and p is zero, the velocity drifts by ½·A·B per second along the third one.
     Sculling {
         /// Axis of the rotation.
+        #[schemars(inner(range(min = -1e12, max = 1e12)))]
         axis: [f64; 3],
         /// Amplitude A (°, −360…360).
+        #[schemars(range(min = -360.0, max = 360.0))]
         amplitude_deg: f64,
         /// Frequency f (Hz, 0…1000).
+        #[schemars(range(min = 0.0, max = 1000.0))]
         frequency_hz: f64,
         /// Axis of the vibration, fixed in the case.
+        #[schemars(inner(range(min = -1e12, max = 1e12)))]
         vibration_axis: [f64; 3],
         /// Amplitude B of the specific force (m/s², −1000…1000).
+        #[schemars(range(min = -1e3, max = 1e3))]
         vibration_m_per_s2: f64,
         /// Phase p of the specific force relative to the angle (°).
         #[serde(default)]
+        #[schemars(range(min = -360.0, max = 360.0))]
         vibration_phase_deg: f64,
     },
 }

@@ -83,8 +83,10 @@ impl Noise {
 #[serde(deny_unknown_fields, default)]
 pub struct GyroNoise {
     /// Angle random walk (rad/√s, ≥ 0); 1 °/√h is 2.9089e-4 rad/√s.
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub angle_random_walk_rad_per_sqrt_s: f64,
     /// Standard deviation of a first-order Markov drift (rad/s, ≥ 0). It is part of the true drift.
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub markov_drift_rad_per_s: f64,
     /// Correlation time of the Markov drift (s, > 0 where that drift is not zero).
     pub markov_correlation_s: f64,

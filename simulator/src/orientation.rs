@@ -15,11 +15,13 @@ use crate::vector::{Vector, add, cross, dot, norm, scale};
 #[serde(deny_unknown_fields)]
 pub struct Orientation {
     /// Reference temperature T₀ (°C).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub reference_deg_c: f64,
     /// C0: one unit row per sensor, 3…8 of them.
     pub rows: Vec<[f64; 3]>,
     /// C1: one row per sensor (1/K), at right angles to that of C0; empty for axes that do not turn.
     #[serde(default)]
+    #[schemars(inner(inner(range(min = -1e-3, max = 1e-3))))]
     pub rows_per_k: Vec<[f64; 3]>,
 }
 

@@ -16,14 +16,18 @@ pub struct Reversal {
     #[serde(default)]
     pub starts_in_minus: bool,
     /// Shortest time without two-way generation after a switch (s, > 0). The source has 5 ms.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub lost_min_s: f64,
     /// Longest such time (s). The source has 15 ms. The time is drawn uniformly; a tick that it touches is lost.
     pub lost_max_s: f64,
     /// Time constant τ with which the perimeter servo pulls the miss in (s, > 0).
+    #[schemars(range(min = 1e-4, max = 1e3))]
     pub servo_time_constant_s: f64,
     /// Standard deviation of the perimeter's miss after a switch, drawn for each gyro (fraction of a wavelength, ≥ 0).
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub miss_rms_wavelengths: f64,
     /// Curvature c of the dither frequency over the miss m: f = f0·(1 − c·m²) (≥ 0). The loss is cut off at ½.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub dither_curvature: f64,
     /// Whether the dither turns with the lasing mode, as a magnetic field's effect on a Zeeman laser does: then the
     /// negative half of a tick comes first in the minus mode. False for electronics that invert the field with the mode, so
@@ -32,6 +36,7 @@ pub struct Reversal {
     pub dither_turns_with_mode: bool,
     /// Half period of the slow meander (s, ≥ 0); 0 for one that is not reported and has the sign +1 throughout.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub meander_half_period_s: f64,
 }
 

@@ -20,8 +20,10 @@ pub struct Scenario {
     #[serde(default)]
     pub start_ns: i64,
     /// Duration of the run (s, 0…10⁹); whole ticks are simulated.
+    #[schemars(range(min = 0.0, max = 1e9))]
     pub duration_s: f64,
     /// Nominal duration of a tick (ns, 10⁵…10⁹).
+    #[schemars(range(min = 100_000, max = 1_000_000_000))]
     pub tick_ns: i64,
     /// Largest distance of a tick's end from its nominal time, drawn uniformly (ns, 0…¼ tick).
     #[serde(default)]

@@ -12,6 +12,7 @@ use crate::noise::{Noise, Purpose};
 #[serde(deny_unknown_fields)]
 pub struct Thermometers {
     /// Time between readings (s, ≥ one tick). All channels are read together; the first time at the start.
+    #[schemars(range(min = 1e-4, max = 1e6))]
     pub period_s: f64,
     /// The channels.
     pub channels: Vec<Channel>,
@@ -24,18 +25,23 @@ pub struct Thermometers {
 #[serde(deny_unknown_fields)]
 pub struct Channel {
     /// Name, 1…24 bytes.
+    #[schemars(length(min = 1, max = 24))]
     pub name: String,
     /// Where it sits.
     pub place: Place,
     /// Reading at 0 °C (V, counts or °C).
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub raw_at_0_deg_c: f64,
     /// Change of the reading per °C; not zero.
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub raw_per_deg_c: f64,
     /// Standard deviation of the reading's noise (°C, ≥ 0).
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub noise_deg_c: f64,
     /// Step of the reading (raw, ≥ 0; 0 for none).
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e12))]
     pub resolution_raw: f64,
 }
 

@@ -8,9 +8,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Node {
     /// Time constant τ (s, ≥ 0); zero follows at once.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub time_constant_s: f64,
     /// Steady temperature above the surroundings by the part's own power (°C).
     #[serde(default)]
+    #[schemars(range(min = -100.0, max = 100.0))]
     pub heating_deg_c: f64,
 }
 

@@ -24,15 +24,20 @@ pub struct Fibre {
     /// Order of winding.
     pub winding: Winding,
     /// Turns in one layer (≥ 1).
+    #[schemars(range(min = 1, max = 100_000))]
     pub turns_per_layer: u32,
     /// Radius of the innermost layer's inner side (m, > 0).
+    #[schemars(range(min = 1e-6, max = 10.0))]
     pub inner_radius_m: f64,
     /// Distance from the middle of the wound fibre to the middle of the optical path (m): the trimming error
     /// of the fibre's ends.
+    #[schemars(range(min = -1e3, max = 1e3))]
     pub midpoint_offset_m: f64,
     /// Refractive index n of the core (> 0).
+    #[schemars(range(min = 1.0, max = 4.0))]
     pub refractive_index: f64,
     /// dn/dT + n·α (1/K) and its change with temperature (1/K²) from the gyro's reference temperature.
+    #[schemars(inner(range(min = -1.0, max = 1.0)))]
     pub thermo_optic_per_k: [f64; 2],
 }
 

@@ -40,24 +40,31 @@ pub struct ZeemanGyro {
     /// Thermal node behind the housing.
     pub node: Node,
     /// Reference temperature T₀ of all coefficients but the meander's (°C).
+    #[schemars(range(min = -100.0, max = 200.0))]
     pub reference_deg_c: f64,
     /// K0: angle per count at the reference temperature (rad, > 0).
+    #[schemars(range(min = 1e-9, max = 1.0))]
     pub scale_rad_per_count: f64,
     /// κ1 (1/K) and κ2 (1/K²): K(T) = K0·(1 + κ1·(T − T₀) + κ2·(T − T₀)²).
     #[serde(default)]
     pub scale_per_k: [f64; 2],
     /// Non-magnetic bias C0, C1, C2 (rad/s) by powers of T − T₀; adds to the input rate.
+    #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub bias_nonmagnetic_rad_per_s: [f64; 3],
     /// Magnetic bias B0, B1, B2 (rad/s) by powers of T − T₀; adds to the input rate with the mode's sign.
+    #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub bias_magnetic_rad_per_s: [f64; 3],
     /// Slow meander D1, D0 (rad/s) by powers of T − 25 °C; adds to the input rate with the meander's sign.
     #[serde(default)]
+    #[schemars(inner(range(min = -1e12, max = 1e12)))]
     pub meander_rad_per_s: [f64; 2],
     /// Rest value f0 of the dither frequency (Hz) by powers of T − T₀.
+    #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub dither_hz: [f64; 3],
     /// Static lock-in rate L (rad/s, ≥ 0): below it the counter stands still, above it counts √(R² − L²) of a rate R, dither
     /// included. So the scale bends where the input comes near the dither's amplitude.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub lock_in_rad_per_s: f64,
     /// Noise.
     #[serde(default)]

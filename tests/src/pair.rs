@@ -69,14 +69,17 @@ impl Pair {
         let (own, other) = (&self.addresses[index], &self.proxies[1 - index].endpoint);
         let file = self.folder.join(format!("service-{index}.toml"));
         let zenoh = self.folder.join(format!("peer-{index}.json5"));
+        // The second connects to the first.
+        let connect = if index == 1 { format!("'{other}{AGAIN}'") } else { String::new() };
+        let other = if index == 1 { String::new() } else { format!("\nother = \"{other}\"") };
         let config = format!(
-            "{{mode: 'peer', listen: {{endpoints: ['{own}']}}, connect: {{endpoints: ['{other}{AGAIN}'], timeout_ms: -1, \
+            "{{mode: 'peer', listen: {{endpoints: ['{own}']}}, connect: {{endpoints: [{connect}], timeout_ms: -1, \
              exit_on_failure: false}}, scouting: {{multicast: {{enabled: false}}, gossip: {{enabled: false}}}}, transport: \
              {{link: {{tx: {{queue: {{batching: {{time_limit: 0}}, size: {{real_time: 16}}}}}}}}}}}}"
         );
         std::fs::write(&zenoh, config).expect("written");
-        let extra =
-            self.extra.replace("[pair]", &format!("[pair]\nlease_ms = 500\nname = \"{}\"", NAMES[index]));
+        let named = format!("[pair]\nlease_ms = 500\nname = \"{}\"{other}", NAMES[index]);
+        let extra = self.extra.replace("[pair]", &named);
         let text = format!(
             "calibrations = \"documents\"\nstate = \"state-{index}\"\n{extra}\n[zenoh]\nconfig = \"peer-{index}.json5\"\n"
         );

@@ -37,8 +37,6 @@ pub(crate) struct Case {
     pub(crate) beside: Option<Beside>,
     /// Whether the service has a state folder, in which it writes down every calibration.
     pub(crate) state: bool,
-    /// Sessions of the source.
-    pub(crate) sessions: usize,
     /// Units that are given another calibration afterwards, one after the other, to see how long that takes.
     pub(crate) timed_swaps: usize,
 }
@@ -63,7 +61,6 @@ impl Case {
             ticks: 0,
             beside: None,
             state: true,
-            sessions: 1,
             timed_swaps: 0,
         }
     }
@@ -90,7 +87,6 @@ impl Case {
         };
         match self.pace {
             Pace::Saturated { .. } => format!("{} {units}, saturated, batches of {}", self.units, self.batch),
-            Pace::Spread => format!("{} {units} × {} Hz, spread{batch}{beside}", self.units, self.rate_hz),
             Pace::Burst => format!("{} {units} × {} Hz{batch}{beside}", self.units, self.rate_hz),
         }
     }
@@ -104,7 +100,7 @@ impl Case {
     pub(crate) fn warm_up_messages(&self) -> usize {
         match self.pace {
             Pace::Saturated { .. } => 0,
-            Pace::Burst | Pace::Spread => self.messages_in(WARM_UP_S),
+            Pace::Burst => self.messages_in(WARM_UP_S),
         }
     }
 
@@ -132,9 +128,7 @@ impl Case {
             prelude,
             pace: self.pace,
             block: saturated,
-            sessions: self.sessions,
             connect: Vec::new(),
-            zenoh_config: None,
             folder: folder.to_owned(),
             keep: CHECKED.min(KEPT.div_ceil(self.units)),
             format,

@@ -89,18 +89,11 @@ pub(crate) fn relay(plan: &Plan) -> Result<Command, Error> {
     let constants = plan.folder.join("constants.json");
     let text = serde_json::to_string(&Constants::OF_MEMS).unwrap_or_default();
     fs::write(&constants, text).map_err(|source| Error::file(&constants, source))?;
-    let mut command = script("relay.py")?;
-    command.arg("--constants").arg(constants);
+    let mut command = Command::new(interpreter()?);
+    command.arg("-B").arg(folder().join("relay.py")).arg("--constants").arg(constants);
     if plan.block {
         command.arg("--block");
     }
-    Ok(command)
-}
-
-/// A script of the bench, to be run with its interpreter.
-pub(crate) fn script(name: &str) -> Result<Command, Error> {
-    let mut command = Command::new(interpreter()?);
-    command.arg("-B").arg(folder().join(name));
     Ok(command)
 }
 
@@ -124,7 +117,7 @@ pub(crate) fn interpreter() -> Result<PathBuf, Error> {
 }
 
 fn works(python: &Path) -> bool {
-    quietly(Command::new(python).args(["-c", "import numpy, zenoh, mcap"])).is_ok()
+    quietly(Command::new(python).args(["-c", "import numpy, zenoh"])).is_ok()
 }
 
 /// Runs a command to its end; the last line that it says, where it fails.

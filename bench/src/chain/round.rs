@@ -60,15 +60,9 @@ pub(crate) struct Outcome {
 }
 
 /// Runs one round.
-pub(crate) fn run(
-    case: &Case,
-    subject: Subject,
-    profile: &Profile,
-    ends: Option<&Profile>,
-) -> Result<Outcome, Error> {
+pub(crate) fn run(case: &Case, subject: Subject, profile: &Profile) -> Result<Outcome, Error> {
     let folder = tempfile::tempdir().map_err(|source| Error::file(&std::env::temp_dir(), source))?;
     let mut plan = case.plan(folder.path(), subject.format());
-    plan.zenoh_config = profile.write(folder.path())?;
     plan.declare_keys = subject == Subject::Keyed;
     let plan_file = folder.path().join("plan.json");
     let write = |plan: &Plan| {
@@ -86,16 +80,10 @@ pub(crate) fn run(
         middle.push(standby);
         plan.connect.push(locator);
     }
-    if ends.is_none() {
-        plan.zenoh_config = None;
-    }
     write(&plan)?;
     let part = |name: &'static str| {
         let mut command = std::process::Command::new(this()?);
         command.args(["part", name]).arg(&plan_file);
-        if let Some(runtime) = ends.and_then(|profile| profile.runtime.as_ref()) {
-            command.env("ZENOH_RUNTIME", runtime);
-        }
         Process::start(name, &mut command, &plan.folder)
     };
     let mut sink = part("sink")?;

@@ -114,9 +114,6 @@ impl Subject {
         for address in &plan.connect {
             command.arg("--connect").arg(address);
         }
-        if let Some(config) = &plan.zenoh_config {
-            command.arg("--zenoh-config").arg(config);
-        }
         Ok(command)
     }
 }

@@ -10,15 +10,20 @@ use crate::cli::plain;
 
 /// Latency first, then throughput.
 pub(crate) fn table(report: &Report) -> String {
-    let saturated = |row: &&Row| row.measure == Measure::Saturation;
+    let is_paced = |row: &Row| !matches!(row.measure, Measure::Saturation | Measure::Units);
     let mut text = format!("{}\n", report.machine.words());
-    let paced: Vec<&Row> = report.rows.iter().filter(|row| !saturated(row)).collect();
+    let paced: Vec<&Row> = report.rows.iter().filter(|row| is_paced(row)).collect();
     if !paced.is_empty() {
         let _ = writeln!(text, "\n{}", latency(&paced));
     }
-    let saturated: Vec<&Row> = report.rows.iter().filter(saturated).collect();
+    let of = |measure| report.rows.iter().filter(move |row| row.measure == measure);
+    let saturated: Vec<&Row> = of(Measure::Saturation).collect();
     if !saturated.is_empty() {
         let _ = writeln!(text, "\n{}", throughput(&saturated));
+    }
+    let by_units: Vec<&Row> = of(Measure::Units).collect();
+    if !by_units.is_empty() {
+        let _ = writeln!(text, "\n{}", units(&by_units));
     }
     for words in &report.skipped {
         let _ = writeln!(text, "\nskipped: {words}");
@@ -27,7 +32,7 @@ pub(crate) fn table(report: &Report) -> String {
 }
 
 /// What stands in the middle, with settings that are not the project's own.
-pub(crate) fn middle(row: &Row) -> String {
+fn middle(row: &Row) -> String {
     match row.profile.as_str() {
         "default" => row.subject.name().to_owned(),
         profile => format!("{}, {profile}", row.subject.name()),
@@ -94,6 +99,43 @@ fn throughput(rows: &[&Row]) -> Table {
             format!("{:.2}", row.median.cpu_share),
         ]);
         last = &row.name;
+    }
+    table
+}
+
+/// What a number of units takes.
+#[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
+fn units(rows: &[&Row]) -> Table {
+    let mut table = plain(&[
+        "load",
+        "in the middle",
+        "ticks/s",
+        "CPU µs/tick",
+        "lost",
+        "resident MiB",
+        "KiB per further unit",
+        "start s",
+        "swap ms",
+    ]);
+    for row in rows {
+        let (outcome, units) = (&row.median, row.case.units);
+        // One unit has what all share too.
+        let first = rows.iter().find(|first| first.subject == row.subject && first.case.units < units);
+        let per_unit = first.map_or_else(String::new, |first| {
+            let further_kib = outcome.resident_kib as f64 - first.median.resident_kib as f64;
+            format!("{:.1}", further_kib / (units - first.case.units) as f64)
+        });
+        table.add_row([
+            row.name.clone(),
+            middle(row),
+            format!("{:.0}", outcome.ticks_per_s),
+            format!("{:.3}", outcome.cpu_us_per_tick),
+            outcome.lost.to_string(),
+            format!("{:.1}", outcome.resident_kib as f64 / 1024.0),
+            per_unit,
+            format!("{:.2}", outcome.start_s),
+            format!("{:.1}", outcome.swap_ms),
+        ]);
     }
     table
 }

@@ -12,8 +12,6 @@ use crate::error::Error;
 pub(crate) enum Pace {
     /// All units at the same moment, one after the other.
     Burst,
-    /// Units evenly over the time between two messages of one.
-    Spread,
     /// As fast as it can be done, for so long at most (ms).
     Saturated {
         /// How long (ms).
@@ -50,12 +48,8 @@ pub(crate) struct Plan {
     pub(crate) pace: Pace,
     /// Whether the middle waits for the sink where that is slow.
     pub(crate) block: bool,
-    /// Sessions that the units are shared out to.
-    pub(crate) sessions: usize,
     /// Where the middle listens, once it does: two addresses where a standby is beside it.
     pub(crate) connect: Vec<String>,
-    /// Zenoh configuration of all parts; the default where there is none.
-    pub(crate) zenoh_config: Option<PathBuf>,
     /// Where results are left.
     pub(crate) folder: PathBuf,
     /// Ticks of each unit of which the sink keeps everything.

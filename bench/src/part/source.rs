@@ -35,12 +35,10 @@ struct Outlets {
 
 /// Publishes when it is told to.
 pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
-    let sessions: Vec<Session> = (0..plan.sessions.max(1)).map(|_| open(plan)).collect::<Result<_, _>>()?;
-    let mut units = Vec::new();
-    for (unit, session) in (0..plan.units).zip(sessions.iter().cycle()) {
-        units.push(Outlets::declare(session, unit)?);
-    }
-    sessions.iter().try_for_each(wait_for_middle)?;
+    let session = open(plan)?;
+    let units: Vec<_> =
+        (0..plan.units).map(|unit| Outlets::declare(&session, unit)).collect::<Result<_, _>>()?;
+    wait_for_middle(&session)?;
     units.iter().try_for_each(|outlets| wait_for_subscriber(&outlets.gyro))?;
 
     let instrument = Instrument::simulate(plan.rate_hz)?;
@@ -65,7 +63,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     let report = publish(plan, &units, rest, behind)?;
     write_numbers(&path(plan, "sent.bin"), &sent)?;
     say(&report)?;
-    // The sessions stay open until everything has come through.
+    // The session stays open until everything has come through.
     while hear().is_some() {}
     Ok(())
 }
@@ -101,12 +99,9 @@ fn publish(
         match plan.pace {
             Pace::Burst => late.push(sleep_until(due)),
             Pace::Saturated { limit_ms } if now_ns() > begin + limit_ms * 1_000_000 => break,
-            Pace::Spread | Pace::Saturated { .. } => {}
+            Pace::Saturated { .. } => {}
         }
-        for (unit, ((outlets, message), sent)) in (0_u64..).zip(units.iter().zip(burst).zip(sent)) {
-            if plan.pace == Pace::Spread {
-                late.push(sleep_until(due + unit * plan.period_ns() / plan.units as u64));
-            }
+        for ((outlets, message), sent) in units.iter().zip(burst).zip(sent) {
             *sent = now_ns();
             outlets.put(message)?;
         }

@@ -222,22 +222,32 @@ impl<'a> Logs<'a> {
     }
 }
 
-/// The documents of a folder, by the unit that each is of.
+/// The documents of a folder, by the unit that each is of; column mappings may stand beside them. Of two of one unit the one that is
+/// named after it counts.
 fn of_folder(folder: &Path) -> Result<BTreeMap<UnitId, Written>, Error> {
     let mut paths = files_of(folder)?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    paths.retain(|path| {
+        path.extension().is_some_and(|extension| extension == "toml")
+            && !name(path).ends_with(".mapping.toml")
+    });
     paths.sort();
     let mut documents: BTreeMap<UnitId, Written> = BTreeMap::new();
     for path in &paths {
         let written = Written::read(path)?;
         let unit = written.loaded.unit.clone();
-        if let Some(other) = documents.get(&unit) {
-            return Err(Error::refused(format!(
-                "{} and {} are both for unit {unit}: choose the one to take",
-                other.name, written.name
-            )));
+        let own = format!("{unit}.toml");
+        let other = documents.get(&unit).map(|other| name(Path::new(&other.name)));
+        match other {
+            Some(other) if other == own => {}
+            Some(other) if name(path) != own => {
+                return Err(Error::refused(format!(
+                    "{other} and {} are both for unit {unit}: name the one to take {own}",
+                    name(path)
+                )));
+            }
+            _ => drop(documents.insert(unit, written)),
         }
-        documents.insert(unit, written);
     }
     Ok(documents)
 }

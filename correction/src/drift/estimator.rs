@@ -1,6 +1,7 @@
 //! The estimator of a unit: feeds each gyro's filter from ticks and references, and says what to subtract.
 
 use alloc::vec::Vec;
+use core::array;
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +9,7 @@ use super::DriftModel;
 use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
 use super::ring::{Covered, OpenCell, cell_end};
-use crate::observation::{GyroLanes, Observation};
+use crate::observation::{GyroLanes, Observation, SOUND};
 use crate::sample::{MAX_SENSORS, SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
 
@@ -221,15 +222,14 @@ impl DriftEstimator {
     }
 
     /// Takes a tick after its correction.
-    #[inline]
     pub fn observe(&mut self, observation: &Observation) {
         if !self.is_idle() {
-            self.add(observation);
+            self.add::<MAX_SENSORS>(observation);
         }
     }
 
-    /// Adds the tick's residual rates to what is kept of each gyro.
-    fn add(&mut self, observation: &Observation) {
+    /// Adds the tick's residual rates to what is kept of each gyro; there are at most `N`.
+    pub(crate) fn add<const N: usize>(&mut self, observation: &Observation) {
         let end = observation.end_time;
         let start = end - observation.duration;
         let GyroLanes { count, rate, bias, flags, .. } = &observation.gyros;
@@ -242,10 +242,15 @@ impl DriftEstimator {
         let count = MAX_SENSORS.min(*count);
         match self.open.as_mut().and_then(|open| Some((open.within(start, end)?, open))) {
             Some((covered_s, open)) => {
-                for lane in 0..count {
-                    if let Some(rate) = residual(lane) {
+                let all: [f64; N] = array::from_fn(|lane| rate[lane] - bias[lane]);
+                let finite = all.iter().fold(true, |finite, residual| finite & residual.is_finite());
+                let whole = finite & observation.settled;
+                if whole && *flags == SOUND {
+                    open.gain_all(covered_s, all);
+                } else {
+                    (0..count).filter_map(|lane| Some((lane, residual(lane)?))).for_each(|(lane, rate)| {
                         open.gain(lane, covered_s, rate);
-                    }
+                    });
                 }
             }
             None => self.go_on((start, end), count, residual),

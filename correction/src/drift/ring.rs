@@ -11,11 +11,12 @@
 //! cells' rates, which is added too: at rest it is next to nothing, in motion it takes the measurement's weight away.
 
 use alloc::vec::Vec;
+use core::array;
 
 use serde::{Deserialize, Serialize};
 
 use super::{Reference, ReferenceRefusal};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, narrow, put};
 use crate::sample::MAX_SENSORS;
 use crate::units::{Span, Timestamp};
 
@@ -110,6 +111,16 @@ impl OpenCell {
     pub(super) fn gain(&mut self, lane: usize, covered_s: f64, rate: f64) {
         self.angle_rad[lane] += rate * covered_s;
         self.observed_s[lane] += covered_s;
+    }
+
+    /// Adds those of the first `N` gyros.
+    #[inline]
+    pub(super) fn gain_all<const N: usize>(&mut self, covered_s: f64, rates: [f64; N]) {
+        let (angles, times): (&[f64; N], &[f64; N]) = (narrow(&self.angle_rad), narrow(&self.observed_s));
+        let angles = array::from_fn(|lane| angles[lane] + rates[lane] * covered_s);
+        let times = array::from_fn(|lane| times[lane] + covered_s);
+        put::<N>(&mut self.angle_rad, angles);
+        put::<N>(&mut self.observed_s, times);
     }
 
     /// Writes one gyro's part of it into its ring.

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
+use crate::lanes::Lanes;
 use crate::sample::MAX_SENSORS;
 use crate::units::{Span, Timestamp};
 
@@ -22,23 +23,17 @@ pub(super) struct Reading {
     /// Measured duration, above zero.
     pub(super) duration: Span,
     /// Mean rate per sensor (rad/s); NaN where there is no sensor or no number.
-    rates: [f64; MAX_SENSORS],
+    rates: Lanes,
 }
 
 impl Reading {
     const NONE: Self =
         Self { end_time: Timestamp::from_ns(0), duration: Span::ZERO, rates: [f64::NAN; MAX_SENSORS] };
 
-    /// The rates of a tick; `None` where it has no duration, so that no rate can be formed.
+    /// The rates of a tick; `None` where it has no duration, so that there are none.
     #[inline]
-    pub(super) fn new(end_time: Timestamp, duration: Span, increments: &[f64]) -> Option<Self> {
-        if duration == Span::ZERO {
-            return None;
-        }
-        let mut rates = [f64::NAN; MAX_SENSORS];
-        let duration_s = duration.as_s();
-        rates.iter_mut().zip(increments).for_each(|(rate, increment)| *rate = increment / duration_s);
-        Some(Self { end_time, duration, rates })
+    pub(super) fn of(end_time: Timestamp, duration: Span, rates: Lanes) -> Option<Self> {
+        (duration != Span::ZERO).then_some(Self { end_time, duration, rates })
     }
 
     /// Middle of the tick, from `origin` (s).
@@ -72,16 +67,22 @@ pub(super) struct History {
 
 impl History {
     /// Adds the newest reading; the oldest gives way.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "once per tick: the reading is made where it is put")]
+    #[inline(always)]
     pub(super) fn push(&mut self, reading: Reading) {
         if self.ring.is_empty() {
-            self.ring = alloc::vec![Reading::NONE; KEPT];
+            self.make_room();
         }
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = reading;
         }
         self.next = (self.next + 1) % KEPT;
         self.held = (self.held + 1).min(KEPT);
+    }
+
+    #[cold]
+    fn make_room(&mut self) {
+        self.ring = alloc::vec![Reading::NONE; KEPT];
     }
 
     /// The readings from the newest to the oldest.

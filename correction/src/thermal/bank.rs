@@ -33,11 +33,11 @@ const MOST_FOLLOWED: usize = 3 * MAX_SENSORS;
 
 /// How far along its way everything is that follows a channel, at one time. What follows none stands still anyway.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Shares<'a> {
+pub(crate) struct Shares<'a> {
     /// Everything is equally far, as it is where a unit's channels are read together.
-    Together(f64),
-    /// By the channel's place among those that are followed.
-    Apart(&'a [f64; MOST_FOLLOWED]),
+    together: f64,
+    /// By the channel's place among those that are followed, where that is not so.
+    apart: Option<&'a [f64; MOST_FOLLOWED]>,
 }
 
 /// When a way begins, and what part of it is made in a second; a way that is over at once has no pace.
@@ -71,7 +71,8 @@ impl Pace {
 /// A value on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ramp {
-    pace: Pace,
+    /// How fast it goes; a value that stands still has no pace.
+    pub(crate) pace: Pace,
     from: f64,
     step: f64,
 }
@@ -84,7 +85,7 @@ impl Ramp {
 
     /// The value at `time`: exactly the starting one before the start.
     pub(crate) fn at(&self, time: Timestamp) -> f64 {
-        self.from + self.step * self.share(time)
+        self.from + self.step * self.pace.share(time)
     }
 
     /// Turns towards `target`, to be reached `over` later; from where the value is at `start`.
@@ -100,12 +101,6 @@ impl Ramp {
     /// Arrives at once.
     pub(crate) fn settle(&mut self) {
         *self = Self::hold(self.from + self.step);
-    }
-
-    /// How far along its way the value is, 0…1; 0 for one that stands still.
-    #[inline]
-    pub(crate) fn share(&self, time: Timestamp) -> f64 {
-        self.pace.share(time)
     }
 }
 
@@ -137,13 +132,20 @@ impl Paces {
         time: Timestamp,
         each: &'a mut Option<[f64; MOST_FOLLOWED]>,
     ) -> Shares<'a> {
-        if self.apart {
-            let each = each.insert([0.0; MOST_FOLLOWED]);
-            let followed = each.iter_mut().zip(&self.followed);
-            followed.for_each(|(share, (_, pace))| *share = pace.share(time));
-            return Shares::Apart(each);
-        }
-        Shares::Together(self.followed.first().map_or(0.0, |(_, pace)| pace.share(time)))
+        let together = self.followed.first().map_or(0.0, |(_, pace)| pace.share(time));
+        Shares { together, apart: if self.apart { Some(self.each(time, each)) } else { None } }
+    }
+
+    /// How far along whatever follows each channel is at `time`.
+    #[inline(never)]
+    fn each<'a>(
+        &self,
+        time: Timestamp,
+        each: &'a mut Option<[f64; MOST_FOLLOWED]>,
+    ) -> &'a [f64; MOST_FOLLOWED] {
+        let each = each.insert([0.0; MOST_FOLLOWED]);
+        each.iter_mut().zip(&self.followed).for_each(|(share, (_, pace))| *share = pace.share(time));
+        each
     }
 
     /// How far along whatever follows a channel is at `time`.
@@ -339,15 +341,14 @@ impl<const T: usize> Bank<T> {
         self.lines.iter_mut().for_each(Line::settle);
     }
 
-    /// The terms so far along, term by term.
+    /// The first `F` terms so far along, term by term.
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     #[inline(always)]
-    pub(crate) fn at<const N: usize>(&self, shares: Shares<'_>) -> [[f64; N]; T] {
-        let share = match shares {
-            Shares::Together(share) => [share; N],
-            Shares::Apart(shares) => {
-                array::from_fn(|lane| shares[usize::from(self.share_of[lane]) % MOST_FOLLOWED])
-            }
+    pub(crate) fn at<const N: usize, const F: usize>(&self, shares: Shares<'_>) -> [[f64; N]; F] {
+        const { assert!(F <= T, "no more terms than there are") }
+        let share = match shares.apart {
+            None => [shares.together; N],
+            Some(apart) => array::from_fn(|lane| apart[usize::from(self.share_of[lane]) % MOST_FOLLOWED]),
         };
         array::from_fn(|term| self.lines[term].at(&share))
     }

@@ -254,12 +254,18 @@ pub const GYRO_TERMS: [Term; 13] = [
 
 /// Terms of an accelerometer (models §3): they add to its bias S, the last one to what remains of it as a force. In the order of
 /// documents.
-pub const ACCEL_TERMS: [Term; 5] = [
+pub const ACCEL_TERMS: [Term; 6] = [
     term(
         Feature::One,
         ("bias", TermForm::Curve),
         (Makes::Bias, Per::ONE),
         "S(T): output at zero specific force. Source: models §3, 001 (z1…z3).",
+    ),
+    term(
+        Feature::ThermalRate,
+        ("thermal_rate", TermForm::Curve),
+        (Makes::Bias, Per::DEG_C_PER_S),
+        "K1, multiplies Ṫ, as for gyros. Source: models §3.",
     ),
     term(
         Feature::Lag,

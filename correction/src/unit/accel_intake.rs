@@ -58,12 +58,22 @@ impl AccelIntake {
             counters.bad_duration += 1;
             return;
         }
-        let pending = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
+        // Made where it is put: a copy costs as much as all that is asked of it.
+        let after = self.gyro_messages;
+        let pending = || PendingAccel { tick: tick.clone(), output, after };
         if self.released.is_some_and(|released| tick.end_time <= released) {
-            self.note_late(pending, counters);
+            self.note_late(pending(), counters);
+        } else if self.follows(tick.end_time) {
+            self.pending.push_back(pending());
         } else {
-            self.insert(pending, counters);
+            self.insert_between(pending(), counters);
         }
+    }
+
+    /// Whether a tick that ends at `time` goes behind all that wait.
+    #[inline]
+    fn follows(&self, time: Timestamp) -> bool {
+        self.pending.back().is_none_or(|last| last.tick.end_time < time) && self.pending.len() < MAX_PENDING
     }
 
     /// Sets a tick apart whose gyro tick has gone.
@@ -76,17 +86,6 @@ impl AccelIntake {
     }
 
     /// Puts a tick in its place in time.
-    #[inline]
-    fn insert(&mut self, pending: PendingAccel, counters: &mut Counters) {
-        let is_newest = self.pending.back().is_none_or(|last| last.tick.end_time < pending.tick.end_time);
-        if is_newest && self.pending.len() < MAX_PENDING {
-            self.pending.push_back(pending);
-        } else {
-            self.insert_between(pending, counters);
-        }
-    }
-
-    /// Likewise a tick that is not the newest, or one too many.
     #[cold]
     fn insert_between(&mut self, pending: PendingAccel, counters: &mut Counters) {
         let time = pending.tick.end_time;
@@ -161,7 +160,7 @@ impl AccelIntake {
         self.pending.retain(near);
         counters.accel_unpaired += before.abs_diff(self.pending.len()) as u64;
         while let Some(tick) = self.behind.pop_front() {
-            self.insert(tick, counters);
+            self.insert_between(tick, counters);
         }
     }
 }

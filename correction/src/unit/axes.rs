@@ -5,7 +5,7 @@ use core::array;
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use crate::orientation::{Inverse, Orientation, ParityCheck, SensorMask};
+use crate::orientation::{Inverse, Orientation, ParityCheck, SensorMask, sum_of_columns};
 use crate::sample::{MAX_PARITY, TickFlags};
 use crate::thermal::{MAX_PLAYS, Ramp, drag};
 use crate::units::{Span, Timestamp};
@@ -112,20 +112,29 @@ impl Axes {
         self.included
     }
 
+    /// The inverse at `time`, where it takes all sensors.
+    #[inline]
+    pub(super) fn inverse<const N: usize>(&self, time: Timestamp) -> Option<[[f64; 4]; N]> {
+        let [from, to] = &self.ends;
+        self.whole.then(|| from.columns_to(to, self.share(time)))
+    }
+
     /// Case axes from the sensors of `usable`, and whether they can be trusted: where the usable ones do not span the space, from
-    /// all that are not excluded, and not to be trusted.
+    /// all that are not excluded, and not to be trusted. `inverse`: that of all sensors, where it is worked out already.
     #[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
     #[inline(always)]
     pub(super) fn resolve<const N: usize>(
         &mut self,
         orientation: &Orientation,
         usable: SensorMask,
-        readings: &[f64; N],
+        (readings, inverse): (&[f64; N], Option<[[f64; 4]; N]>),
         time: Timestamp,
     ) -> ([f64; 3], bool) {
         if self.whole && usable == self.all {
             let [from, to] = &self.ends;
-            return (from.lerp_apply(to, self.share(time), readings), true);
+            let inverse =
+                if let Some(known) = inverse { known } else { from.columns_to(to, self.share(time)) };
+            return (sum_of_columns(&inverse, readings), true);
         }
         // A copy, so that the readings themselves need no place in memory.
         let readings = *readings;
@@ -153,13 +162,13 @@ impl Axes {
         }
         let [from, to] = &self.ends;
         let readings = array::from_fn(|lane| if self.mask.contains(lane) { readings[lane] } else { 0.0 });
-        (from.lerp_apply::<N>(to, self.share(time), &readings), trusted)
+        (sum_of_columns::<N>(&from.columns_to(to, self.share(time)), &readings), trusted)
     }
 
     /// How far along the way between the inverses `time` is.
     #[inline]
     fn share(&self, time: Timestamp) -> f64 {
-        if self.stands { 1.0 } else { self.temperature.share(time) }
+        if self.stands { 1.0 } else { self.temperature.pace.share(time) }
     }
 
     /// Goes on with other sensors: both ends anew, from where the temperature is now, so that the change of sensors is all that
@@ -221,7 +230,7 @@ impl Axes {
 
     fn at(&self, time: Timestamp) -> Option<Inverse> {
         let [from, to] = &self.ends;
-        self.spans.then(|| from.lerp(to, self.temperature.share(time)))
+        self.spans.then(|| from.lerp(to, self.temperature.pace.share(time)))
     }
 }
 
@@ -268,7 +277,7 @@ mod tests {
                 .iter_mut()
                 .zip(orientation.forward(axes.temperature_deg_c(seconds(s)), truth))
                 .for_each(|(l, r)| *l = r);
-            axes.resolve(&orientation, usable, &lanes, seconds(s))
+            axes.resolve(&orientation, usable, (&lanes, None), seconds(s))
         };
         let mut axes = Axes::new(&orientation, 20.0);
         axes.update(&orientation, 20.0, seconds(0), TICK);

@@ -31,7 +31,6 @@ use crate::sample::{AccelTick, CorrectedTick, GyroTick, MAX_SENSORS, SensorFlags
 use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
-use accels::Felt;
 pub(super) use motion::MotionInUse;
 use motion::{Follows, MotionMemory};
 
@@ -211,9 +210,6 @@ impl Corrector {
         } else {
             self.correct_lanes::<4>(calibration, tick, counters, out);
         }
-        if self.calm.drifts {
-            self.drift.observe(&self.seen);
-        }
     }
 
     /// Does before a tick what few need: a new series begins, temperature readings or rate references take effect, a swap is on its
@@ -298,14 +294,7 @@ impl Corrector {
         let mut each = None;
         let shares = self.thermal.paces.shares(raw.end_time, &mut each);
         let felt = self.accels_feel::<N>(calibration, tick, shares, counters, out);
-        if let Some(Felt { forces, .. }) = felt.filter(|felt| self.calm.follows.any & felt.within) {
-            self.note_force(calibration, &forces, raw.end_time);
-        }
         self.gyros::<N>(calibration, tick, shares, counters, out);
-        if let Some(felt) = felt {
-            self.resolve_force(calibration, felt, missed, counters, out);
-        }
-
         let per_second = 1.0 / raw.duration.as_s();
         let seen = &mut self.seen;
         seen.sequence = raw.sequence;
@@ -314,9 +303,16 @@ impl Corrector {
         seen.missed = missed;
         seen.mode = raw.mode;
         seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
+        if let Some(felt) = felt {
+            self.resolve_force(calibration, felt, counters, out);
+        }
+        let seen = &mut self.seen;
         seen.flags = out.flags;
         if restart {
             seen.flags |= TickFlags::RESTART;
+        }
+        if self.calm.drifts {
+            self.drift.add::<N>(&self.seen);
         }
     }
 

@@ -101,15 +101,6 @@ impl Footing {
 const UNSOUND: SensorFlags =
     SensorFlags::OVERRANGE.union(SensorFlags::NOT_FINITE).union(SensorFlags::EXCLUDED);
 
-/// Flags of the sensors in a tick with nothing to say of any.
-pub(super) const SOUND: [SensorFlags; MAX_SENSORS] = [SensorFlags::VALID; MAX_SENSORS];
-
-/// Whether every reading is a number below its sensor's limit.
-#[inline]
-pub(super) fn within<const N: usize>(readings: &[f64; N], limits: &[f64; N]) -> bool {
-    readings.iter().zip(limits).fold(true, |sound, (reading, limit)| sound & (reading.abs() < *limit))
-}
-
 /// Account of one sensor since its unit got a calibration with as many sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SensorHealth {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::layout::{Found, cells};
 use crate::error::Error;
-use crate::text::{date_time_ns, open_decoded, parse_float};
+use crate::mapping::TimeUnit;
+use crate::text::{open_decoded, parse_float, says_order, stamp_ns};
 
 /// Rows by which the usual step, and gravity, are told.
 const SAMPLE: usize = 4096;
@@ -20,8 +21,11 @@ pub(super) struct Column {
     pub(super) empty: u64,
     /// Cells with anything else.
     pub(super) other: u64,
-    /// Cells with a date and time; they count as numbers of ns too.
-    pub(super) date_times: u64,
+    /// Cells with a date and time or a time of day, all in this unit; they count as numbers of ns too.
+    stamps: u64,
+    stamp_unit: Option<TimeUnit>,
+    /// Which of day and month stands first, where a cell says so.
+    pub(super) order: Option<TimeUnit>,
     /// Cells whose number has a fraction.
     pub(super) fractions: u64,
     /// Largest size of a number.
@@ -79,7 +83,8 @@ impl Steps {
 }
 
 impl Column {
-    fn take(&mut self, cell: &str, mark: u8) {
+    /// Takes a cell; where dates do not say it, day and month stand in the order given.
+    fn take(&mut self, cell: &str, mark: u8, order: TimeUnit) {
         if cell.is_empty() {
             self.empty += 1;
             return;
@@ -87,8 +92,9 @@ impl Column {
         let number = parse_float(cell, mark).filter(|number| number.is_finite());
         let (number, parts) = if let Some(number) = number {
             (number, parts(cell, mark).unwrap_or((0, number)))
-        } else if let Some(ns) = date_time_ns(cell.as_bytes()) {
-            self.date_times += 1;
+        } else if let Some((unit, ns)) = self.stamp(cell, order) {
+            self.stamps += 1;
+            self.stamp_unit = Some(unit);
             #[expect(
                 clippy::cast_precision_loss,
                 reason = "for ranges; steps are taken from the whole number"
@@ -113,14 +119,26 @@ impl Column {
         }
     }
 
+    /// A date and time or a time of day, in the unit of those before it.
+    fn stamp(&mut self, cell: &str, order: TimeUnit) -> Option<(TimeUnit, i64)> {
+        if !cell.contains(':') {
+            return None;
+        }
+        self.order = self.order.or_else(|| says_order(cell));
+        let mut units = [TimeUnit::DateTime, order, TimeUnit::TimeOfDay].into_iter();
+        units
+            .find_map(|unit| Some((unit, stamp_ns(cell.as_bytes(), unit)?)))
+            .filter(|(unit, _)| self.stamp_unit.is_none_or(|before| before == *unit))
+    }
+
     /// Whether it could be the clock of the rows.
     pub(super) fn increases(&self) -> bool {
         self.numbers > 1 && self.steps.back == 0 && self.empty + self.other == 0
     }
 
-    /// Whether every cell is a date and time.
-    pub(super) fn is_date_time(&self) -> bool {
-        self.date_times > 0 && self.date_times == self.numbers
+    /// The unit of dates and times or times of day, where every cell is one.
+    pub(super) fn stamp_unit(&self) -> Option<TimeUnit> {
+        self.stamp_unit.filter(|_| self.stamps == self.numbers)
     }
 
     /// Whether it counts the rows.
@@ -149,8 +167,17 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    /// Reads the file to its end.
-    pub(super) fn of(path: &Path, found: &Found) -> Result<Self, Error> {
+    /// Reads the file to its end; where a date says that the month stands first, once more.
+    pub(super) fn of(path: &Path, found: &Found, order: Option<TimeUnit>) -> Result<Self, Error> {
+        let figures = Self::read(path, found, order.unwrap_or(TimeUnit::DayFirst))?;
+        let month_first = figures.columns.iter().any(|column| column.order == Some(TimeUnit::MonthFirst));
+        if order.is_none() && month_first {
+            return Self::read(path, found, TimeUnit::MonthFirst);
+        }
+        Ok(figures)
+    }
+
+    fn read(path: &Path, found: &Found, order: TimeUnit) -> Result<Self, Error> {
         let mut lines = open_decoded(path, found.encoding)?;
         let mut figures = Self { columns: vec![Column::default(); found.width], rows: 0 };
         let first = found.rows.first().map(String::as_str).unwrap_or_default();
@@ -162,8 +189,15 @@ impl Figures {
                 continue;
             }
             figures.rows += 1;
-            for (column, cell) in figures.columns.iter_mut().zip(cells(&line, found.split_at)) {
-                column.take(&cell, found.decimal_mark);
+            let mut cells = cells(&line, found.split_at);
+            if let Some((date, time)) = found.date_and_time
+                && let Some(date) = cells.get(date).cloned()
+                && let Some(time) = cells.get_mut(time)
+            {
+                *time = format!("{date} {time}");
+            }
+            for (column, cell) in figures.columns.iter_mut().zip(cells) {
+                column.take(&cell, found.decimal_mark, order);
             }
         }
         for column in &mut figures.columns {
@@ -196,7 +230,7 @@ mod tests {
 
     fn column_of(cells: impl IntoIterator<Item = String>) -> Column {
         let mut column = Column::default();
-        cells.into_iter().for_each(|cell| column.take(&cell, b'.'));
+        cells.into_iter().for_each(|cell| column.take(&cell, b'.', TimeUnit::DayFirst));
         column.steps.settle();
         column
     }
@@ -212,7 +246,8 @@ mod tests {
         let dates = column_of(
             (0..100).map(|row| format!("2024-05-01T10:00:{:02}.{:03}Z", row / 100, row % 100 * 10)),
         );
-        assert!(dates.is_date_time() && dates.increases() && !seconds.is_date_time());
+        assert_eq!((dates.stamp_unit(), seconds.stamp_unit()), (Some(TimeUnit::DateTime), None));
+        assert!(dates.increases());
         assert!((dates.steps.usual - 1e7).abs() < 1e-9, "{}", dates.steps.usual);
     }
 

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::names::is_unit;
 use super::{Hints, refuse};
 use crate::error::Error;
-use crate::mapping::{Delimiter, Encoding};
-use crate::text::{open_decoded, open_raw, parse_float, split_cells};
+use crate::mapping::{Delimiter, Encoding, TimeUnit};
+use crate::text::{is_date, open_decoded, open_raw, parse_float, split_cells, stamp_ns};
 
 /// Bytes by which an encoding is told.
 const SAMPLE_BYTES: u64 = 1 << 18;
@@ -45,6 +45,8 @@ pub(super) struct Found {
     pub(super) units: Vec<String>,
     pub(super) drop_rows: usize,
     pub(super) width: usize,
+    /// Columns of the date and of the time of day, where they are two.
+    pub(super) date_and_time: Option<(usize, usize)>,
     /// Lines before the data, for what they say of rates.
     pub(super) preamble: Vec<String>,
     /// First rows of data.
@@ -148,7 +150,12 @@ fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -
 fn numeric(line: &str, delimiter: Delimiter, mark: u8) -> Option<(usize, usize)> {
     let cells = cells(line, delimiter);
     let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
-    let numbers = cells.iter().filter(|cell| parse_float(cell, mark).is_some()).count();
+    let is_stamp = |cell: &str| {
+        let units = [TimeUnit::DateTime, TimeUnit::DayFirst, TimeUnit::MonthFirst, TimeUnit::TimeOfDay];
+        cell.contains(':') && units.into_iter().any(|unit| stamp_ns(cell.as_bytes(), unit).is_some())
+    };
+    let is_number = |cell: &&String| parse_float(cell, mark).is_some() || is_date(cell) || is_stamp(cell);
+    let numbers = cells.iter().filter(is_number).count();
     (numbers >= 2 && numbers * 2 > filled).then(|| (cells.len(), numbers * 1000 / filled))
 }
 
@@ -207,6 +214,7 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
     let odd = if header_at.is_none() { odd_rows(&rows, delimiter, mark) } else { 0 };
     rows.drain(..odd);
     let skip_lines = skip_lines + odd;
+    let date_and_time = date_and_time(&rows, delimiter, comment);
     Found {
         encoding,
         delimiter: name,
@@ -219,9 +227,23 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
         units,
         drop_rows,
         width,
+        date_and_time,
         preamble,
         rows,
     }
+}
+
+/// Columns of dates and of times of day, where each row has both.
+fn date_and_time(rows: &[String], delimiter: Delimiter, comment: Option<&str>) -> Option<(usize, usize)> {
+    // The last line may be cut.
+    let whole = rows.split_last().map_or(rows, |(_, before)| before).iter();
+    let data = whole.filter(|row| !comment.is_some_and(|prefix| row.trim_start().starts_with(prefix)));
+    let rows: Vec<_> = data.map(|row| cells(row, delimiter)).collect();
+    let column = |is: &dyn Fn(&String) -> bool| {
+        (0..rows.first()?.len()).find(|index| rows.iter().all(|row| row.get(*index).is_some_and(is)))
+    };
+    let is_time = |cell: &String| stamp_ns(cell.as_bytes(), TimeUnit::TimeOfDay).is_some();
+    column(&|cell| is_date(cell)).zip(column(&is_time))
 }
 
 /// Rows of other figures in front of the data: their last is the last of the first rows with a fraction in a column of whole numbers.

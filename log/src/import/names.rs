@@ -1,5 +1,7 @@
 //! What a column holds, by its name.
 
+use super::words::parts;
+
 /// A quantity that a log may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
@@ -30,27 +32,6 @@ pub(super) struct Meaning {
     pub(super) rank: u8,
 }
 
-/// Parts of a name in small letters: at what is no letter or digit, and before capitals.
-fn parts(name: &str) -> Vec<String> {
-    let mut parts: Vec<String> = vec![String::new()];
-    let mut before = ' ';
-    for c in name.chars() {
-        let starts =
-            c.is_uppercase() && before.is_lowercase() || c.is_ascii_digit() != before.is_ascii_digit();
-        if !c.is_alphanumeric() || starts {
-            parts.push(String::new());
-        }
-        if c.is_alphanumeric()
-            && let Some(last) = parts.last_mut()
-        {
-            last.extend(c.to_lowercase());
-        }
-        before = c;
-    }
-    parts.retain(|part| !part.is_empty());
-    parts
-}
-
 /// The name before its unit, and the unit in brackets at its end. A bracket with a number is an index.
 fn bracketed(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
@@ -65,7 +46,9 @@ fn bracketed(name: &str) -> (&str, Option<&str>) {
     (name, None)
 }
 
-const GYROS: [&str; 8] = ["gyro", "gyr", "gyros", "gyroscope", "omega", "w", "g", "angrate"];
+const GYROS: [&str; 9] = ["gyro", "gyr", "gyros", "gyroscope", "omega", "w", "g", "angrate", "rate"];
+/// Those that say enough without an axis.
+const GYROS_ALONE: [&str; 4] = ["gyro", "gyros", "gyroscope", "angrate"];
 const ACCELS: [&str; 9] =
     ["accel", "acc", "accl", "acceleration", "accelerometer", "accelerometers", "acel", "a", "f"];
 /// Parts that are of no sensor's reading.
@@ -127,9 +110,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         (Kind::Gyro, true)
     } else if velocity && axis.is_some() {
         (Kind::Accel, true)
-    } else if axis.is_some()
-        && (has(&GYROS) || pair("angular", "vel") || pair("angular", "rate") || pair("rot", "rate"))
-    {
+    } else if axis.is_some() && (has(&GYROS) || has(&["angular"]) && has(&["vel", "velocity"])) {
         (Kind::Gyro, false)
     } else if axis.is_some() && has(&ACCELS) || axis.is_some() && pair("specific", "force") {
         (Kind::Accel, false)
@@ -148,6 +129,8 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         || has(&["tow"])
     {
         (Kind::Time, false)
+    } else if has(&GYROS_ALONE) {
+        (Kind::Gyro, false)
     } else {
         return None;
     };
@@ -171,8 +154,8 @@ pub(super) fn is_unit(text: &str) -> bool {
     !text.is_empty() && [Kind::Time, Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().any(known)
 }
 
-/// The unit, as the mapping spells it, and how much of it a reading of 1 is, where it is not one: of sensors, thousandths and millionths have none of
-/// their own.
+/// The unit, as the mapping spells it, and the factor from a reading to it, where that is not 1: of sensors, thousandths and millionths
+/// have no unit of their own.
 fn scaled_unit(
     kind: Kind,
     increment: bool,
@@ -193,6 +176,12 @@ fn scaled_unit(
 /// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word.
 fn take_axis(parts: &mut Vec<String>) -> Option<usize> {
     let letter = |text: &str| ["x", "y", "z"].iter().position(|axis| *axis == text);
+    if parts.iter().any(|part| part == "rate")
+        && let Some(at) = parts.iter().position(|part| ["roll", "pitch", "yaw"].contains(&part.as_str()))
+    {
+        let name = parts.remove(at);
+        return ["roll", "pitch", "yaw"].iter().position(|axis| *axis == name);
+    }
     if let Some(at) = parts.iter().rposition(|part| letter(part).is_some()) {
         return letter(&parts.remove(at));
     }
@@ -225,8 +214,12 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
         .chars()
         .filter(|c| !c.is_whitespace() && !matches!(c, '.' | '(' | ')'))
         .collect();
-    let text =
-        text.replace("degrees", "deg").replace("degree", "deg").replace('°', "deg").replace("sec", "s");
+    let text = text
+        .replace("degrees", "deg")
+        .replace("degree", "deg")
+        .replace("grad", "deg")
+        .replace(['°', 'º', '˚'], "deg");
+    let text = text.replace("seconds", "s").replace("second", "s").replace("sec", "s");
     let text = text
         .replace("^-1", "-1")
         .replace("^-2", "-2")
@@ -253,7 +246,9 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "counts" => Some("counts"),
             _ if raw => Some("raw"),
             "" if has("dps") || has("deg") => Some("deg_per_s"),
-            "" if has("rad") || has("velocity") && has("angular") => Some("rad_per_s"),
+            "" if has("rad") || parts.windows(2).any(|pair| pair == ["angular", "velocity"]) => {
+                Some("rad_per_s")
+            }
             _ => None,
         },
         Kind::Accel if increment => match text.as_str() {
@@ -288,7 +283,7 @@ fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> 
             "degc" | "c" | "celsius" => Some("deg_c"),
             "k" | "kelvin" => Some("kelvin"),
             "v" | "volt" => Some("volt"),
-            "" if !raw => None,
+            "" | "-" | "deg" if !raw => None,
             // °F and all else is for the document to convert.
             _ => Some("raw"),
         },
@@ -304,7 +299,19 @@ mod tests {
     #[test]
     fn names_of_many_makers_say_what_they_hold() {
         type Case = (&'static str, Option<&'static str>, Option<(Kind, Option<usize>, Option<&'static str>)>);
-        let cases: [Case; 48] = [
+        let cases: [Case; 60] = [
+            ("Drehrate X [°/s]", None, Some((Gyro, Some(0), Some("deg_per_s")))),
+            ("Drehraten_z [Grad/s]", None, Some((Gyro, Some(2), Some("deg_per_s")))),
+            ("Drehrate", None, Some((Gyro, None, None))),
+            ("Nickrate [º/s]", None, Some((Gyro, Some(1), Some("deg_per_s")))),
+            ("Yaw Rate (deg/second)", None, Some((Gyro, Some(2), Some("deg_per_s")))),
+            ("Vitesse angulaire x (rad/s)", None, Some((Gyro, Some(0), Some("rad_per_s")))),
+            ("Velocidad angular y", None, Some((Gyro, Some(1), None))),
+            ("Accélération z (m/s²)", None, Some((Accel, Some(2), Some("m_per_s2")))),
+            ("Temps [s]", None, Some((Time, None, Some("s")))),
+            ("Zähler", None, Some((Counter, None, None))),
+            ("角速度X(°/s)", None, Some((Gyro, Some(0), Some("deg_per_s")))),
+            ("gyro count", None, Some((Counter, None, None))),
             ("Gyr_X", None, Some((Gyro, Some(0), None))),
             ("Acc_Z", None, Some((Accel, Some(2), None))),
             ("UnCompGyroY [rad/s]", None, Some((Gyro, Some(1), Some("rad_per_s")))),

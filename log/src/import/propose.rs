@@ -8,8 +8,9 @@ use super::figures::{Figures, usual_size};
 use super::layout::{self, Found};
 use super::names::{Kind, Meaning, meaning};
 use super::written::{FileText, Sensors, Temperature, Time, name_line};
-use super::{Hints, Proposal, Question, refuse};
+use super::{Hints, Proposal, Question, STAMP_UNITS, refuse};
 use crate::error::Error;
+use crate::mapping::TimeUnit;
 use crate::streams::raw_text::RawColumns;
 
 /// Standard gravity in the units that an accelerometer may have.
@@ -29,7 +30,7 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         .collect();
     for (path, name) in paths.iter().zip(&names) {
         let found = layout::find(path.as_ref(), hints)?;
-        let figures = Figures::of(path.as_ref(), &found)?;
+        let figures = Figures::of(path.as_ref(), &found, hints.date_order())?;
         let file = File { name, found: &found, figures: &figures, hints };
         let several = paths.len() > 1;
         let text = match file.own() {
@@ -45,10 +46,7 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
     let has_gyros = proposal.mapping.contains("[file.gyro]");
     if !has_gyros && !proposal.open.iter().any(|open| matches!(open, Question::Columns { .. })) {
         let first = paths.first().map_or(Path::new("the log"), AsRef::as_ref);
-        return Err(refuse(
-            first,
-            "has no three gyro columns with known names: name the columns with --columns",
-        ));
+        return Err(refuse(first, "has no gyro columns with known names: name the columns with --columns"));
     }
     let notes: Vec<_> = proposal.notes.iter().map(|note| format!("#   {note}\n")).collect();
     proposal.mapping = format!(
@@ -112,10 +110,20 @@ impl<'a> File<'a> {
         let mut sensors = Vec::new();
         for (group, kind) in groups.into_iter().zip(["gyro", "accel"]) {
             let Some((columns, first)) = group else { continue };
-            let (unit, scale) = self.sensor_unit(&columns, &first, kind, proposal);
-            let may_be_empty = columns.iter().any(|column| self.is_sparse(*column));
+            let (unit, scale) = self.sensor_unit(columns, &first, kind, proposal);
+            let there: Vec<usize> = columns.into_iter().flatten().collect();
+            let may_be_empty = there.iter().any(|column| self.is_sparse(*column));
             let part = scale.map_or_else(String::new, |scale| format!("{scale:?} "));
-            proposal.notes.push(format!("{kind}: {} in {part}{unit}", self.listed(&columns)));
+            let axes = |there: bool| {
+                let named =
+                    columns.iter().zip(["x", "y", "z"]).filter(|(column, _)| column.is_some() == there);
+                named.map(|(_, axis)| axis).collect::<Vec<_>>().join(" and ")
+            };
+            let as_axes = match axes(false) {
+                none if none.is_empty() => none,
+                lacks => format!(" as {}; 0 for {lacks}, which the log does not have", axes(true)),
+            };
+            proposal.notes.push(format!("{kind}: {} in {part}{unit}{as_axes}", self.listed(&there)));
             sensors.push(Sensors { kind, columns, unit, scale, counter, may_be_empty });
         }
         let temperatures = self.temperatures(&meanings, proposal);
@@ -158,28 +166,28 @@ impl<'a> File<'a> {
         meanings
     }
 
-    /// The three columns of a kind, x, y and z, of the best of those that the log has.
-    fn group(meanings: &Meanings, kind: Kind) -> Option<(Vec<usize>, Meaning)> {
+    /// The columns of a kind, x, y and z, of the best of those that the log has; of gyros one or two are better than none.
+    fn group(meanings: &Meanings, kind: Kind) -> Option<([Option<usize>; 3], Meaning)> {
         // Where only the first of three names its unit, the others have it too.
         let mut groups: BTreeMap<&str, Axes<'_>> = BTreeMap::new();
         for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == kind) {
-            let Some(axis) = meaning.axis else { continue };
+            let axis = meaning.axis.unwrap_or(0);
             groups.entry(&meaning.stem).or_default()[axis].get_or_insert((*index, meaning));
         }
-        let whole = groups.into_values().filter_map(|axes| match axes {
-            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
-            _ => None,
-        });
-        let best =
-            whole.min_by_key(|axes| (axes.iter().map(|(_, meaning)| meaning.rank).min(), axes[0].0))?;
-        let first = best.iter().map(|(_, meaning)| *meaning).min_by_key(|meaning| meaning.rank)?.clone();
-        Some((best.iter().map(|(index, _)| *index).collect(), first))
+        let lacking = |axes: &Axes<'_>| axes.iter().filter(|axis| axis.is_none()).count();
+        let rank = |axes: &Axes<'_>| axes.iter().flatten().map(|(_, meaning)| meaning.rank).min();
+        let taken = groups.into_values().filter(|axes| kind == Kind::Gyro || lacking(axes) == 0);
+        let best = taken.min_by_key(|axes| {
+            (lacking(axes), rank(axes), axes.iter().flatten().next().map(|(index, _)| *index))
+        })?;
+        let first = best.iter().flatten().map(|(_, meaning)| *meaning).min_by_key(|meaning| meaning.rank)?;
+        Some((best.map(|axis| axis.map(|(index, _)| index)), first.clone()))
     }
 
     /// The unit as the mapping spells it, and how much of it a reading of 1 is, where it is not one.
     fn sensor_unit(
         self,
-        columns: &[usize],
+        columns: [Option<usize>; 3],
         first: &Meaning,
         kind: &str,
         proposal: &mut Proposal,
@@ -198,16 +206,17 @@ impl<'a> File<'a> {
         }
         if kind == "accel"
             && !first.increment
-            && let Ok(three) = <[usize; 3]>::try_from(columns)
-            && let Some(size) = usual_size(self.found, three)
+            && let [Some(x), Some(y), Some(z)] = columns
+            && let Some(size) = usual_size(self.found, [x, y, z])
             && let Some((unit, _)) = GRAVITY.iter().find(|(_, g)| (size / g - 1.0).abs() < 0.1)
         {
             proposal.notes.push(format!("accel: unit from the size at the beginning, {size:.4}"));
             return ((*unit).to_owned(), None);
         }
+        let columns: Vec<usize> = columns.into_iter().flatten().collect();
         let largest = columns.iter().filter_map(|column| self.figures.columns.get(*column));
         let largest = largest.fold(0.0_f64, |largest, column| largest.max(column.largest)).to_string();
-        let columns = self.listed(columns);
+        let columns = self.listed(&columns);
         proposal.open.push(if kind == "gyro" {
             Question::GyroUnit { columns, largest }
         } else {
@@ -236,20 +245,27 @@ impl<'a> File<'a> {
     }
 
     fn time(self, meanings: &Meanings, counted: bool, proposal: &mut Proposal) -> Time {
-        let mut clocks: Vec<_> = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Time).collect();
-        clocks.sort_by_key(|(index, meaning)| (meaning.rank, *index));
+        let named = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Time);
+        let mut clocks: Vec<_> = named.map(|(index, meaning)| (meaning.rank, *index, meaning.unit)).collect();
+        // Dates and times of day say themselves what they are.
+        let dated =
+            self.figures.columns.iter().enumerate().filter(|(_, column)| column.stamp_unit().is_some());
+        let unnamed = dated.filter(|(index, _)| !clocks.iter().any(|(_, named, _)| named == index));
+        let unnamed: Vec<_> = unnamed.map(|(index, _)| (u8::MAX, index, None)).collect();
+        clocks.extend(unnamed);
+        clocks.sort_unstable();
         let (mut found, mut why) = (None, None);
-        for (index, meaning) in clocks {
-            if let Some(column) = self.figures.columns.get(*index).filter(|column| column.increases()) {
-                found = Some((*index, meaning, column));
+        for (_, index, unit) in clocks {
+            if let Some(column) = self.figures.columns.get(index).filter(|column| column.increases()) {
+                found = Some((index, unit, column));
                 break;
             }
-            let words = format!("{} does not always grow", self.listed(&[*index]));
+            let words = format!("{} does not always grow", self.listed(&[index]));
             proposal.notes.push(format!("time: {words}: not used"));
             why.get_or_insert(words);
         }
         let stated = self.hints.rate_hz.or_else(|| rate_in(&self.found.preamble));
-        let Some((index, meaning, column)) = found else {
+        let Some((index, named_unit, column)) = found else {
             let Some(rate) = stated else {
                 proposal.open.push(Question::Rate { file: self.name.to_owned(), why });
                 return Time { tick_ns: 1e7, ..Time::default() };
@@ -259,15 +275,20 @@ impl<'a> File<'a> {
             return Time { tick_ns: 1e9 / rate, ..Time::default() };
         };
         let step = column.steps.usual;
-        let unit = self
-            .hints
-            .time_unit
-            .as_deref()
-            .or(column.is_date_time().then_some("iso"))
-            .or(meaning.unit)
-            .map(ToOwned::to_owned)
-            .or_else(|| unit_of(step, column.maximum, stated));
-        let unit = unit.unwrap_or_else(|| {
+        let dated = column.stamp_unit().and_then(|unit| {
+            let (_, word) = STAMP_UNITS.iter().find(|(stamps, _)| *stamps == unit)?;
+            if matches!(unit, TimeUnit::DayFirst | TimeUnit::MonthFirst)
+                && column.order.is_none()
+                && self.hints.time_unit.is_none()
+            {
+                proposal
+                    .open
+                    .push(Question::DateOrder { column: self.listed(&[index]), first: self.stamp(index) });
+            }
+            Some(*word)
+        });
+        let unit = self.hints.time_unit.as_deref().or(dated).or(named_unit).map(ToOwned::to_owned);
+        let unit = unit.or_else(|| unit_of(step, column.maximum, stated)).unwrap_or_else(|| {
             let column = self.listed(&[index]);
             proposal.open.push(Question::TimeUnit { column, step: step.to_string() });
             "s".to_owned()
@@ -287,12 +308,23 @@ impl<'a> File<'a> {
             column.steps.gaps,
             (column.steps.longest * ns).round() / 1e6
         ));
+        let date = self.found.date_and_time.filter(|(_, time)| *time == index).map(|(date, _)| date);
         Time {
             column: Some(index),
+            date,
             unit,
             tick_ns,
             gap_after_ticks: gap_after_ticks.map(|ticks| (ticks * 100.0).round() / 100.0),
         }
+    }
+
+    /// The first stamp of a column, as it is written.
+    fn stamp(self, column: usize) -> String {
+        let cells = self.found.rows.first().map(|row| layout::cells(row, self.found.split_at));
+        let cell = |index: usize| cells.as_ref()?.get(index).cloned();
+        let date =
+            self.found.date_and_time.filter(|(_, time)| *time == column).and_then(|(date, _)| cell(date));
+        date.into_iter().chain(cell(column)).collect::<Vec<_>>().join(" ")
     }
 
     fn temperatures(self, meanings: &Meanings, proposal: &mut Proposal) -> Vec<Temperature> {

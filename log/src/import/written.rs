@@ -9,7 +9,8 @@ use crate::mapping::Encoding;
 #[derive(Debug, Clone)]
 pub(super) struct Sensors {
     pub(super) kind: &'static str,
-    pub(super) columns: Vec<usize>,
+    /// Of x, y and z; `None` for an axis that the log does not have.
+    pub(super) columns: [Option<usize>; 3],
     pub(super) unit: String,
     /// How much of the unit a reading of 1 is, where it is not one.
     pub(super) scale: Option<f64>,
@@ -30,6 +31,8 @@ pub(super) struct Temperature {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Time {
     pub(super) column: Option<usize>,
+    /// Column of the date, where the other has the time of day alone.
+    pub(super) date: Option<usize>,
     pub(super) unit: String,
     pub(super) tick_ns: f64,
     pub(super) gap_after_ticks: Option<f64>,
@@ -94,6 +97,9 @@ impl FileText<'_> {
         if let Some(column) = time.column {
             line(format_args!("column = {}\nunit = \"{}\"", self.column(column), time.unit));
         }
+        if let Some(date) = time.date {
+            line(format_args!("date_column = {}", self.column(date)));
+        }
         line(format_args!("tick_ns = {:?}", time.tick_ns));
         if let Some(ticks) = time.gap_after_ticks {
             line(format_args!("gap_after_ticks = {ticks:?}"));
@@ -111,11 +117,10 @@ impl FileText<'_> {
             line(format_args!("sensors = ["));
             let scale = sensors.scale.map_or_else(String::new, |scale| format!(", scale = {scale:?}"));
             for column in &sensors.columns {
-                line(format_args!(
-                    "    {{ column = {}, unit = \"{}\"{scale} }},",
-                    self.column(*column),
-                    sensors.unit
-                ));
+                let source = column.map_or("constant = 0.0".to_owned(), |column| {
+                    format!("column = {}", self.column(column))
+                });
+                line(format_args!("    {{ {source}, unit = \"{}\"{scale} }},", sensors.unit));
             }
             line(format_args!("]"));
         }

@@ -1,7 +1,7 @@
 //! The files of a log: sizes, and how a recording is laid out.
 
 use std::fs::File;
-use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::io;
 use std::path::Path;
 
 use mcap::records::op;
@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::recording::MAGIC;
+use crate::recording::walk::{Head, RecordFile, number};
 use crate::source::is_recording;
 
 /// How a recording is laid out.
@@ -47,63 +48,45 @@ impl FileInfo {
     pub fn of(path: &Path) -> Result<Self, Error> {
         let failed = |source| Error::file(path, "look at the log", source);
         let bytes = std::fs::metadata(path).map_err(failed)?.len();
-        let recording = if is_recording(path) { Some(layout(path, bytes).map_err(failed)?) } else { None };
+        let recording = if is_recording(path) { Some(layout(path).map_err(failed)?) } else { None };
         Ok(Self { path: path.display().to_string(), bytes, recording })
     }
 }
 
-/// Goes from record to record; each is an opcode (u8), a length (u64, little-endian) and so many bytes.
-fn layout(path: &Path, bytes: u64) -> io::Result<ChunksInfo> {
-    let mut file = BufReader::with_capacity(1 << 8, File::open(path)?);
+/// What is read at once (bytes): heads.
+const BLOCK: usize = 1 << 8;
+
+/// Goes from record to record.
+fn layout(path: &Path) -> io::Result<ChunksInfo> {
+    let mut records = RecordFile::new(File::open(path)?, BLOCK)?;
     let mut info = ChunksInfo::default();
-    let mut at = file.seek(SeekFrom::Start(MAGIC.len() as u64))?;
-    let mut ended = false;
-    loop {
-        let mut head = [0; 9];
-        match file.read_exact(&mut head) {
-            Ok(()) => {}
-            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(info),
-            Err(error) => return Err(error),
-        }
-        let [opcode, length @ ..] = head;
-        let length = u64::from_le_bytes(length);
-        let Some(end) = at.checked_add(9).and_then(|start| start.checked_add(length)) else {
-            return Ok(info);
-        };
-        if end > bytes {
-            return Ok(info);
-        }
-        match opcode {
-            op::CHUNK => chunk(&mut file, length, &mut info)?,
+    let (mut at, mut ended) = (MAGIC.len() as u64, false);
+    while let Some(head) = records.head(at)? {
+        at = head.end();
+        match head.opcode {
+            op::CHUNK => chunk(&mut records, &head, &mut info)?,
             op::ATTACHMENT => info.attachments += 1,
             op::DATA_END => ended = true,
             op::FOOTER => {
-                info.complete = ended && end + MAGIC.len() as u64 == bytes;
-                return Ok(info);
+                info.complete = ended && at + MAGIC.len() as u64 == records.length();
+                break;
             }
             _ => {}
         }
-        at = file.seek(SeekFrom::Start(end))?;
     }
+    Ok(info)
 }
 
 /// Reads the head of a chunk: start and end time, uncompressed size, checksum, compression, size.
-fn chunk(file: &mut impl Read, length: u64, info: &mut ChunksInfo) -> io::Result<()> {
-    let mut head = [0; 32];
-    if length < head.len() as u64 {
-        return Ok(());
-    }
-    file.read_exact(&mut head)?;
-    let field = |from: usize| {
-        head.get(from..from + 8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
-    };
-    let name_length = head.last_chunk::<4>().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-    let mut name = Vec::new();
-    file.take(u64::from(name_length.min(64))).read_to_end(&mut name)?;
-    let name = String::from_utf8_lossy(&name).into_owned();
+fn chunk(records: &mut RecordFile<File>, chunk: &Head, info: &mut ChunksInfo) -> io::Result<()> {
+    let head = records.load(chunk.begin, 32 + 64)?;
+    let Some(name_length) = head.get(28..).and_then(|from| from.first_chunk()) else { return Ok(()) };
+    let name = head.get(32..).unwrap_or_default();
+    let name_length = usize::try_from(u32::from_le_bytes(*name_length)).unwrap_or(usize::MAX);
+    let name = String::from_utf8_lossy(name.get(..name_length).unwrap_or(name)).into_owned();
     info.chunks += 1;
-    info.uncompressed_bytes = info.uncompressed_bytes.saturating_add(field(16).unwrap_or(0));
-    info.stored_bytes = info.stored_bytes.saturating_add(length);
+    info.uncompressed_bytes = info.uncompressed_bytes.saturating_add(number(&head, 16).unwrap_or(0));
+    info.stored_bytes = info.stored_bytes.saturating_add(chunk.length);
     let name = if name.is_empty() { "none".to_owned() } else { name };
     if !info.compression.contains(&name) && info.compression.len() < 16 {
         info.compression.push(name);

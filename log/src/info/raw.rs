@@ -12,13 +12,15 @@ use super::histogram::{Histogram, Spread};
 const MAX_NAMES: usize = 256;
 
 /// Readings of one name.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ReadingInfo {
+    /// Unit of measure in which they were sent, as far as it is known; nothing for health readings.
+    pub unit: String,
     /// Readings that are numbers.
     pub readings: u64,
     /// Readings that are none.
     pub missing: u64,
-    /// The smallest, as it was sent: V, counts or °C.
+    /// The smallest, as it was sent.
     pub min: f64,
     /// The largest, likewise.
     pub max: f64,

@@ -43,7 +43,7 @@ fn gyro(first: u64, ticks: u64, late_ns: u64) -> Message {
         switch_command: sequence > 0 && sequence.is_multiple_of(10),
         ..core::GyroTick::default()
     };
-    let output = core::OutputKind::Counts;
+    let output = OutputKind::Counts;
     let batch = GyroBatch { output, ticks: (first..first + ticks).map(tick).collect() };
     Message {
         topic: Topic::Raw(unit(), RawStream::Gyro),
@@ -80,7 +80,7 @@ fn corrected(sequences: &[u64], missed: u64, counter: u64) -> Message {
 
 /// What a recording of these messages holds.
 fn info_of(messages: &[Message]) -> LogInfo {
-    let mut survey = Survey::new(true);
+    let mut survey = Survey::new(&LogFiles::Recordings(Vec::new()));
     for message in messages {
         survey.take(message);
     }
@@ -216,7 +216,7 @@ fn temperatures_have_their_range_and_what_is_missing() {
     let topic = Topic::Raw(unit(), RawStream::Temperature);
     let info = info_of(&[Message { topic, received_ns: 1, frame }]);
     let readings = &info.units["ZLG-0001"].temperatures.by_name;
-    let body = readings["body"];
+    let body = &readings["body"];
     assert_eq!((body.readings, body.min, body.max, body.first, body.last), (3, -3.5, 25.0, 20.0, 25.0));
     assert_eq!((readings["coil"].readings, readings["coil"].missing, readings["coil"].min), (2, 1, 30.0));
 }

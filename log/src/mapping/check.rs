@@ -5,7 +5,7 @@ use isotherm_document::{Reader, element, join};
 
 use super::{
     Column, Delimiter, FileMapping, GyroMapping, Mapping, ModeMapping, SensorUnit, SwitchMapping,
-    TickMapping, TimeMapping, TimeUnit,
+    TickMapping, TimeMapping,
 };
 
 pub(super) fn check(r: &mut Reader<'_>, Mapping { files, .. }: &Mapping) {
@@ -70,10 +70,14 @@ fn time(r: &mut Reader<'_>, path: &str, time: &TimeMapping, own_durations: bool)
     }
     let stamped = r.has(&at("column"));
     if stamped && !r.has(&at("unit")) {
-        let what = "is missing: unit of the stamps, \"ns\", \"us\", \"ms\", \"s\" or \"iso\"";
+        let what = "is missing: unit of the stamps, \"ns\", \"us\", \"ms\", \"s\", \"iso\", \"dmy\", \"mdy\" or \"time_of_day\"";
         r.report(&at("unit"), what);
     }
-    for key in ["unit", "marks", "duration", "gap_after_ticks"].map(at) {
+    if time.stamps.as_ref().is_some_and(|stamps| stamps.date.is_some() && !stamps.unit.has_date()) {
+        let what = "needs the unit \"iso\", \"dmy\" or \"mdy\", by which dates are read";
+        r.report(&at("date_column"), what);
+    }
+    for key in ["unit", "date_column", "marks", "duration", "gap_after_ticks"].map(at) {
         if !stamped && r.has(&key) {
             r.report(&key, "needs a time column: add `column`, or remove this key");
         }
@@ -119,17 +123,31 @@ fn ticks<U: SensorUnit>(r: &mut Reader<'_>, path: &str, ticks: &TickMapping<U>) 
     if ticks.duration_column.is_some() && ticks.duration_unit.is_none() {
         r.report(&unit, "is missing: unit of the duration column, \"ns\", \"us\", \"ms\" or \"s\"");
     }
-    if ticks.duration_column.is_some() && ticks.duration_unit == Some(TimeUnit::DateTime) {
-        r.report(&unit, "is \"iso\", must be \"ns\", \"us\", \"ms\" or \"s\": a duration has no date");
+    if ticks.duration_column.is_some() && ticks.duration_unit.is_some_and(|unit| unit.exponent().is_none()) {
+        r.report(&unit, "must be \"ns\", \"us\", \"ms\" or \"s\": a duration has no date");
     }
     // What the readings stand for is not known: nothing can be said of their units.
     if r.is_damaged(&join(path, "output")) {
         return;
     }
     let sensors = join(path, "sensors");
+    if ticks.sensors.iter().all(|sensor| sensor.column.is_none()) {
+        r.report(&sensors, "has no column: one of the sensors must have one");
+    }
     for (index, sensor) in ticks.sensors.iter().enumerate() {
         let at = |key| join(&element(&sensors, index), key);
         let (unit, is_counts) = (at("unit"), sensor.unit.in_si().is_none());
+        if sensor.column.is_some() == sensor.constant.is_some() {
+            r.report(
+                &element(&sensors, index),
+                "must have either `column = …` or, for a sensor that the log does not have, `constant = 0`",
+            );
+        }
+        if ticks.output == OutputKind::Counts
+            && sensor.constant.is_some_and(|constant| constant.fract() != 0.0)
+        {
+            r.report(&at("constant"), "must be a whole number: the output is \"counts\"");
+        }
         if ticks.output == OutputKind::Counts {
             if !is_counts {
                 r.report(&unit, "must be \"counts\", or left out: the output is \"counts\"");

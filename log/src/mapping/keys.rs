@@ -77,6 +77,9 @@ pub enum AccelUnit {
 pub trait SensorUnit: Copy + Default {
     /// How much it is in SI, and whether it is an increment over the tick; `None` for counts.
     fn in_si(self) -> Option<(f64, bool)>;
+
+    /// What its readings are sent in.
+    fn sent(self) -> &'static str;
 }
 
 impl SensorUnit for GyroUnit {
@@ -91,6 +94,15 @@ impl SensorUnit for GyroUnit {
             Self::Arcsec => (Angle::from_arcsec(1.0).as_rad(), true),
         })
     }
+
+    fn sent(self) -> &'static str {
+        match self {
+            Self::Counts => "counts",
+            Self::RadPerS | Self::DegPerS | Self::DegPerH | Self::Rad | Self::Deg | Self::Arcsec => "rad/s",
+            Self::Raw => "raw",
+            Self::RawPerTick => "raw/s",
+        }
+    }
 }
 
 impl SensorUnit for AccelUnit {
@@ -102,6 +114,16 @@ impl SensorUnit for AccelUnit {
             Self::Mg => (SpecificForce::from_g(0.001).as_m_per_s2(), false),
             Self::MPerS | Self::RawPerTick => (1.0, true),
         })
+    }
+
+    fn sent(self) -> &'static str {
+        match self {
+            Self::Counts => "counts",
+            Self::MPerS2 | Self::G | Self::Mg | Self::MPerS => "m/s²",
+            Self::Volt => "V",
+            Self::Raw => "raw",
+            Self::RawPerTick => "raw/s",
+        }
     }
 }
 
@@ -125,5 +147,14 @@ impl TemperatureUnit {
     #[must_use]
     pub fn shift(self) -> f64 {
         if self == Self::Kelvin { -273.15 } else { -0.0 }
+    }
+
+    /// What its readings are sent in.
+    pub(crate) fn sent(self) -> &'static str {
+        match self {
+            Self::DegC | Self::Kelvin => "°C",
+            Self::Volt => "V",
+            Self::Raw => "raw",
+        }
     }
 }

@@ -53,7 +53,7 @@ fn a_sound_mapping_says_what_it_says() {
     assert_eq!(conversions[1].factor.to_bits(), (-rad_per_deg).to_bits());
     assert_eq!((conversions[2].mid_scale, conversions[2].factor), (32768.0, 0.5));
     assert_eq!(gyro.switch.as_ref().unwrap().from, Some(SwitchFrom::ModeChange));
-    assert_eq!(file.accel.as_ref().unwrap().sensors[0].column, Column::Index(4));
+    assert_eq!(file.accel.as_ref().unwrap().sensors[0].column, Some(Column::Index(4)));
     assert_eq!((file.temperatures[0].unit.shift(), file.temperatures[0].every_rows), (-273.15, 3));
 }
 
@@ -91,6 +91,10 @@ fn every_broken_line_is_named_with_its_place_and_key() {
         ("{ column = \"x\", unit", "{ column = 0, unit", 12, 16, "file[0].gyro.sensors[0].column"),
         ("{ column = \"x\", unit", "{ column = \" \", unit", 12, 16, "file[0].gyro.sensors[0].column"),
         ("{ column = \"x\", unit", "{ columns = \"x\", unit", 12, 7, "file[0].gyro.sensors[0].columns"),
+        ("{ column = \"x\", unit", "{ constant = 1, column = \"x\", unit", 12, 5, "file[0].gyro.sensors[0]"),
+        ("{ column = \"x\", unit", "{ unit", 12, 5, "file[0].gyro.sensors[0]"),
+        ("{ column = 5 }", "{ constant = 5 }", 20, 11, "file[0].accel.sensors"),
+        ("unit = \"ms\"", "unit = \"ms\"\ndate_column = \"d\"", 8, 15, "file[0].time.date_column"),
         ("sign = -1", "sign = 0", 13, 48, "file[0].gyro.sensors[1].sign"),
         ("scale = 0.5", "scale = -0.5", 14, 68, "file[0].gyro.sensors[2].scale"),
         ("mid_scale = 32768", "mid_scale = nan", 14, 53, "file[0].gyro.sensors[2].mid_scale"),
@@ -145,7 +149,7 @@ fn a_problem_reads_like_a_sentence() {
     let problems = Mapping::parse(&SOUND.replace("\"ms\"", "\"min\""), "m.toml").unwrap_err();
     assert_eq!(
         problems[0].to_string(),
-        "m.toml:7:8: file[0].time.unit: is \"min\" (a string), must be one of \"ns\", \"us\", \"ms\", \"s\", \"iso\""
+        "m.toml:7:8: file[0].time.unit: is \"min\" (a string), must be one of \"ns\", \"us\", \"ms\", \"s\", \"iso\", \"dmy\", \"mdy\", \"time_of_day\""
     );
     let syntax = Mapping::parse("version = 1\nfile = [", "m.toml").unwrap_err();
     assert_eq!((syntax.len(), syntax[0].line), (1, 2));

@@ -25,6 +25,35 @@ pub enum TimeUnit {
     /// None: date and time of ISO 8601, in UTC where they name no offset.
     #[serde(rename = "iso")]
     DateTime,
+    /// None: date and time, day before month: `31.12.2026 23:59:59.250` (UTC).
+    #[serde(rename = "dmy")]
+    DayFirst,
+    /// None: date and time, month before day: `12/31/2026 11:59:59.250 PM` (UTC).
+    #[serde(rename = "mdy")]
+    MonthFirst,
+    /// None: hours, minutes and seconds since midnight.
+    #[serde(rename = "time_of_day")]
+    TimeOfDay,
+}
+
+impl TimeUnit {
+    /// What a number is to be multiplied by to be in ns, as a power of ten; `None` where stamps are no numbers.
+    #[must_use]
+    pub fn exponent(self) -> Option<i32> {
+        match self {
+            Self::Nanoseconds => Some(0),
+            Self::Microseconds => Some(3),
+            Self::Milliseconds => Some(6),
+            Self::Seconds => Some(9),
+            Self::DateTime | Self::DayFirst | Self::MonthFirst | Self::TimeOfDay => None,
+        }
+    }
+
+    /// Whether stamps have a date, which may stand in a column of its own.
+    #[must_use]
+    pub fn has_date(self) -> bool {
+        matches!(self, Self::DateTime | Self::DayFirst | Self::MonthFirst)
+    }
 }
 
 /// A column that holds a time or a duration.
@@ -34,6 +63,8 @@ pub struct TimeColumn {
     pub column: Column,
     /// Its unit.
     pub unit: TimeUnit,
+    /// Column of the date, where the other has the time of day alone.
+    pub date: Option<Column>,
 }
 
 /// Which end of the tick a stamp marks.
@@ -73,6 +104,8 @@ pub(super) struct TimeKeys {
     column: Option<Column>,
     /// Unit of the stamps.
     unit: Option<TimeUnit>,
+    /// Column of the date, where stamps are the time of day alone.
+    date_column: Option<Column>,
     /// Which end of the tick a stamp marks.
     marks: Option<Marks>,
     /// Where a tick's duration comes from: the difference of stamps, or the nominal tick.
@@ -112,7 +145,11 @@ impl From<TimeKeys> for TimeMapping {
         let ns = ticks.into_iter().find_map(|(stated, ns)| Some(stated? * ns));
         Self {
             measured: keys.duration.map_or(keys.column.is_some(), |rule| rule == DurationRule::Measured),
-            stamps: keys.column.zip(keys.unit).map(|(column, unit)| TimeColumn { column, unit }),
+            stamps: (keys.column.zip(keys.unit)).map(|(column, unit)| TimeColumn {
+                column,
+                unit,
+                date: keys.date_column,
+            }),
             marks: keys.marks.unwrap_or(Marks::End),
             tick: ns.map(|ns| Span::from_s(ns * 1e-9)),
             gap_after_ticks: keys.gap_after_ticks,

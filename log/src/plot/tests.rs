@@ -70,7 +70,6 @@ fn two_logs_are_compared_tick_by_tick() {
         assert!(html.contains(words), "{words}");
     }
     assert!(html.contains("calibration 2 (abababab) from tick 250 on"));
-    assert!(html.contains("400 corrected ticks are in both logs, 200 of them differ"));
     // The mean of the differences: half of the common ticks differ by 0.5 µrad in 5 ms.
     let mean = 0.5 * 0.5e-6 / 0.005 * nominal::DEG_PER_H;
     assert!(html.contains(&format!(">{mean:.5}</td>")), "{mean}");
@@ -82,7 +81,7 @@ fn a_log_without_ticks_is_refused_in_words() {
     let path = folder.path().join("empty.mcap");
     RecordingWriter::create(&path, RecordingOptions::default()).unwrap().finish().unwrap();
     let error = plot(vec![log(&path)], &PlotOptions::default(), &mut |_| {}).unwrap_err();
-    assert!(error.to_string().contains("nothing to draw"), "{error}");
+    assert!(matches!(error, Error::Usage(_)), "{error}");
 }
 
 #[test]

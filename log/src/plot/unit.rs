@@ -7,14 +7,14 @@ use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
 use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
-use isotherm_protocol::key::RawStream;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::status::{Output, Status};
 
 use super::nominal::{DEG_PER_H, Nominal};
 use super::time::{Clock, Stream, seconds};
 use super::track::Track;
-use crate::message::{Message, Topic};
+use crate::message::Message;
+use crate::streams::decoded::{Decoded, decode};
 use isotherm_pages::Ink;
 
 /// Most marks, stretches or channels of each kind; further ones are counted.
@@ -115,15 +115,15 @@ impl UnitPlot {
     }
 
     fn read(&mut self, message: &Message, corrected: &mut dyn FnMut(i64, &CorrectedTick)) -> Option<()> {
-        let frame = &message.frame;
-        match &message.topic {
-            Topic::Raw(_, RawStream::Gyro) => self.take_gyro(&codec::decode(frame).ok()?),
-            Topic::Raw(_, RawStream::Accel) => self.take_accel(&codec::decode(frame).ok()?),
-            Topic::Raw(_, RawStream::Temperature) => self.take_temperatures(&codec::decode(frame).ok()?),
-            Topic::Corrected(_) => self.take_corrected(&codec::decode(frame).ok()?, corrected),
-            Topic::Status(_) => self.take_status(&codec::decode(frame).ok()?),
-            Topic::Journal(_) => self.take_journal(codec::decode(frame).ok()?),
-            _ => {}
+        let Some((_, decoded)) = decode(message).ok()? else { return Some(()) };
+        match decoded {
+            Decoded::Gyro(batch) => self.take_gyro(&batch),
+            Decoded::Accel(batch) => self.take_accel(&batch),
+            Decoded::Temperature(batch) => self.take_temperatures(&batch),
+            Decoded::Corrected(batch) => self.take_corrected(&batch, corrected),
+            Decoded::Status(status) => self.take_status(&status),
+            Decoded::Journal => self.take_journal(codec::decode(&message.frame).ok()?),
+            Decoded::Health(_) | Decoded::Reference(_) => {}
         }
         Some(())
     }

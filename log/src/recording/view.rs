@@ -2,6 +2,7 @@
 //! `PlotJuggler`.
 //!
 //! They have channels of their own, named as the topic with `/json` behind it; each tick is one message. Nothing reads them back here.
+//! Times and vectors are Foxglove's own, by their names: its times begin with 1970, and an earlier tick is not shown.
 
 use std::collections::BTreeMap;
 
@@ -70,8 +71,10 @@ pub(super) fn schema(topic: &Topic) -> Option<(&'static str, String)> {
         "type": "object",
         "title": "time",
         "description": "End of the tick on the producer's clock",
-        "properties": { "sec": integer("s"), "nsec": integer("ns") },
-        "required": ["sec", "nsec"],
+        "properties": {
+            "sec": { "type": "integer", "minimum": 0 },
+            "nsec": { "type": "integer", "minimum": 0, "maximum": 999_999_999 },
+        },
     } });
     if let (Value::Object(all), Value::Object(more)) = (&mut properties, more) {
         all.extend(more);
@@ -92,7 +95,7 @@ fn corrected() -> Value {
     let axes = |words: &str| {
         let axis = json!({ "type": "number" });
         json!({
-            "type": "object", "description": words,
+            "type": "object", "title": "foxglove.Vector3", "description": words,
             "properties": { "x": axis, "y": axis, "z": axis }, "required": ["x", "y", "z"],
         })
     };
@@ -134,8 +137,8 @@ struct Shown<T> {
 
 #[derive(Serialize)]
 struct Stamp {
-    sec: i64,
-    nsec: i64,
+    sec: u64,
+    nsec: u64,
 }
 
 #[derive(Serialize)]
@@ -241,14 +244,11 @@ fn shown<T: Serialize>(received_ns: u64, readings: impl Iterator<Item = (Timesta
     let last = readings.iter().map(|(time, _)| time.as_ns()).max().unwrap_or(0);
     let point = |(time, more): (Timestamp, T)| {
         let ns = time.as_ns();
-        let timestamp = Stamp { sec: ns.div_euclid(1_000_000_000), nsec: ns.rem_euclid(1_000_000_000) };
+        let time_ns = u64::try_from(ns).ok()?;
+        let timestamp = Stamp { sec: time_ns / 1_000_000_000, nsec: time_ns % 1_000_000_000 };
         let json = serde_json::to_vec(&Shown { timestamp, more }).ok()?;
         let before = u64::try_from(last.saturating_sub(ns)).unwrap_or(0);
-        Some(Point {
-            log_ns: received_ns.saturating_sub(before),
-            time_ns: u64::try_from(ns).unwrap_or(0),
-            json,
-        })
+        Some(Point { log_ns: received_ns.saturating_sub(before), time_ns, json })
     };
     readings.into_iter().filter_map(point).collect()
 }

@@ -5,9 +5,9 @@
 //! the indexes that stand behind each chunk, so that it costs little even for a long recording and works for one that was
 //! cut short.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::codec;
@@ -16,27 +16,49 @@ use isotherm_protocol::key::UnitId;
 use mcap::records::{Channel, Record, op};
 
 use super::{Mark, Outline, Outlines, UnitOutline};
-use crate::error::Error;
+use crate::error::{Error, few};
 use crate::message::Topic;
+use crate::recording::walk::{Head, RecordFile};
 use crate::recording::{MAGIC, MESSAGE_ENCODING, chunk_records};
 
-/// Longest record that is read whole (bytes): chunks beyond this are not of a recorder.
-const LONGEST_RECORD: u64 = 1 << 28;
-/// Opcode and length in front of a record.
-const RECORD_HEADER: usize = 9;
+/// What is read of a recording at once (bytes): heads and indexes.
+const BLOCK: usize = 1 << 13;
 
 /// Looks through recordings, in this order, for journals and for the units there are.
 ///
 /// # Errors
 /// [`Error::File`] where one cannot be opened or read. What is damaged ends the look at its file, as it ends its reading.
 pub fn scan(paths: &[PathBuf]) -> Result<Outlines, Error> {
+    Ok(look(paths, true)?.finish())
+}
+
+/// Refuses units that none of these recordings has, before they are read for what they do not hold.
+///
+/// # Errors
+/// [`Error::NoSuchUnit`], and as [`scan`].
+pub fn check_units(paths: &[PathBuf], units: &BTreeSet<UnitId>) -> Result<(), Error> {
+    if units.is_empty() {
+        return Ok(());
+    }
+    let there = look(paths, false)?.units;
+    let Some(unit) = units.iter().find(|unit| !there.contains_key(*unit)) else { return Ok(()) };
+    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+    Err(Error::NoSuchUnit {
+        recording: names.join(", "),
+        unit: unit.clone(),
+        there: few(&there.keys().map(UnitId::as_str).collect::<Vec<_>>()),
+    })
+}
+
+/// Goes through recordings; without `journals`, for the units alone.
+fn look(paths: &[PathBuf], journals: bool) -> Result<Found, Error> {
     let mut found = Found::default();
     for path in paths {
         let failed = |source| Error::file(path, "read the recording", source);
-        let mut recording = Recording::open(path).map_err(failed)?;
+        let mut recording = Recording::open(path, journals).map_err(failed)?;
         while recording.record(&mut found).map_err(failed)? {}
     }
-    Ok(found.finish())
+    Ok(found)
 }
 
 /// What has been come across.
@@ -83,17 +105,20 @@ pub(crate) fn join(joiner: &mut Joiner, frame: &[u8]) -> Result<Option<JournalEn
 
 /// A recording, gone through record by record.
 struct Recording {
-    file: BufReader<File>,
+    records: RecordFile<File>,
+    /// Where the next record begins.
+    at: u64,
     /// Topic of each channel so far; `None` for channels of something else.
     topics: HashMap<u16, Option<Topic>>,
+    /// Whether journals are read.
+    journals: bool,
     /// The last chunk, unread until it is known to hold a journal.
     chunk: Option<Chunk>,
 }
 
 /// A chunk whose indexes are being gone through.
 struct Chunk {
-    start: u64,
-    length: u64,
+    head: Head,
     /// Whether it must be read: it has a journal, or a channel that is not known yet.
     wanted: bool,
     /// Whether anything was said of what it holds.
@@ -101,66 +126,54 @@ struct Chunk {
 }
 
 impl Recording {
-    fn open(path: &Path) -> std::io::Result<Self> {
-        let mut file = BufReader::new(File::open(path)?);
-        file.seek(SeekFrom::Start(MAGIC.len() as u64))?;
-        Ok(Self { file, topics: HashMap::new(), chunk: None })
+    fn open(path: &Path, journals: bool) -> io::Result<Self> {
+        let records = RecordFile::new(File::open(path)?, BLOCK)?;
+        let at = MAGIC.len() as u64;
+        Ok(Self { records, at, topics: HashMap::new(), journals, chunk: None })
     }
 
     /// Goes on by one record; `false` at the end of what can be read.
-    fn record(&mut self, found: &mut Found) -> std::io::Result<bool> {
-        let mut header = [0; RECORD_HEADER];
-        if !fill(&mut self.file, &mut header)? {
+    fn record(&mut self, found: &mut Found) -> io::Result<bool> {
+        let Some(head) = self.records.head(self.at)? else {
             // Some of its indexes may be cut off.
             self.chunk.iter_mut().for_each(|chunk| chunk.wanted = true);
             self.leave_chunk(found)?;
             return Ok(false);
-        }
-        let [opcode, length @ ..] = header;
-        let length = u64::from_le_bytes(length);
-        if opcode != op::MESSAGE_INDEX {
+        };
+        self.at = head.end();
+        if head.opcode != op::MESSAGE_INDEX {
             self.leave_chunk(found)?;
         }
-        match opcode {
-            op::CHUNK => {
-                let start = self.file.stream_position()?;
-                self.chunk = Some(Chunk { start, length, wanted: false, indexed: false });
-                self.skip(length)
-            }
+        match head.opcode {
+            op::CHUNK => self.chunk = Some(Chunk { head, wanted: false, indexed: false }),
             op::MESSAGE_INDEX => {
-                let Some(bytes) = self.read(length)? else { return Ok(false) };
                 if let Some(chunk) = &mut self.chunk
-                    && let Some(id) = bytes.first_chunk()
+                    && let Some(id) = self.records.load(head.begin, 2)?.first_chunk()
                 {
                     chunk.indexed = true;
                     chunk.wanted |= match self.topics.get(&u16::from_le_bytes(*id)) {
-                        Some(topic) => matches!(topic, Some(Topic::Journal(_))),
+                        Some(topic) => self.journals && matches!(topic, Some(Topic::Journal(_))),
                         None => true,
                     };
                 }
-                Ok(true)
             }
             op::CHANNEL | op::MESSAGE => {
-                let Some(bytes) = self.read(length)? else { return Ok(false) };
-                Ok(mcap::parse_record(opcode, &bytes).is_ok_and(|record| {
-                    self.take(&record, found);
-                    true
-                }))
+                let Some(bytes) = self.records.body(&head)? else { return Ok(false) };
+                let Ok(record) = mcap::parse_record(head.opcode, &bytes) else { return Ok(false) };
+                self.take(&record, found);
             }
-            op::DATA_END | op::FOOTER => Ok(false),
-            _ => self.skip(length),
+            op::DATA_END | op::FOOTER => return Ok(false),
+            _ => {}
         }
+        Ok(true)
     }
 
-    /// Reads the chunk whose indexes are over, where it is wanted, and comes back to where it was.
-    fn leave_chunk(&mut self, found: &mut Found) -> std::io::Result<()> {
+    /// Reads the chunk whose indexes are over, where it is wanted.
+    fn leave_chunk(&mut self, found: &mut Found) -> io::Result<()> {
         let Some(chunk) = self.chunk.take().filter(|chunk| chunk.wanted || !chunk.indexed) else {
             return Ok(());
         };
-        let back = self.file.stream_position()?;
-        self.file.seek(SeekFrom::Start(chunk.start))?;
-        let bytes = self.read(chunk.length)?;
-        self.file.seek(SeekFrom::Start(back))?;
+        let bytes = self.records.body(&chunk.head)?;
         // What is damaged will be told by who reads it for its messages.
         let records = bytes.and_then(|bytes| chunk_records(&bytes).ok());
         records.iter().flatten().for_each(|record| self.take(record, found));
@@ -177,36 +190,13 @@ impl Recording {
                 self.topics.insert(*id, topic);
             }
             Record::Message { header, data } => {
-                if let Some(Some(Topic::Journal(unit))) = self.topics.get(&header.channel_id) {
+                if let Some(Some(Topic::Journal(unit))) = self.topics.get(&header.channel_id)
+                    && self.journals
+                {
                     found.journal(unit, header.log_time, data);
                 }
             }
             _ => {}
         }
-    }
-
-    /// Passes over what a record holds; `false` where the file ends in it.
-    fn skip(&mut self, length: u64) -> std::io::Result<bool> {
-        let Ok(offset) = i64::try_from(length) else { return Ok(false) };
-        self.file.seek_relative(offset)?;
-        Ok(true)
-    }
-
-    /// What a record holds; `None` where the file ends in it.
-    fn read(&mut self, length: u64) -> std::io::Result<Option<Vec<u8>>> {
-        if length > LONGEST_RECORD {
-            return Ok(None);
-        }
-        let mut bytes = Vec::new();
-        let read = self.file.by_ref().take(length).read_to_end(&mut bytes)?;
-        Ok((read as u64 == length).then_some(bytes))
-    }
-}
-
-/// Fills a buffer; `false` where the file ends before.
-fn fill(file: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<bool> {
-    match file.read_exact(buffer) {
-        Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
-        other => other.map(|()| true),
     }
 }

@@ -5,14 +5,14 @@ use isotherm_correction::unit::{ChannelReport, Counters, Unit};
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::key::{Input, RawStream};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::reference::Reference;
+use isotherm_protocol::raw::GyroBatch;
 use isotherm_protocol::stream::UnitStream;
 use serde::Serialize;
 
 use super::{Done, Replica, entry_words, input_name};
 use crate::error::Error;
 use crate::part::Messages;
+use crate::streams::decoded::Decoded;
 
 /// What happened.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -272,43 +272,15 @@ fn tick_out(tick: &CorrectedTick) -> TickOut {
 /// What is in a frame.
 fn in_frame(input: Input, frame: &[u8], taken: &Result<(), CodecError>) -> What {
     let bad = taken.as_ref().err().map(ToString::to_string);
-    let (first_sequence, times) = match input {
-        Input::Raw(RawStream::Gyro) => codec::decode::<GyroBatch>(frame).map_or_else(
-            |_| Default::default(),
-            |batch| {
-                (
-                    batch.ticks.first().map(|first| first.sequence),
-                    batch.ticks.iter().map(|tick| tick.end_time.as_ns()).collect(),
-                )
-            },
-        ),
-        Input::Raw(RawStream::Accel) => codec::decode::<AccelBatch>(frame).map_or_else(
-            |_| Default::default(),
-            |batch| {
-                (
-                    batch.ticks.first().map(|first| first.sequence),
-                    batch.ticks.iter().map(|tick| tick.end_time.as_ns()).collect(),
-                )
-            },
-        ),
-        Input::Raw(RawStream::Temperature) => codec::decode::<TemperatureBatch>(frame).map_or_else(
-            |_| Default::default(),
-            |batch| (None, batch.ticks().filter_map(|tick| Some(tick.first()?.time.as_ns())).collect()),
-        ),
-        Input::Raw(RawStream::Health) => codec::decode::<HealthBatch>(frame).map_or_else(
-            |_| Default::default(),
-            |batch| (None, batch.ticks.iter().map(|tick| tick.time_ns).collect()),
-        ),
-        Input::Reference => codec::decode::<Reference>(frame)
-            .map_or_else(|_| Default::default(), |reference| (None, vec![reference.end_ns])),
+    let decoded = Decoded::of_input(input, frame).ok();
+    let (first_sequence, ticks) = match &decoded {
+        Some(Decoded::Gyro(batch)) => (batch.ticks.first().map(|first| first.sequence), batch.ticks.len()),
+        Some(Decoded::Accel(batch)) => (batch.ticks.first().map(|first| first.sequence), batch.ticks.len()),
+        Some(Decoded::Temperature(batch)) => (None, batch.ticks().count()),
+        Some(Decoded::Health(batch)) => (None, batch.ticks.len()),
+        other => (None, usize::from(other.is_some())),
     };
-    let times: Vec<i64> = times;
-    What::Frame {
-        input: input_name(input),
-        first_sequence,
-        ticks: times.len(),
-        from_ns: times.first().copied(),
-        to_ns: times.last().copied(),
-        bad,
-    }
+    let times = decoded.and_then(|decoded| decoded.times());
+    let [from_ns, to_ns] = [0, 1].map(|end| times.map(|times| times[end].as_ns()));
+    What::Frame { input: input_name(input), first_sequence, ticks, from_ns, to_ns, bad }
 }

@@ -5,6 +5,8 @@ use std::io;
 use isotherm_document::escape::clipped;
 use thiserror::Error;
 
+use crate::mapping::TimeUnit;
+
 /// What of a column's name is shown, in characters.
 const LONGEST_NAME: usize = 80;
 
@@ -73,8 +75,16 @@ pub enum Reason {
     #[error("is not a time that fits 64 bits of nanoseconds")]
     NotATime,
     /// Neither date nor time.
-    #[error("is not a date and time of ISO 8601, such as 2026-11-23T14:05:00.250Z")]
-    NotADateTime,
+    #[error("is not a {}", match .unit {
+        TimeUnit::DayFirst => "date and time, day before month, such as 23.11.2026 14:05:00.250",
+        TimeUnit::MonthFirst => "date and time, month before day, such as 11/23/2026 14:05:00.250",
+        TimeUnit::TimeOfDay => "time of day, such as 14:05:00.250",
+        _ => "date and time of ISO 8601, such as 2026-11-23T14:05:00.250Z",
+    })]
+    NotADateTime {
+        /// What it must be.
+        unit: TimeUnit,
+    },
     /// A status word that is none.
     #[error("is not a status word, a whole number from 0 (hexadecimal with 0x)")]
     NotAWord,

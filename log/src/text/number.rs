@@ -1,8 +1,5 @@
 //! Numbers in cells, read exactly.
 
-use jiff::fmt::temporal::DateTimeParser;
-use jiff::tz::Offset;
-
 /// Most digits of a time; 10³⁰ is far beyond 64 bits of nanoseconds.
 const MOST_DIGITS: usize = 30;
 
@@ -64,16 +61,6 @@ pub(super) fn word(cell: &[u8]) -> Option<u64> {
         Some(digits) => u64::from_str_radix(digits, 16).ok(),
         None => text.parse().ok(),
     }
-}
-
-/// Date and time of ISO 8601 as ns since 1970 (UTC); without an offset they are taken as UTC.
-pub(crate) fn date_time_ns(cell: &[u8]) -> Option<i64> {
-    static PARSER: DateTimeParser = DateTimeParser::new();
-    let time = PARSER.parse_timestamp(cell).ok().or_else(|| {
-        let civil = PARSER.parse_datetime(cell).ok()?;
-        Offset::UTC.to_timestamp(civil).ok()
-    })?;
-    i64::try_from(time.as_nanosecond()).ok()
 }
 
 /// A time in ns, exactly as written and rounded to the nearest where it has more digits; its unit is 10^`exponent` ns.
@@ -154,23 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn date_times_with_and_without_an_offset() {
-        let noon = 1_700_000_000_000_000_000;
-        let table: &[(&str, Option<i64>)] = &[
-            ("2023-11-14T22:13:20Z", Some(noon)),
-            ("2023-11-14 22:13:20", Some(noon)),
-            ("2023-11-14T22:13:20,250", Some(noon + 250_000_000)),
-            ("2023-11-14T23:13:20.000000001+01:00", Some(noon + 1)),
-            ("2023-11-14T16:13:20-06", Some(noon)),
-            ("1969-12-31T23:59:59.5Z", Some(-500_000_000)),
-            ("2023-02-29T00:00:00", None),
-            ("14.11.2023 22:13:20", None),
-            ("22:13:20", None),
-            ("1700000000", None),
-        ];
-        for (cell, expected) in table {
-            assert_eq!(date_time_ns(cell.as_bytes()), *expected, "{cell}");
-        }
+    fn status_words_are_decimal_or_hexadecimal() {
         assert_eq!(
             ["12", "0x1F", "0X0", "-1", "0x"].map(|cell| word(cell.as_bytes())),
             [Some(12), Some(31), Some(0), None, None]

@@ -19,6 +19,27 @@ pub(super) struct TimeCell {
     pub(super) cell: usize,
     /// Its unit.
     pub(super) unit: TimeUnit,
+    /// Cell of the date, where the other has the time of day alone.
+    pub(super) date: Option<usize>,
+}
+
+/// Where a sensor's reading comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Source {
+    /// A cell.
+    Cell(usize),
+    /// None: the log does not have this sensor.
+    Constant(f64),
+}
+
+impl Source {
+    /// The cell.
+    pub(super) fn cell(self) -> Option<usize> {
+        match self {
+            Self::Cell(cell) => Some(cell),
+            Self::Constant(_) => None,
+        }
+    }
 }
 
 /// Sensors of one kind.
@@ -26,8 +47,8 @@ pub(super) struct TimeCell {
 pub(super) struct TickCells {
     /// What the readings stand for.
     pub(super) output: OutputKind,
-    /// Cell and conversion of each sensor.
-    pub(super) sensors: Sensors<(usize, Conversion)>,
+    /// Source and conversion of each sensor.
+    pub(super) sensors: Sensors<(Source, Conversion)>,
     /// Sequence numbers.
     pub(super) sequence: Option<usize>,
     /// Durations.
@@ -122,11 +143,15 @@ impl Columns {
         for (kind, ticks) in [("gyro", gyro), ("accelerometer", self.accel.as_ref())] {
             let Some(ticks) = ticks else { continue };
             let numbered = ticks.sensors.iter().zip(1..);
-            sensors.extend(numbered.map(|((cell, _), number)| (*cell, format!("{kind} {number}"))));
+            sensors.extend(
+                numbered
+                    .filter_map(|((source, _), number)| Some((source.cell()?, format!("{kind} {number}")))),
+            );
             others.extend(ticks.sequence.map(|cell| (cell, format!("sequence number of the {kind}s"))));
             others.extend(ticks.duration.map(|time| (time.cell, format!("duration of the {kind}s"))));
         }
-        others.extend(self.stamps.map(|time| (time.cell, "time".to_owned())));
+        let stamps = self.stamps.iter().flat_map(|time| std::iter::once(time.cell).chain(time.date));
+        others.extend(stamps.map(|cell| (cell, "time".to_owned())));
         others.extend(self.status.as_ref().map(|(cell, _)| (*cell, "status".to_owned())));
         let channel =
             |of: &TemperatureCell| (of.cell, format!("temperature channel {:?}", of.channel.as_str()));
@@ -193,7 +218,9 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
 fn ticks<U: SensorUnit>(mapping: &TickMapping<U>, header: &[String]) -> Result<TickCells, Reason> {
     let mut sensors = Sensors::new();
     for sensor in &mapping.sensors {
-        sensors.push((find(&sensor.column, header)?, sensor.conversion()));
+        let constant = Source::Constant(sensor.constant.unwrap_or_default());
+        let cell = sensor.column.as_ref().map(|column| find(column, header)).transpose()?;
+        sensors.push((cell.map_or(constant, Source::Cell), sensor.conversion()));
     }
     Ok(TickCells {
         output: mapping.output,
@@ -206,7 +233,8 @@ fn ticks<U: SensorUnit>(mapping: &TickMapping<U>, header: &[String]) -> Result<T
 
 /// A column of times.
 fn time(mapping: &TimeColumn, header: &[String]) -> Result<TimeCell, Reason> {
-    Ok(TimeCell { cell: find(&mapping.column, header)?, unit: mapping.unit })
+    let date = mapping.date.as_ref().map(|date| find(date, header)).transpose()?;
+    Ok(TimeCell { cell: find(&mapping.column, header)?, unit: mapping.unit, date })
 }
 
 /// A column of two states.

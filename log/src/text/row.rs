@@ -4,10 +4,11 @@ use isotherm_correction::sample::{self, HalfPeriodCounts, LasingMode, OutputKind
 use isotherm_correction::units::Span;
 
 use super::cells::Cell;
+use super::dates::stamp_ns;
 use super::error::Reason;
 use super::number;
-use super::resolve::{GyroCells, StateCell, TickCells, TimeCell};
-use crate::mapping::{StatusMapping, TimeUnit};
+use super::resolve::{GyroCells, Source, StateCell, TickCells, TimeCell};
+use crate::mapping::StatusMapping;
 
 /// What is wrong with a row: the cell's index and the reason.
 #[derive(Debug)]
@@ -90,18 +91,15 @@ impl<'a> Row<'a> {
     /// A time (ns).
     pub(super) fn time_ns(&self, time: TimeCell) -> Result<i64, Fault> {
         let text = self.filled(time.cell)?;
-        let exponent = match time.unit {
-            TimeUnit::Nanoseconds => 0,
-            TimeUnit::Microseconds => 3,
-            TimeUnit::Milliseconds => 6,
-            TimeUnit::Seconds => 9,
-            TimeUnit::DateTime => {
-                let reason = Reason::NotADateTime;
-                return number::date_time_ns(text).ok_or(Fault { cell: Some(time.cell), reason });
+        let (ns, reason) = match (time.unit.exponent(), time.date) {
+            (Some(exponent), _) => (number::time_ns(text, exponent, self.decimal_mark), Reason::NotATime),
+            (None, None) => (stamp_ns(text, time.unit), Reason::NotADateTime { unit: time.unit }),
+            (None, Some(date)) => {
+                let whole = [self.filled(date)?, text].join(&b' ');
+                (stamp_ns(&whole, time.unit), Reason::NotADateTime { unit: time.unit })
             }
         };
-        let ns = number::time_ns(text, exponent, self.decimal_mark);
-        ns.ok_or(Fault { cell: Some(time.cell), reason: Reason::NotATime })
+        ns.ok_or(Fault { cell: Some(time.cell), reason })
     }
 
     /// A duration.
@@ -145,10 +143,11 @@ impl<'a> Row<'a> {
             return Ok(None);
         }
         let mut values = sample::Readings::default();
-        for (cell, conversion) in &cells.sensors {
-            values.push(match cells.output {
-                OutputKind::Counts => f64::from(self.count(*cell)?) * conversion.factor,
-                OutputKind::Mean => conversion.of(self.float(*cell)?),
+        for (source, conversion) in &cells.sensors {
+            values.push(match (cells.output, *source) {
+                (OutputKind::Counts, Source::Cell(cell)) => f64::from(self.count(cell)?) * conversion.factor,
+                (OutputKind::Mean, Source::Cell(cell)) => conversion.of(self.float(cell)?),
+                (_, Source::Constant(constant)) => conversion.of(constant),
             });
         }
         let sequence = cells.sequence.map(|cell| self.sequence(cell));
@@ -177,8 +176,8 @@ impl<'a> Row<'a> {
 
     /// Whether all sensors' cells hold nothing.
     fn all_empty(&self, cells: &TickCells) -> Result<bool, Fault> {
-        for (cell, _) in &cells.sensors {
-            if !self.is_empty(*cell)? {
+        for cell in cells.sensors.iter().filter_map(|(source, _)| source.cell()) {
+            if !self.is_empty(cell)? {
                 return Ok(false);
             }
         }

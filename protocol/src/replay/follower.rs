@@ -35,6 +35,8 @@ struct Anchor {
     at_ns: u64,
     /// How many frames had come.
     frames: u64,
+    /// How many corrected frames had been made.
+    made: u64,
 }
 
 /// A frame that may have to be given again.
@@ -50,6 +52,8 @@ struct Frame {
 pub struct Rebuilt {
     /// The stream.
     pub stream: UnitStream,
+    /// How many of the corrected frames that were made before hold: those behind them are [`Self::frames`] now.
+    pub before: u64,
     /// The corrected frames that it has made again, the oldest first.
     pub frames: Vec<Vec<u8>>,
     /// Whether frames and entries were those that the other service had, as far as is known.
@@ -65,8 +69,10 @@ pub struct Follower {
     /// The memory that is to be gone on from.
     memory: Option<(JournalEntry, u64)>,
     frames: VecDeque<Frame>,
-    /// How many frames came before the first of [`Self::frames`].
+    /// How many frames came before the first of [`Self::frames`], as far as they were followed.
     gone: u64,
+    /// What was heard before it.
+    before: [Heard; Input::ALL.len()],
     /// Behind the first anchor, by number; while there is no memory those of every instance.
     entries: Vec<(JournalEntry, u64)>,
     /// How many of [`Self::entries`], the last ones, the stream was not given.
@@ -74,11 +80,12 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// One that has no memory of the other service yet.
+    /// One that has no memory of the other service yet; its stream has heard `before`.
     #[must_use]
-    pub fn new(unit: UnitId) -> Self {
+    pub fn new(unit: UnitId, before: [Heard; Input::ALL.len()]) -> Self {
         Self {
             unit,
+            before,
             anchors: VecDeque::new(),
             memory: None,
             frames: VecDeque::new(),
@@ -115,13 +122,22 @@ impl Follower {
     /// Notes a frame that the stream is given.
     pub fn frame(&mut self, input: Input, now_ns: u64, bytes: &[u8]) {
         if self.frames.len() == MAX_WAITING {
-            self.frames.pop_front();
-            self.gone += 1;
+            self.give_up_oldest();
             if self.anchors.front().is_some_and(|anchor| anchor.frames < self.gone) {
                 self.lose();
             }
         }
         self.frames.push_back(Frame { input, at_ns: now_ns, bytes: bytes.into() });
+    }
+
+    /// Gives the oldest frame up; `false` where there is none.
+    fn give_up_oldest(&mut self) -> bool {
+        let Some(Frame { input, bytes, .. }) = self.frames.pop_front() else { return false };
+        if let Some(before) = self.before.get_mut(input.index()) {
+            before.note(&bytes);
+        }
+        self.gone += 1;
+        true
     }
 
     /// Takes the answer to a question for the memory, or an entry of the journal. Whether it is of use.
@@ -160,19 +176,20 @@ impl Follower {
     }
 
     /// Goes on as far as it can: from a memory that has come, or from an entry whose frames have come. `own` is the stream as it
-    /// is; what is given back takes its place. The second value says that the memory must be asked for anew.
-    pub fn advance(&mut self, own: &UnitStream, now_ns: u64) -> (Option<Rebuilt>, bool) {
+    /// is, and `made` how many corrected frames were taken from it and its forerunners; what is given back takes its place. The second
+    /// value says that the memory must be asked for anew.
+    pub fn advance(&mut self, own: &UnitStream, made: u64, now_ns: u64) -> (Option<Rebuilt>, bool) {
         if let Some((memory, at_ns)) = self.memory.clone() {
-            let anchor = Anchor { entry: memory, at_ns, frames: self.gone };
+            let anchor = Anchor { entry: memory, at_ns, frames: self.gone, made };
             // Where the last gyro frame that the other had heard did not come, some behind it may be missing too.
             if !self.has_last_gyro_frame(&anchor.entry) {
                 return (None, now_ns > at_ns.saturating_add(LONGEST_LAG_NS));
             }
             let rebuilt = self.rebuild(&anchor, false);
-            let Some(made) = &rebuilt else {
+            let Some(again) = &rebuilt else {
                 return (None, now_ns > at_ns.saturating_add(4 * super::NEAR_NS));
             };
-            if !made.exact {
+            if !again.exact {
                 // Entries behind the memory follow frames that did not come here.
                 self.lose();
                 return (None, true);
@@ -183,7 +200,7 @@ impl Follower {
             self.memory = None;
             self.waiting = 0;
             self.entries.clear();
-            self.remember(&made.stream, (&anchor.entry.instance, number), now_ns);
+            self.remember((&again.stream, made), (&anchor.entry.instance, number), now_ns);
             return (rebuilt, false);
         }
         if self.anchors.is_empty() {
@@ -195,7 +212,7 @@ impl Follower {
                     self.anchors.back().map(|anchor| (anchor.entry.instance.clone(), anchor.entry.number));
                 let (instance, before) = last.unwrap_or_default();
                 let number = self.entries.last().map_or(before, |(entry, _)| entry.number);
-                self.remember(own, (&instance, number), now_ns);
+                self.remember((own, made), (&instance, number), now_ns);
             }
             return (None, false);
         }
@@ -277,20 +294,18 @@ impl Follower {
     }
 
     /// Takes the stream's own memory, and gives up what is older than the one before it.
-    fn remember(&mut self, own: &UnitStream, (instance, number): (&str, u64), now_ns: u64) {
+    fn remember(&mut self, (own, made): (&UnitStream, u64), (instance, number): (&str, u64), now_ns: u64) {
         let event = JournalEvent::Memory { memory: own.memory(), document: None, pending: None };
         let (unit, instance, heard) = (self.unit.to_string(), instance.to_owned(), own.heard());
         let entry = JournalEntry { unit, instance, number, heard, event };
         let frames = self.gone + self.frames.len() as u64;
-        self.anchors.push_back(Anchor { entry, at_ns: now_ns, frames });
+        self.anchors.push_back(Anchor { entry, at_ns: now_ns, frames, made });
         while self.anchors.len() > 2 {
             self.anchors.pop_front();
         }
         let Some(oldest) = self.anchors.front() else { return };
         let (first, number) = (oldest.frames, oldest.entry.number);
-        while self.gone < first && self.frames.pop_front().is_some() {
-            self.gone += 1;
-        }
+        while self.gone < first && self.give_up_oldest() {}
         self.entries.retain(|(entry, _)| entry.number > number);
     }
 
@@ -301,7 +316,8 @@ impl Follower {
         let behind: Vec<_> =
             self.entries.iter().filter(|(entry, _)| is_behind(entry, &anchor.entry)).cloned().collect();
         let marks = behind.iter().map(|(entry, at_ns)| Mark::of(entry, *at_ns));
-        let mut sequencer = Sequencer::new(Outline::new(std::iter::once(mark).chain(marks).collect()));
+        let mut sequencer =
+            Sequencer::new(Outline::new(std::iter::once(mark).chain(marks).collect())).behind(self.before);
         let skipped = usize::try_from(anchor.frames.saturating_sub(self.gone)).unwrap_or(usize::MAX);
         let mut left = behind.len() + 1;
         sequencer.entry(anchor.entry.clone(), anchor.at_ns);
@@ -326,7 +342,7 @@ impl Follower {
         }
         let Made { stream, frames, exact } = made;
         let stream = stream.filter(|_| left == 0)?;
-        Some(Rebuilt { stream, frames, exact })
+        Some(Rebuilt { stream, before: anchor.made, frames, exact })
     }
 
     /// The instance that is followed, or whose memory is to be gone on from.

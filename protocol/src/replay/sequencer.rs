@@ -103,6 +103,8 @@ pub struct Sequencer {
     given: [VecDeque<u32>; Input::ALL.len()],
     /// Sequence number of the first corrected tick that came behind the entry that the next stream begins with.
     published: Option<u64>,
+    /// What came before the first frame; `None` where that is not known.
+    before: Option<[Heard; Input::ALL.len()]>,
     /// For the memory that the next stream begins with.
     search: Search,
     /// For the memory that the last stream began with.
@@ -142,6 +144,7 @@ impl Sequencer {
             to_go: [None; Input::ALL.len()],
             given: Default::default(),
             published: None,
+            before: None,
             search: Search::default(),
             copies: Copies::default(),
             out: VecDeque::new(),
@@ -149,6 +152,12 @@ impl Sequencer {
             over: false,
             unheard: 0,
         }
+    }
+
+    /// Is told what came before the first frame: a memory that has heard just that goes before every frame.
+    #[must_use]
+    pub fn behind(self, before: [Heard; Input::ALL.len()]) -> Self {
+        Self { before: Some(before), ..self }
     }
 
     /// Takes a frame, in recorded order.

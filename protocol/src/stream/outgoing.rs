@@ -141,6 +141,7 @@ impl Outgoing {
     /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
     /// last tick, and how many there are. `write_head` appends the head of a frame of so many ticks of a revision;
     /// `temperatures` says in which state they are.
+    #[inline(never)]
     pub(super) fn next_frame(
         &mut self,
         into: &mut Vec<u8>,

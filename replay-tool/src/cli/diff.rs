@@ -11,7 +11,7 @@ use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
-use isotherm_log::replica::scan;
+use isotherm_log::replica::{check_units, scan};
 use isotherm_log::source::is_recording;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
@@ -78,6 +78,9 @@ struct Report<'r> {
 /// Runs the command.
 pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
     let units = args.unit.iter().map(|serial| unit_id(serial)).collect::<Result<BTreeSet<_>, _>>()?;
+    for recording in [&args.a, &args.b].into_iter().filter(|path| is_recording(path)) {
+        check_units(std::slice::from_ref(recording), &units)?;
+    }
     let unnamed = unnamed(args, &units)?;
     let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
     let mut b = CorrectedLog::open(&args.b, &units, &unnamed)?;

@@ -50,7 +50,7 @@ pub(super) struct ImportArgs {
     /// Unit of the accelerometers (default: from the header, else from gravity)
     #[arg(long, value_name = "UNIT", value_parser = PossibleValuesParser::new(ACCEL_UNITS))]
     accel_unit: Option<String>,
-    /// Unit of the time column (default: from the header, else from its steps)
+    /// Unit of the time column, or the order of its dates (default: from the header, its cells and steps)
     #[arg(long, value_name = "UNIT", value_parser = PossibleValuesParser::new(TIME_UNITS))]
     time_unit: Option<String>,
     /// Ticks per second, for a log without usable time (Hz)

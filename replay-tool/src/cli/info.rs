@@ -41,12 +41,11 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, Error> {
 
 /// Reads the log to its end.
 pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
-    let recording = log.is_recording()?;
-    let unnamed = UnitId::new(UNNAMED).ok();
-    let mut messages = log.messages(BATCH, unnamed.as_ref())?;
+    let opened = log.files(BATCH, UnitId::new(UNNAMED).ok().as_ref())?;
+    let mut messages = opened.open(&log.part()?)?;
     let files = log.log_files()?;
     let files: Vec<_> = files.iter().map(|path| FileInfo::of(path)).collect::<Result<_, _>>()?;
-    let mut survey = Survey::new(recording);
+    let mut survey = Survey::new(&opened);
     let mut bar = Bar::over_log(messages.progress().watch());
     loop {
         let message = messages.next_message()?;

@@ -8,6 +8,7 @@ use isotherm_correction::units::Span;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Messages, Part, are_recordings};
+use isotherm_log::replica::check_units;
 use isotherm_log::text::{LogReader, Window};
 use isotherm_protocol::key::UnitId;
 
@@ -86,10 +87,11 @@ impl LogArgs {
     /// # Errors
     /// As [`LogArgs::is_recording`] and [`Mapping::load`]; where a text log has no unit or several.
     pub(crate) fn files(&self, batch_ticks: usize, unit: Option<&UnitId>) -> Result<LogFiles, Error> {
+        let given = self.units()?;
         if self.is_recording()? {
+            check_units(&self.log, &given)?;
             return Ok(LogFiles::Recordings(self.log.clone()));
         }
-        let given = self.units()?;
         let mut units = given.iter().chain(unit.filter(|_| given.is_empty()));
         let unit = match (units.next(), units.next()) {
             (Some(unit), None) => unit.clone(),

@@ -12,6 +12,7 @@ use isotherm_bus::outlet::least_in_flight;
 use isotherm_cli::Exit;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
+use isotherm_log::error::few;
 use isotherm_log::faults::FaultOptions;
 use isotherm_log::message::Topic;
 use isotherm_log::schedule::Clock;
@@ -236,8 +237,7 @@ fn check_names(options: &PlayOptions) -> Result<(), Error> {
         }
     }
     let Some(missing) = missing.first() else { return Ok(()) };
-    let units: Vec<_> = units.iter().map(String::as_str).collect();
-    let has = if units.is_empty() { "none".to_owned() } else { tables::list(&units) };
+    let has = few(&units.into_iter().collect::<Vec<_>>());
     Err(Error::Usage(format!("--remap names {missing}, but there is no such unit to play; units: {has}")))
 }
 
@@ -262,5 +262,8 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     let report = Report { play: &play, log: &log };
     print(if args.json { show::json(&report) } else { tables::human(&report, &options) }.as_bytes())?;
     ended?;
+    if play.units.is_empty() {
+        return Err(Error::NothingPlayed);
+    }
     Ok(Exit::of_loss(play.lost_data() || log.lost_data()))
 }

@@ -71,6 +71,7 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
             Replica::without_journal(loaded.unit.clone(), settings, Some(loaded)),
         ));
     }
+    let files = args.log.files(1, None)?;
     let mut outlines = scan(&args.log.log)?;
     outlines.damaged.iter().for_each(|words| show::warn(words));
     let wanted = args.log.units()?;
@@ -84,13 +85,13 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
     let [unit] = units.as_slice() else {
         let names: Vec<_> = units.iter().map(UnitId::as_str).collect();
         return Err(Error::Usage(match names.len() {
-            0 => "the log has no raw messages, or none of that unit".to_owned(),
+            0 => "the log has no raw messages to step through".to_owned(),
             _ => format!("the log has {}: choose one with --unit", names.join(", ")),
         }));
     };
     let journal = outlines.units.remove(unit).unwrap_or_default().journal;
     let part = Part { units: [unit.clone()].into(), ..args.log.part()? };
-    let messages = args.log.files(1, None)?.open(&part)?;
+    let messages = files.open(&part)?;
     let replica = match loaded {
         Some(loaded) if loaded.unit != *unit => {
             return Err(Error::Usage(format!(

@@ -273,3 +273,39 @@ fn limits_of_options_are_said_before_anything_is_opened() {
         "",
     );
 }
+
+#[test]
+fn a_unit_that_a_recording_does_not_have_is_said_with_those_that_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    for (unit, preset) in [("ZLG-0001", "zeeman-sine"), ("MEMS-0001", "mems-chamber")] {
+        let name = format!("{unit}.csv");
+        check(
+            &replay(folder.path(), &["simulate", "--preset", preset, "--duration", "2", "--out", &name]),
+            0,
+            "",
+        );
+        let out = format!("{unit}.mcap");
+        check(&replay(folder.path(), &["convert", &name, "--unit", unit, "--out", &out]), 0, "");
+    }
+    let words = "ZLG-0001.mcap, MEMS-0001.mcap has no unit NIX; it has MEMS-0001, ZLG-0001\n";
+    for (command, more) in [
+        ("play", &["--speed", "max"][..]),
+        ("correct", &[]),
+        ("info", &[]),
+        ("list", &[]),
+        ("cat", &[]),
+        ("step", &[]),
+        ("plot", &["--out", "x.html"]),
+        ("convert", &["--out", "x.csv"]),
+    ] {
+        let given = ["--unit", "ZLG-0001", "--unit", "NIX"];
+        let args = [&[command, "ZLG-0001.mcap", "MEMS-0001.mcap"], more, &given].concat();
+        let output = replay(folder.path(), &args);
+        check(&output, 1, words);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!((errors.lines().count(), stdout(&output)), (1, String::new()), "{command}: {errors}");
+    }
+    let output = replay(folder.path(), &["diff", "ZLG-0001.mcap", "MEMS-0001.mcap", "--unit", "ZLG-0001"]);
+    check(&output, 1, "MEMS-0001.mcap has no unit ZLG-0001; it has MEMS-0001");
+    assert!(!folder.path().join("x.html").exists() && !folder.path().join("x.csv").exists());
+}

@@ -27,16 +27,16 @@ use super::common::{check, replay, stdout};
 use super::real_logs::data;
 
 /// Rows of a log at 100 Hz at rest.
-const ROWS: usize = 500;
+pub(crate) const ROWS: usize = 500;
 
 /// A number that differs from row to row, reproducibly.
-fn noise(row: usize, column: usize) -> f64 {
+pub(crate) fn noise(row: usize, column: usize) -> f64 {
     let mixed = (row * 7919 + column * 104_729) % 1000;
     f64::from(u32::try_from(mixed).unwrap()) * 1e-3 - 0.5
 }
 
 /// A log: lines in front, then one line per row.
-fn log(front: &str, row: impl Fn(usize) -> String) -> String {
+pub(crate) fn log(front: &str, row: impl Fn(usize) -> String) -> String {
     let mut text = front.to_owned();
     for index in 0..ROWS {
         let _ = writeln!(text, "{}", row(index));
@@ -45,16 +45,21 @@ fn log(front: &str, row: impl Fn(usize) -> String) -> String {
 }
 
 /// What `import` must find.
-struct Expected<'a> {
+pub(crate) struct Expected<'a> {
     /// Parts that the mapping must have.
-    parts: &'a [&'a str],
-    period_ns: i64,
-    gaps: u64,
-    temperatures: usize,
+    pub(crate) parts: &'a [&'a str],
+    pub(crate) period_ns: i64,
+    pub(crate) gaps: u64,
+    pub(crate) temperatures: usize,
 }
 
 /// Imports a log without a word, and checks what came of it.
-fn import(name: &str, bytes: &[u8], options: &[&str], expected: &Expected<'_>) -> (String, Mapping) {
+pub(crate) fn import(
+    name: &str,
+    bytes: &[u8],
+    options: &[&str],
+    expected: &Expected<'_>,
+) -> (String, Mapping) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(name), bytes).unwrap();
     let output = replay(folder.path(), &[&["import", name, "--json"], options].concat());
@@ -77,7 +82,7 @@ fn import(name: &str, bytes: &[u8], options: &[&str], expected: &Expected<'_>) -
     (text, mapping)
 }
 
-const TEN_MS: i64 = 10_000_000;
+pub(crate) const TEN_MS: i64 = 10_000_000;
 
 #[test]
 fn xsens_a_rate_in_the_comments_and_a_counter_that_begins_anew() {
@@ -488,7 +493,7 @@ fn what_no_log_says_is_asked_for_with_its_option() {
     check(&replay(folder.path(), &columns), 2, "bare.mapping.toml exists: give another name, or --overwrite");
     let mapping = Mapping::load(&folder.path().join("bare.mapping.toml")).unwrap();
     let sensors = &mapping.files[0].accel.as_ref().unwrap().sensors;
-    assert_eq!(sensors[2].column, Column::Index(6));
+    assert_eq!(sensors[2].column, Some(Column::Index(6)));
 }
 
 #[test]

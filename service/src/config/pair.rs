@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::units::{As, Ms};
+use super::units::{As, Ms, OneEndpoint};
 
 /// What an operator can set of a pair.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -20,7 +20,7 @@ pub struct PairSettings {
     pub mode: Mode,
     /// Of two that speak the one with the lower priority yields.
     pub priority: u8,
-    /// How late the other's output may be.
+    /// How long the other may be silent; a tick is waited for at least three quarters of it.
     #[serde(rename = "takeover_ms", with = "As::<Ms>")]
     #[schemars(with = "u32", range(min = 5, max = 10_000))]
     pub takeover: Duration,
@@ -29,6 +29,11 @@ pub struct PairSettings {
     #[serde(rename = "lease_ms", with = "As::<Ms>")]
     #[schemars(with = "Option<u32>", range(min = 100, max = 60_000))]
     pub lease: Option<Duration>,
+    /// Address of the other instance, where it connects to this one: it is asked at the start whether it is there, and then waited for.
+    /// `None`: this one connects to the other, or both to a router.
+    #[serde(with = "As::<OneEndpoint>")]
+    #[schemars(with = "Option<String>")]
+    pub other: Option<String>,
 }
 
 impl Default for PairSettings {
@@ -39,6 +44,7 @@ impl Default for PairSettings {
             priority: 0,
             takeover: Duration::from_millis(20),
             lease: None,
+            other: None,
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use isotherm_bus::endpoint;
 use isotherm_document::{Form, Reader, element};
 use isotherm_protocol::pair::is_name;
 
@@ -85,6 +86,20 @@ fn names(r: &mut Reader<'_>, settings: &mut Settings) {
     if let Some(name) = settings.pair.name.as_ref().filter(|name| !is_name(name)) {
         let must_be = "1 to 32 letters A-Z a-z, digits, '.', '_' and '-'";
         r.report("pair.name", format!("is {name:?}, must be {must_be}"));
+    }
+    if let Some(other) = &settings.pair.other {
+        match endpoint(other) {
+            Ok(other)
+                if settings.zenoh.session.connect.iter().any(|it| endpoint(it).as_ref() == Ok(&other)) =>
+            {
+                r.report(
+                    "pair.other",
+                    format!("is {other:?}, as in zenoh.connect: only one of the two connects"),
+                );
+            }
+            Ok(other) => settings.pair.other = Some(other),
+            Err(reason) => r.report("pair.other", format!("is {other:?}, {reason}")),
+        }
     }
     for host in &settings.web.hosts {
         let fits = |c: char| c.is_ascii_alphanumeric() || "-._[]:".contains(c);

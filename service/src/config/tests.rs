@@ -65,6 +65,7 @@ mode = "active"
 priority = 7
 takeover_ms = 35
 lease_ms = 400
+other = "10.0.0.2:7447"
 [zenoh]
 config = "z.json5"
 connect = ["tcp/127.0.0.1:1"]
@@ -129,6 +130,7 @@ fn every_key_arrives_where_it_belongs() {
             priority: 7,
             takeover: Duration::from_millis(35),
             lease: Some(Duration::from_millis(400)),
+            other: Some("tcp/10.0.0.2:7447".to_owned()),
         },
         metrics: MetricsSettings { listen: Some("0.0.0.0:9464".parse().unwrap()), allow_remote: true },
         zenoh: ZenohSettings {
@@ -161,6 +163,14 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         ),
         ("max_units = 1.5", "1:13: max_units: is 1.5, must be a whole number from 1 to 16384"),
         ("max_units = -1", "1:13: max_units: is -1, must be a whole number from 1 to 16384"),
+        (
+            "[pair]\nother = \"a:70000\"",
+            "2:9: pair.other: is \"a:70000\", has the port \"70000\", must be 0 to 65535",
+        ),
+        (
+            "[pair]\nother = \"a:7\"\n[zenoh]\nconnect = [\"tcp/a:7\"]",
+            "2:9: pair.other: is \"tcp/a:7\", as in zenoh.connect: only one of the two connects",
+        ),
         ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),
         (
             "temperature_delay_ms = \"5\"",

@@ -60,6 +60,8 @@ pub(super) struct PathText;
 pub(super) struct AddressText;
 /// Endpoints of Zenoh, without what may be secret when they are written.
 pub(super) struct Endpoints;
+/// One of them, or none.
+pub(super) struct OneEndpoint;
 
 /// One form: type of the setting, what is written, and the way there and back.
 macro_rules! form {
@@ -96,6 +98,8 @@ form!(AddressText, Option<SocketAddr> => Option<String>, |set| set.map(|address|
     |text| text?.parse().ok());
 form!(Endpoints, Vec<String> => Vec<String>, |set| set.iter().map(|endpoint| address(endpoint).to_owned()).collect(),
     |endpoints| endpoints);
+form!(OneEndpoint, Option<String> => Option<String>, |set| set.as_deref().map(|endpoint| address(endpoint).to_owned()),
+    |endpoint| endpoint);
 
 /// State that a unit starts in.
 #[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]

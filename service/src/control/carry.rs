@@ -14,14 +14,11 @@ use isotherm_protocol::overlay::{Overlay, is_overlay};
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 
-use super::command::{PreLaunchRun, order_of, words};
+use super::command::{PRE_LAUNCH_ENDED, PreLaunchRun, order_of, words};
 use super::manager::Worker;
 use super::request::reply;
 use super::revision::Record;
 use crate::control::store::StoreError;
-
-/// Entries of a unit that are looked through for those that are there already.
-const LOOKED_THROUGH: usize = 10_000;
 
 /// What another instance has written down of a unit.
 #[derive(Debug, Clone)]
@@ -56,11 +53,12 @@ impl Worker {
         held(self.store.document(digest)) || held(self.store.overlay(digest))
     }
 
-    /// Writes down what is not here yet, and has the unit's plan be what it says; nothing of a unit that this instance speaks for.
-    pub(super) fn carry(&mut self, carried: &Carried) {
+    /// Writes down what is not here yet, and has the unit's plan be what it says; nothing of a unit that this instance speaks for. Whether it is
+    /// all written down.
+    pub(super) fn carry(&mut self, carried: &Carried) -> bool {
         let Carried { unit, entries, kept } = carried;
         if self.intake.speaks_for(unit) {
-            return;
+            return false;
         }
         let done = kept.values().try_for_each(|bytes| {
             let put = if overlay(bytes).is_some() {
@@ -72,19 +70,20 @@ impl Worker {
         });
         let done = done.and_then(|()| self.carry_entries(unit, entries));
         match done {
-            Ok(0) => return,
+            Ok(0) => return true,
             Ok(count) => {
                 tracing::debug!(%unit, count, "entries of the other instance's audit file are copied");
             }
             Err(error) => {
                 tracing::error!(%unit, "the other instance's history is not copied: {error}");
-                return;
+                return false;
             }
         }
-        let before = self.records.get(unit).map(|record| (record.accepted, record.refused));
-        let (accepted, refused) = before.unwrap_or_default();
-        let pre_launch = running(entries);
+        let before = self.records.get(unit);
+        let (accepted, refused) = before.map(|record| (record.accepted, record.refused)).unwrap_or_default();
+        let pre_launch = running(before.and_then(|record| record.pre_launch.clone()), entries);
         self.plan_again(unit, Record { accepted, refused, pre_launch, ..self.restored(unit) });
+        true
     }
 
     /// Has a unit begin anew with what is written down of it.
@@ -95,11 +94,12 @@ impl Worker {
     }
 
     fn carry_entries(&mut self, unit: &UnitId, entries: &[AuditEntry]) -> Result<usize, StoreError> {
-        let own = self.store.history(Some(unit), LOOKED_THROUGH)?;
-        let is_here = |entry: &AuditEntry| {
-            own.iter().any(|own| own.time == entry.time && own.by == entry.by && own.event == entry.event)
-        };
-        let mut fresh: Vec<&AuditEntry> = entries.iter().filter(|entry| !is_here(entry)).collect();
+        let mut fresh = Vec::new();
+        for entry in entries {
+            if !self.store.has_written(unit, entry)? {
+                fresh.push(entry);
+            }
+        }
         // What holds there holds here, whatever was accepted here before.
         let last = entries.iter().rfind(|entry| matches!(entry.event, AuditEvent::Accepted(_)));
         if let Some((entry, AuditEvent::Accepted(accepted))) = last.map(|entry| (entry, &entry.event)) {
@@ -181,22 +181,17 @@ impl Worker {
 
     /// A command that led to a state, unless it is the last that is written down.
     fn note_commanded(&mut self, unit: &UnitId, command: &Command, state: &str, instance: &str) {
-        let entries = self.store.history(Some(unit), LOOKED_THROUGH).unwrap_or_default();
-        let last = entries.into_iter().rev().find_map(|entry| match entry.event {
-            AuditEvent::Command(record) if record.accepted => Some(record),
-            _ => None,
-        });
-        let same =
-            |last: &CommandRecord| last.state_after == state && last.command.starts_with(command.name());
-        if last.as_ref().is_some_and(same) {
+        let last = self.store.last_command(unit);
+        if last.is_some_and(|last| last.state_after == state && last.command.starts_with(command.name())) {
             return;
         }
+        let state_before = last.map_or_else(String::new, |last| last.state_after.clone());
         let order = order_of(command);
         let record = CommandRecord {
             command: order.as_ref().map_or_else(|| command.name().to_owned(), words),
             accepted: true,
             reason: Some(format!("from the journal of instance {instance}")),
-            state_before: last.map_or_else(String::new, |last| last.state_after),
+            state_before,
             state_after: state.to_owned(),
             last_sequence: None,
             order,
@@ -215,15 +210,15 @@ impl Worker {
 }
 
 /// A pre-launch calibration that goes on: its result is to be stored as it was asked for, whoever stores it.
-fn running(entries: &[AuditEntry]) -> Option<PreLaunchRun> {
+fn running(before: Option<PreLaunchRun>, entries: &[AuditEntry]) -> Option<PreLaunchRun> {
     let commands = entries.iter().filter_map(|entry| match &entry.event {
         AuditEvent::Command(record) if record.accepted || record.order.is_none() => Some((entry, record)),
         _ => None,
     });
-    commands.fold(None, |run, (entry, record)| match &record.order {
+    commands.fold(before, |run, (entry, record)| match &record.order {
         Some(Order::PreLaunch(order)) => Some(PreLaunchRun { order: *order, by: entry.by.clone() }),
         Some(Order::Abort) => None,
-        None if record.command == "pre-launch ended" => None,
+        None if record.command == PRE_LAUNCH_ENDED => None,
         _ => run,
     })
 }

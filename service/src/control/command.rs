@@ -227,6 +227,9 @@ pub(super) fn order_of(command: &Command) -> Option<Order> {
     }
 }
 
+/// What stands in the place of a command where a pre-launch calibration has ended by itself.
+pub(super) const PRE_LAUNCH_ENDED: &str = "pre-launch ended";
+
 /// A command in words, for audit file and log.
 pub(super) fn words(order: &Order) -> String {
     let at = |place: &PlaceOrder| {

@@ -217,7 +217,11 @@ impl Worker {
             Message::JudgeAgain => self.judge_bad_again(),
             Message::Notice(unit, notice) => self.take_notice(&unit, notice),
             Message::Lacks(carried, answer) => drop(answer.send(self.lacking(&carried))),
-            Message::Carry(carried) => self.carry(&carried),
+            Message::Carry(carried, done) => {
+                if self.carry(&carried) {
+                    let _ = done.send(());
+                }
+            }
         }
     }
 

@@ -13,7 +13,7 @@ use isotherm_protocol::history::{AuditEvent, CommandRecord, Source, WallTime};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::{GyroOverlay, OVERLAY_SCHEMA, Overlay, PreLaunchRecord};
 
-use super::command::PreLaunchRun;
+use super::command::{PRE_LAUNCH_ENDED, PreLaunchRun};
 use super::document::Document;
 use super::manager::Worker;
 use super::queue::PreLaunchEnd;
@@ -64,7 +64,7 @@ impl Worker {
     fn write_end(&mut self, unit: &UnitId, by: &str, accepted: bool, reason: String) {
         let state_after = self.intake.present(unit).map_or(State::Standby, |present| present.state);
         let record = CommandRecord {
-            command: "pre-launch ended".to_owned(),
+            command: PRE_LAUNCH_ENDED.to_owned(),
             accepted,
             reason: Some(reason),
             state_before: State::PreLaunchCalibration.to_string(),

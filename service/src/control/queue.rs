@@ -42,7 +42,7 @@ pub(super) enum Message {
     /// What another instance has written down; what of it is lacking here.
     Lacks(Carried, oneshot::Sender<Vec<Digest>>),
     /// What another instance has written down.
-    Carry(Carried),
+    Carry(Carried, oneshot::Sender<()>),
 }
 
 /// What a query asks for.
@@ -86,7 +86,7 @@ pub(crate) enum Notice {
     InForce(InForce),
     /// A pre-launch calibration has ended.
     PreLaunch(PreLaunchEnd),
-    /// Another instance, whose place this one has taken, gave the unit a calibration: its journal's entry.
+    /// Another instance, whose place this one has taken, gave the unit a calibration or a command: its journal's entry.
     Followed(Box<JournalEntry>),
     /// This instance speaks for the unit from here on.
     Speaks,
@@ -136,9 +136,10 @@ impl Inbox {
         let _ = self.0.tell(Message::Lacks(carried, answer));
     }
 
-    /// Hands over what another instance has written down; where there is no room, it comes again with the next.
-    pub(crate) fn carry(&self, carried: Carried) {
-        let _ = self.0.tell(Message::Carry(carried));
+    /// Hands over what another instance has written down; it is answered when it is written down here, and not at all where there is
+    /// no room.
+    pub(crate) fn carry(&self, carried: Carried, done: oneshot::Sender<()>) {
+        let _ = self.0.tell(Message::Carry(carried, done));
     }
 
     /// Hands an event of the folder over; waits for its turn, on the watcher's own thread.

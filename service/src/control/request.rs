@@ -170,13 +170,13 @@ impl Worker {
 
     /// A query on `imu/*/history`.
     fn answer_history(&self, query: &Query) -> Result<(), String> {
-        let limit = limit(query.parameters().as_str())?;
+        let (limit, after) = part_of_history(query.parameters().as_str())?;
         let one = one_unit(query.key_expr().as_str(), Asked::History).ok();
         let units = one.map_or_else(|| self.records.keys().cloned().collect(), |unit| vec![unit]);
         for unit in units {
             let key = key::history(&unit);
             if is_asked(query, &key) && self.intake.speaks_for(&unit) {
-                let read = self.store.history(Some(&unit), limit);
+                let read = self.store.history_after(after, Some(&unit), limit);
                 let told = read.map_err(|error| format!("the history cannot be read: {error}"));
                 if let Err(words) = told.and_then(|entries| reply_json(query, &key, &entries)) {
                     refuse(query, &words);
@@ -218,13 +218,20 @@ fn refuse(query: &Query, words: &str) {
     }
 }
 
-/// Reads `limit=20`.
-fn limit(parameters: &str) -> Result<usize, String> {
-    let mut limit = HISTORY_ENTRIES;
+/// Reads `limit=20;after=1000`: how many entries, and above which number.
+fn part_of_history(parameters: &str) -> Result<(usize, u64), String> {
+    let (mut limit, mut after) = (HISTORY_ENTRIES, 0);
     for parameter in parameters.split(';').filter(|parameter| !parameter.is_empty()) {
-        let value = parameter.strip_prefix("limit=").and_then(|value| value.parse().ok()).filter(|n| *n > 0);
-        limit = value
-            .ok_or_else(|| format!("parameter {parameter:?} must be limit=N, N a whole number from 1"))?;
+        let value = |name| parameter.strip_prefix(name).and_then(|value| value.parse::<u64>().ok());
+        if let Some(number) = value("after=") {
+            after = number;
+        } else if let Some(number) = value("limit=").filter(|number| *number > 0) {
+            limit = usize::try_from(number).unwrap_or(usize::MAX);
+        } else {
+            return Err(format!(
+                "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an entry"
+            ));
+        }
     }
-    Ok(limit)
+    Ok((limit, after))
 }

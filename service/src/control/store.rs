@@ -29,7 +29,7 @@ pub use error::StoreError;
 pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn};
 pub use verify::{Break, Verification, verify};
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -42,6 +42,7 @@ use blobs::BlobStore;
 use folder::{Lock, Mark};
 use index::Index;
 use log::Log;
+use read::likeness;
 
 use crate::control::compressed::CompressedBytes;
 
@@ -57,6 +58,8 @@ pub struct Store {
     documents: BlobStore,
     overlays: BlobStore,
     index: Index,
+    /// Of units whose history other instances send: what is written down, by what it has in common with theirs.
+    written: BTreeMap<UnitId, BTreeSet<Digest>>,
     /// Length at which a new audit file is begun (bytes).
     full_bytes: u64,
     /// No new file could be begun; told once.
@@ -126,8 +129,9 @@ impl Store {
         let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
         let full_bytes = FULL_BYTES;
         let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
-        let (stuck, prune_due) = (false, true);
-        let store = Self { journal, documents, overlays, index, full_bytes, stuck, prune_due, is_damaged };
+        let (stuck, prune_due, written) = (false, true, BTreeMap::new());
+        let store =
+            Self { journal, documents, overlays, index, written, full_bytes, stuck, prune_due, is_damaged };
         Ok((store, opened))
     }
 
@@ -139,6 +143,7 @@ impl Store {
             documents: BlobStore::in_memory(),
             overlays: BlobStore::in_memory(),
             index: Index::default(),
+            written: BTreeMap::new(),
             full_bytes: FULL_BYTES,
             stuck: false,
             prune_due: false,
@@ -239,6 +244,10 @@ impl Store {
         }
         for entry in &entries {
             self.index.apply(entry);
+            let unit = entry.unit.as_deref().and_then(|unit| UnitId::new(unit).ok());
+            if let Some(written) = unit.and_then(|unit| self.written.get_mut(&unit)) {
+                written.insert(likeness(entry));
+            }
         }
         if let Journal::Folder { path, .. } = &self.journal {
             Mark::note_entry(path, self.index.next_number.saturating_sub(1));

@@ -10,7 +10,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::journal::{Joiner, JournalPart};
 use isotherm_protocol::key::{self, UnitId};
-use isotherm_protocol::pair::{PairReport, Role};
+use isotherm_protocol::pair::{Member, PairReport, Role};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
@@ -28,7 +28,7 @@ const NEXT_MEMORY: Duration = Duration::from_millis(500);
 /// How long after an entry of the journal histories are asked for: by then what follows from it is in the audit file, as a rule; and
 /// once more, for the first tick of a calibration.
 const DELAYS: [Duration; 2] = [Duration::from_millis(200), Duration::from_millis(1500)];
-/// Entries of a history that are asked for.
+/// Most entries of a history that are asked for.
 const ENTRIES: u32 = 1000;
 
 /// Where questions are handed in.
@@ -91,8 +91,9 @@ impl Asker {
     }
 
     async fn ask_records(self, mut questions: UnboundedReceiver<Option<UnitId>>) {
+        let mut copied = Copied::default();
         if self.pair.is_opening() {
-            self.records(None).await;
+            self.records(None, &mut copied).await;
             let spoken = self.spoken().await;
             self.pair.opened(&self.intake, &spoken);
         }
@@ -119,7 +120,7 @@ impl Asker {
                         if let Some(at) = due.get_mut(&unit) {
                             at.retain(|at| *at > now);
                         }
-                        self.records(unit).await;
+                        self.records(unit, &mut copied).await;
                     }
                     due.retain(|_, at| !at.is_empty());
                 }
@@ -189,33 +190,72 @@ impl Asker {
         }
     }
 
-    /// Has histories and documents written down here too.
-    async fn records(&self, unit: Option<UnitId>) {
+    /// Has histories and documents written down here too: what came since it was done last.
+    async fn records(&self, unit: Option<UnitId>, copied: &mut Copied) {
+        copied.of(self.pair.others());
         let selector = unit.as_ref().map_or(key::ALL_HISTORY.to_owned(), key::history);
-        let samples = self.ask(&format!("{selector}?limit={ENTRIES}")).await;
+        let after = copied.after(unit.as_ref());
+        let samples = self.ask(&format!("{selector}?limit={ENTRIES};after={after}")).await;
+        let mut all = Some(after);
         for sample in samples {
             let serial = key::parse_history(sample.key_expr().as_str());
             let Some(unit) = serial.and_then(|serial| UnitId::new(serial).ok()) else { continue };
             let Ok(entries) = serde_json::from_slice::<Vec<AuditEntry>>(&sample.payload().to_bytes()) else {
                 continue;
             };
-            if self.intake.speaks_for(&unit) {
-                continue;
+            let Some(last) = entries.last().map(|entry| entry.number) else { continue };
+            let done = !self.intake.speaks_for(&unit) && self.copy(unit.clone(), entries).await;
+            all = all.filter(|_| done).map(|all| all.max(last));
+            if done {
+                copied.units.insert(unit, last);
             }
-            let mut carried = Carried { unit, entries, kept: BTreeMap::new() };
-            // A document may lie under an overlay: that is known when the overlay is there.
-            for _ in 0..2 {
-                let (answer, lacking) = oneshot::channel();
-                self.inbox.lacks(carried.clone(), answer);
-                for digest in lacking.await.unwrap_or_default() {
-                    let found = self.ask(&key::kept("*", &digest)).await;
-                    let bytes = found.iter().map(|sample| sample.payload().to_bytes().into_owned());
-                    if let Some(bytes) = bytes.into_iter().find(|bytes| Digest::of(bytes) == digest) {
-                        carried.kept.insert(digest, bytes);
-                    }
+        }
+        if unit.is_none() {
+            copied.all = all.unwrap_or(copied.all);
+        }
+    }
+
+    /// Has entries of a unit written down here, with the documents that they name; whether they are.
+    async fn copy(&self, unit: UnitId, entries: Vec<AuditEntry>) -> bool {
+        let mut carried = Carried { unit, entries, kept: BTreeMap::new() };
+        // A document may lie under an overlay: that is known when the overlay is there.
+        for _ in 0..2 {
+            let (answer, lacking) = oneshot::channel();
+            self.inbox.lacks(carried.clone(), answer);
+            for digest in lacking.await.unwrap_or_default() {
+                let found = self.ask(&key::kept("*", &digest)).await;
+                let bytes = found.iter().map(|sample| sample.payload().to_bytes().into_owned());
+                if let Some(bytes) = bytes.into_iter().find(|bytes| Digest::of(bytes) == digest) {
+                    carried.kept.insert(digest, bytes);
                 }
             }
-            self.inbox.carry(carried);
         }
+        let (answer, done) = oneshot::channel();
+        self.inbox.carry(carried, answer);
+        done.await.is_ok()
+    }
+}
+
+/// How far the audit file of another instance has been written down here: the number of an entry.
+#[derive(Debug, Default)]
+struct Copied {
+    /// The instance; `None` where there are several, whose numbers differ.
+    instance: Option<String>,
+    /// Of all units.
+    all: u64,
+    units: BTreeMap<UnitId, u64>,
+}
+
+impl Copied {
+    /// Begins anew where the other instance is another one.
+    fn of(&mut self, others: Vec<Member>) {
+        let instance = <[Member; 1]>::try_from(others).ok().map(|[other]| other.instance);
+        if instance.is_none() || self.instance != instance {
+            *self = Self { instance, ..Self::default() };
+        }
+    }
+
+    fn after(&self, unit: Option<&UnitId>) -> u64 {
+        self.all.max(unit.and_then(|unit| self.units.get(unit).copied()).unwrap_or(0))
     }
 }

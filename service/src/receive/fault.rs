@@ -62,6 +62,29 @@ kinds! {
     Alarm = "alarms",
 }
 
+impl FaultKind {
+    /// Whether a message was refused.
+    #[must_use]
+    pub fn is_refusal(self) -> bool {
+        use FaultKind as K;
+
+        !matches!(self, K::Unpublished | K::Alarm | K::OtherBits | K::TwoSpeak | K::TwoProducers)
+    }
+
+    /// Those that units count; the others belong to the service.
+    pub fn of_units() -> impl Iterator<Item = Self> {
+        use FaultKind as K;
+
+        let of_service = |kind: &Self| {
+            matches!(
+                kind,
+                K::UnknownStream | K::BadSerial | K::Deletion | K::TooManyUnits | K::OtherBits | K::TwoSpeak
+            )
+        };
+        Self::ALL.iter().copied().filter(move |kind| !of_service(kind))
+    }
+}
+
 impl From<&CodecError> for FaultKind {
     fn from(error: &CodecError) -> Self {
         match error {
@@ -171,10 +194,7 @@ impl FaultLog {
     /// Messages that were refused, of whatever kind.
     #[must_use]
     pub fn refused(&self) -> u64 {
-        use FaultKind as K;
-
-        let own = [K::Unpublished, K::Alarm, K::OtherBits, K::TwoSpeak, K::TwoProducers];
-        FaultKind::ALL.iter().filter(|kind| !own.contains(kind)).map(|kind| self.count(*kind)).sum()
+        FaultKind::ALL.iter().filter(|kind| kind.is_refusal()).map(|kind| self.count(*kind)).sum()
     }
 
     /// The last fault of a kind not seen before, in words.

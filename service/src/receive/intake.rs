@@ -1,18 +1,17 @@
 //! What the receive threads do with a raw message: find its unit, have it corrected, survive whatever it is.
 
+mod appear;
 mod paired;
 mod units;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::control::Schedule;
-use isotherm_protocol::key::{self, Input, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::status::{Fault, Output, Status};
+use isotherm_protocol::key::{self, UnitId};
+use isotherm_protocol::status::{Fault, Status};
 
 use crate::config::Settings;
 use crate::control::Inbox;
@@ -21,9 +20,7 @@ use crate::control::revision::{Calibrations, Plan};
 use crate::observe::totals::Totals;
 use crate::pair::Pair;
 use crate::receive::fault::{FaultKind, FaultLog};
-use crate::receive::unit::{
-    Footing, Journal, Outlet, Present, StreamTimeoutSettings, SwapAccount, UnitActor,
-};
+use crate::receive::unit::{Journal, Present, SwapAccount, UnitActor};
 pub use units::OutletMaker;
 use units::{Outlets, Unit, Units};
 
@@ -43,11 +40,6 @@ pub struct Intake {
     faults: Mutex<FaultLog>,
     looked_for_room: Mutex<Option<Instant>>,
 }
-
-/// How long a unit without a calibration is silent before another may have its place.
-const STRANGER_KEPT: Duration = Duration::from_secs(60);
-/// Shortest distance of two looks for such a unit.
-const ROOM_INTERVAL: Duration = Duration::from_millis(100);
 
 impl std::fmt::Debug for Intake {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -124,122 +116,6 @@ impl Intake {
         guarded(&mut actor, |actor| actor.receive(input, frame, arrival)).unwrap_or(true)
     }
 
-    /// Makes the unit of a message that is its first, unless the message is bad or there are too many.
-    fn appear(&self, serial: &str, input: Input, frame: &[u8], now: Instant) -> Option<Unit> {
-        let Input::Raw(stream) = input else {
-            self.fault(FaultKind::UnknownStream, || {
-                format!("unit {serial}: a reference for a unit that has not appeared")
-            });
-            return None;
-        };
-        let id = UnitId::new(serial)
-            .map_err(|error| self.fault(FaultKind::BadSerial, || format!("serial {serial:?} {error}")))
-            .ok()?;
-        let calibrated = read(&self.calibrations).has(&id);
-        // Rubbish on a strange serial makes no unit; on a serial with a calibration it is that unit's rubbish.
-        if !calibrated && let Err(error) = readable(stream, frame) {
-            self.fault(FaultKind::from(&error), || {
-                format!("first message of unit {id}, {}: {error}", input.topic())
-            });
-            return None;
-        }
-        // Looked at without the right to write first: a flood of strange serials must not hold the others up.
-        if !self.has_place(&read(&self.units), calibrated) {
-            self.make_room(now);
-        }
-        let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
-        if let Some(unit) = units.by_serial.get(serial) {
-            return Some(Arc::clone(unit));
-        }
-        if !self.has_place(&units, calibrated) {
-            return self.refuse(&id);
-        }
-        let outlet = match self.outlets.take(&id) {
-            Ok(outlet) => outlet,
-            Err(error) => {
-                self.fault(FaultKind::TooManyUnits, || {
-                    format!("unit {id} is refused: no publisher: {error}")
-                });
-                return None;
-            }
-        };
-        let mut actor = self.make(&id, outlet);
-        // Read while nobody else may write the units: what is changed behind this finds the unit there.
-        let plan = read(&self.calibrations).get(&id).cloned().unwrap_or_default();
-        for change in plan.changes() {
-            actor.change(change);
-        }
-        for command in &plan.intent {
-            match actor.command(command) {
-                Ok(state) => {
-                    tracing::info!(unit = %id, %state, "{} restored after the restart", command.name());
-                }
-                Err(refusal) => {
-                    tracing::warn!(unit = %id, "the state before the restart cannot be restored: {refusal}");
-                }
-            }
-        }
-        if let Some(current) = &plan.current {
-            tracing::info!(unit = %id, revision = current.number.counter, "appeared, calibrated");
-        } else {
-            tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
-        }
-        let unit = Arc::new(Mutex::new(actor));
-        units.insert(id, &unit);
-        Some(unit)
-    }
-
-    /// A unit that knows nothing yet.
-    fn make(&self, id: &UnitId, outlet: Outlet) -> UnitActor {
-        let settings = self.settings.unit;
-        let pairing_window = Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs());
-        let quiet = StreamTimeoutSettings { tail_flush: self.settings.tail_flush, pairing_window };
-        let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
-        if self.pair.as_ref().is_some_and(|pair| !pair.speaks_first()) {
-            // The others may have heard more of it; where none speaks it does, after a while.
-            actor.follow(Instant::now(), Footing::Nothing);
-        }
-        if let Some(inbox) = &self.inbox {
-            actor.report_to(inbox.clone());
-        }
-        if let Some(journal) = &self.journal {
-            actor.journal_to(journal.clone());
-        }
-        actor
-    }
-
-    /// Whether one more unit may appear; places for units that have a calibration are kept free for them.
-    fn has_place(&self, units: &Units, calibrated: bool) -> bool {
-        let waiting = |calibrations: &Calibrations| {
-            calibrations.units().filter(|unit| !units.by_serial.contains_key(*unit)).count()
-        };
-        let limit = self.settings.max_units;
-        // Most of the time there is room for all of them, whoever has appeared.
-        units.len() < limit && (calibrated || units.len() + waiting(&read(&self.calibrations)) < limit)
-    }
-
-    /// Forgets the unit without a calibration that has been silent longest, if that is long enough: anybody can make one appear, and
-    /// it must not hold its place for ever. Looked for now and then, for a flood of strange serials is not to cost more.
-    fn make_room(&self, now: Instant) {
-        {
-            let mut looked = lock(&self.looked_for_room);
-            if looked.is_some_and(|looked| now.saturating_duration_since(looked) < ROOM_INTERVAL) {
-                return;
-            }
-            *looked = Some(now);
-        }
-        let units = read(&self.units).in_order();
-        let silent = units.iter().filter_map(|(id, unit)| {
-            // Whoever is at work on it hears of it.
-            let actor = unit.try_lock().ok()?;
-            (actor.doing().1 != Output::Calibrated).then(|| (actor.silence(now), id.clone()))
-        });
-        if let Some((silence, id)) = silent.max().filter(|(silence, _)| *silence >= STRANGER_KEPT) {
-            tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());
-            self.forget(&id);
-        }
-    }
-
     /// Knows nothing more of a unit; it appears anew with its next message.
     pub(crate) fn forget(&self, unit: &UnitId) {
         self.calibrations.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
@@ -256,14 +132,6 @@ impl Intake {
     /// Whether a unit has appeared.
     pub(crate) fn has(&self, unit: &UnitId) -> bool {
         read(&self.units).by_serial.contains_key(unit)
-    }
-
-    fn refuse<T>(&self, id: &UnitId) -> Option<T> {
-        let limit = self.settings.max_units;
-        self.fault(FaultKind::TooManyUnits, || {
-            format!("unit {id} is refused: all {limit} places (max_units) are taken")
-        });
-        None
     }
 
     /// The unit of a serial, if it has appeared.
@@ -385,16 +253,6 @@ fn words_of(panic: &(dyn Any + Send)) -> String {
     let text =
         panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     format!("panic: {}", text.unwrap_or("without words"))
-}
-
-/// Whether a frame is a batch of its stream.
-fn readable(stream: RawStream, frame: &[u8]) -> Result<(), CodecError> {
-    match stream {
-        RawStream::Gyro => codec::decode::<GyroBatch>(frame).map(drop),
-        RawStream::Accel => codec::decode::<AccelBatch>(frame).map(drop),
-        RawStream::Temperature => codec::decode::<TemperatureBatch>(frame).map(drop),
-        RawStream::Health => codec::decode::<HealthBatch>(frame).map(drop),
-    }
 }
 
 /// Locks; a panic while the lock was held has been dealt with where it happened.

@@ -1,65 +1,37 @@
 //! A histogram of latencies with a bounded relative error.
 
+use hdrhistogram::Histogram as Counts;
 use isotherm_protocol::status::LatencyBucket;
 
-/// Sub-buckets per power of two: a bucket is at most 1/16 of its lower bound wide.
-const SUB_BUCKETS: u64 = 1 << SUB_BITS;
-/// log₂ of it.
-const SUB_BITS: u32 = 4;
-/// One linear stretch below 16 ns, then sixteen buckets for each power of two up to 2⁶⁴ ns.
-const BUCKETS: usize = ((u64::BITS - SUB_BITS + 1) as usize) << SUB_BITS;
-
-/// Counts latencies in logarithmic buckets. Buckets are made for those powers of two in which there is a latency, when its
-/// first one comes: a unit's latencies lie within some of the 61.
-#[derive(Debug, Clone, Default)]
+/// Counts latencies in buckets, of which each is at most 1/16 of its lower bound wide. There are buckets up to the largest latency so
+/// far: one that is larger makes more.
+#[derive(Debug, Clone)]
 pub struct Histogram {
-    /// In order.
-    octaves: Vec<Octave>,
-    total: u64,
+    /// `None` never: one digit is a precision that can be had.
+    counts: Option<Counts<u64>>,
     sum: u64,
     largest: u64,
 }
 
-/// The buckets of a power of two.
-#[derive(Debug, Clone)]
-struct Octave {
-    number: usize,
-    counts: [u64; 1 << SUB_BITS],
+impl Default for Histogram {
+    fn default() -> Self {
+        Self { counts: Counts::new(1).ok(), sum: 0, largest: 0 }
+    }
 }
 
 impl Histogram {
     /// Counts one latency (ns); whether it is the first.
     pub fn record(&mut self, ns: u64) -> bool {
-        let bucket = bucket(ns);
-        let (number, sub) = (bucket >> SUB_BITS, bucket % (1 << SUB_BITS));
-        let place = self.octaves.binary_search_by_key(&number, |octave| octave.number);
-        let place = place.unwrap_or_else(|place| {
-            // There are few, and they stay.
-            self.octaves.reserve_exact(1);
-            self.octaves.insert(place, Octave { number, counts: [0; 1 << SUB_BITS] });
-            place
-        });
-        if let Some(count) = self.octaves.get_mut(place).and_then(|octave| octave.counts.get_mut(sub)) {
-            *count += 1;
-        }
-        self.total += 1;
+        let _ = self.counts.as_mut().map(|counts| counts.record(ns));
         self.sum = self.sum.saturating_add(ns);
         self.largest = self.largest.max(ns);
-        self.total == 1
-    }
-
-    /// Every bucket there is, in order, with its number.
-    fn counts(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
-        self.octaves.iter().flat_map(|octave| {
-            let counts = octave.counts.iter().enumerate();
-            counts.map(|(sub, count)| (((octave.number << SUB_BITS) + sub) as u64, *count))
-        })
+        self.total() == 1
     }
 
     /// How many were counted.
     #[must_use]
     pub fn total(&self) -> u64 {
-        self.total
+        self.counts.as_ref().map_or(0, Counts::len)
     }
 
     /// Sum of all that were counted (ns).
@@ -71,51 +43,23 @@ impl Histogram {
     /// The buckets in which something was counted, by their largest latency.
     #[must_use]
     pub fn buckets(&self) -> Vec<LatencyBucket> {
-        let counted = self.counts().filter(|(_, count)| *count > 0);
-        counted.map(|(index, count)| LatencyBucket { up_to_ns: upper_bound(index), count }).collect()
+        let counted = self.counts.iter().flat_map(Counts::iter_recorded);
+        let bucket = counted.map(|bucket| LatencyBucket {
+            up_to_ns: bucket.value_iterated_to(),
+            count: bucket.count_since_last_iteration(),
+        });
+        bucket.collect()
     }
 
     /// The latency (ns) that the share `share` (0…1) of all counted ones does not exceed; 0 where nothing was counted.
     ///
     /// *Numerics*: never below the exact value, at most 1/16 above it.
     #[must_use]
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "a rank among fewer than 2⁵³ latencies; float-to-int saturates"
-    )]
     pub fn quantile(&self, share: f64) -> u64 {
-        let rank = ((self.total as f64 * share.clamp(0.0, 1.0)).ceil() as u64).max(1);
-        let mut seen = 0;
-        for (index, count) in self.counts() {
-            seen += count;
-            if seen >= rank {
-                return upper_bound(index).min(self.largest);
-            }
-        }
-        self.largest
+        // A share of 0 would give the lower end of a bucket.
+        let share = share.max(f64::MIN_POSITIVE);
+        self.counts.as_ref().map_or(0, |counts| counts.value_at_quantile(share)).min(self.largest)
     }
-}
-
-/// Index of the bucket that a latency falls in.
-fn bucket(ns: u64) -> usize {
-    if ns < SUB_BUCKETS {
-        return usize::try_from(ns).unwrap_or(0);
-    }
-    let shift = ns.ilog2() - SUB_BITS;
-    let sub = (ns >> shift) - SUB_BUCKETS;
-    usize::try_from(u64::from(shift + 1) * SUB_BUCKETS + sub).unwrap_or(BUCKETS - 1)
-}
-
-/// Largest latency of a bucket.
-fn upper_bound(index: u64) -> u64 {
-    if index < SUB_BUCKETS {
-        return index;
-    }
-    let shift = index / SUB_BUCKETS - 1;
-    let lower = (SUB_BUCKETS + index % SUB_BUCKETS) << shift;
-    lower + ((1 << shift) - 1)
 }
 
 #[cfg(test)]
@@ -129,11 +73,11 @@ mod tests {
             [power - 1, power, power | (power >> 1), power | (power >> 2) | 1]
         });
         for ns in powers.chain([u64::MAX]) {
-            let index = bucket(ns);
-            assert!(index < BUCKETS, "{ns}");
-            let upper = upper_bound(index as u64);
-            assert!(upper >= ns && upper - ns <= ns / SUB_BUCKETS, "{ns}: {upper}");
-            assert!(index == 0 || upper_bound(index as u64 - 1) < ns, "{ns}");
+            let mut histogram = Histogram::default();
+            assert!(histogram.record(ns) && !histogram.record(ns));
+            let [bucket] = histogram.buckets()[..] else { panic!("{ns}: {histogram:?}") };
+            assert!(bucket.count == 2 && bucket.up_to_ns >= ns, "{ns}: {bucket:?}");
+            assert!(bucket.up_to_ns - ns <= ns / 16, "{ns}: {bucket:?}");
         }
     }
 

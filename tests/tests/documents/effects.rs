@@ -349,6 +349,31 @@ fn what_goes_with_a_gradient_and_with_the_supply_is_removed() {
     assert!(with > 0.5 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
 }
 
+#[test]
+fn what_goes_with_a_gradient_is_removed_by_the_rate_of_one_thermometer() {
+    let by_gradient = [1.5, -1.0, 2.0];
+    let accelerometers = by_gradient.map(|milli_g| AccelerometerEffects {
+        gradient_m_per_s2_per_k: milli_g * 1e-3 * G,
+        ..AccelerometerEffects::default()
+    });
+    let effects = Effects { accelerometers: accelerometers.to_vec(), ..Effects::default() };
+    let chamber = Profile::constant(20.0).hold(10.0).ramp(60.0, 1.0).ramp(20.0, 1.0);
+    let mut scenario = scenario(TUMBLE, effects);
+    scenario = Scenario { duration_s: chamber.duration_s(), chamber, tick_ns: 100_000_000, ..scenario };
+    let node = scenario.instrument.accelerometers.as_ref().unwrap().sensors[0].node;
+    let state = |document: &mut Document| {
+        for (sensor, milli_g) in document.accel.as_mut().unwrap().sensor.iter_mut().zip(by_gradient) {
+            let per_k = milli_g * 1e-3 * G * sensor.scale_factor.shape().at(25.0).unwrap();
+            // It is warmer than the housing by its own heat, and behind it by its time constant.
+            let warmer = sensor.terms.curve(Feature::One).unwrap().plus(per_k * node.heating_deg_c);
+            sensor.set(Feature::One, warmer);
+            sensor.set(Feature::ThermalRate, Curve::new(constant(-per_k * node.time_constant_s)));
+        }
+    };
+    let [floor, with, left] = judged(&scenario, state, |document, scenario| errors(document, scenario).1);
+    assert!(with > 1.0 && left < floor + 0.03 * with, "mg: {with} {left} {floor}");
+}
+
 /// Angle and velocity of a tick.
 type Increments = [[f64; 3]; 2];
 

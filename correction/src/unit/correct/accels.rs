@@ -4,12 +4,12 @@ use core::array;
 
 use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
-use crate::lanes::{narrow, put};
+use crate::lanes::{narrow, put, within};
+use crate::observation::SOUND;
 use crate::orientation::SensorMask;
 use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
-use crate::unit::flags::{SOUND, within};
 
 /// Terms of the accelerometers at a tick: S and 1/K, and r of their boards.
 pub(super) type AccelTerms<const N: usize> = ([[f64; N]; 2], [[f64; N]; 1]);
@@ -20,10 +20,10 @@ pub(super) struct Felt<const N: usize> {
     pub(super) forces: [f64; N],
     /// Accelerometers whose reading counts.
     usable: SensorMask,
-    /// Whether every reading is a number below its limit.
-    pub(super) within: bool,
     /// Measured duration of their tick (s).
     duration_s: f64,
+    /// Inverse of the axes of all accelerometers, where it is worked out already.
+    inverse: Option<[[f64; 4]; N]>,
 }
 
 /// Specific forces along the input axes of accelerometers (m/s²) that read this over a tick (models §3).
@@ -46,7 +46,7 @@ impl Corrector {
     #[inline(always)]
     pub(super) fn accel_terms<const N: usize>(&self, shares: Shares<'_>) -> AccelTerms<N> {
         let (mut terms, mut board) =
-            (self.thermal.accels.at::<N>(shares), self.thermal.boards.at::<N>(shares));
+            (self.thermal.accels.at::<N, 2>(shares), self.thermal.boards.at::<N, 1>(shares));
         if let Some(slewing) = self.slewing() {
             slewing.terms(&mut terms, &slewing.from.accels);
             slewing.terms(&mut board, &slewing.from.boards);
@@ -113,15 +113,19 @@ impl Corrector {
         put(&mut seen.reading, *readings);
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
-        if self.calm.follows.any {
+        if self.calm.follows.squares {
+            forces = self.remove_squares(shares, forces);
+        }
+        if self.calm.follows.delays {
             let (mut left, mut counted) = (forces, usable);
-            self.remove_squares(shares, &mut left);
-            if self.holds_back() {
-                self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
-            }
+            self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
             (forces, usable) = (left, counted);
         }
-        Some(Felt { forces, usable, within, duration_s })
+        let mut felt = Felt { forces, usable, duration_s, inverse: None };
+        if self.calm.follows.force & within {
+            felt.inverse = self.note_force(calibration, forces, time);
+        }
+        Some(felt)
     }
 
     /// Resolves what the accelerometers feel in case axes, and watches its parity.
@@ -130,16 +134,12 @@ impl Corrector {
     pub(super) fn resolve_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        felt: Felt<N>,
-        missed: u64,
+        Felt { mut forces, usable, duration_s, inverse }: Felt<N>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        let Felt { mut forces, usable, duration_s, .. } = felt;
-        if self.calm.follows.any {
-            let mut left = forces;
-            self.remove_size_effect(calibration, missed, out, &mut left);
-            forces = left;
+        if self.calm.follows.positions {
+            forces = self.remove_size_effect(calibration, out, forces);
         }
         let time = out.end_time;
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
@@ -153,7 +153,7 @@ impl Corrector {
             let left_over = (&mut out.accel_parity, &mut out.flags);
             excluded = axes.watch(orientation, usable, &watched[..sensors], left_over);
         }
-        let (force, trusted) = axes.resolve(orientation, usable, &forces, time);
+        let (force, trusted) = axes.resolve(orientation, usable, (&forces, inverse), time);
         let force = self.slewing().map_or(force, |slewing| {
             let (old, forces) = (slewing.from.accel_axes.as_ref(), forces);
             slewing.axes(force, old, usable, &forces[..sensors])

@@ -4,7 +4,8 @@ use core::array;
 
 use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
-use crate::lanes::{narrow, put};
+use crate::lanes::{narrow, put, within};
+use crate::observation::SOUND;
 use crate::orientation::SensorMask;
 use crate::reversal::{Reversal, Substitution, TickInput};
 use crate::sample::{
@@ -13,7 +14,6 @@ use crate::sample::{
 use crate::servo::{ServoTick, Transient};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
-use crate::unit::flags::{SOUND, within};
 
 /// What the substitution did, and the servo could not: counted.
 const SWITCHING: TickFlags = TickFlags::INTERPOLATED
@@ -42,6 +42,28 @@ impl Corrector {
         }
     }
 
+    /// What the gyros drift by acceleration and rate, and those whose rate is beyond its curve.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "lanes that stay in registers")]
+    fn drift_with_motion<const N: usize>(
+        &mut self,
+        calibration: &Calibration,
+        shares: Shares<'_>,
+        scale: Scale<N>,
+        readings: [f64; N],
+        duration_s: f64,
+    ) -> ([f64; N], SensorMask) {
+        let mut clamped = SensorMask::NONE;
+        let mut drift = if self.calm.follows.force { self.drift_with_force::<N>(shares) } else { [0.0; N] };
+        if self.calm.follows.rates {
+            let limits = narrow::<N>(&calibration.gyro_limits);
+            let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
+            let rates = scale.angles(within).map(|angle| angle / duration_s);
+            clamped = self.weigh_over_rate::<N>(calibration, shares, &rates, &mut drift);
+        }
+        (drift, clamped)
+    }
+
     /// Corrects the gyros' readings of a tick.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
@@ -58,31 +80,29 @@ impl Corrector {
         let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick)));
         let lost = reversal.is_some_and(|(reversal, input)| self.substitution.is_lost(reversal, &input));
 
-        let mut terms = self.thermal.gyros.at::<N>(shares);
-        // What few ticks need is given copies: lanes of which nobody has the address stay in registers.
-        if self.calm.special {
-            let mut special = terms;
-            self.special_terms(calibration, &mut special, time.seconds_from(tick.turn_on));
-            terms = special;
-        }
-        let [weight, mut bias, magnetic, meander] = terms;
-        if self.calm.modal {
+        let [mut weight, mut bias] = self.thermal.gyros.at::<N, 2>(shares);
+        if self.calm.modal | self.calm.special {
+            let mut terms = self.thermal.gyros.at::<N, 4>(shares);
+            // What few ticks need is given copies: lanes of which nobody has the address stay in registers.
+            if self.calm.special {
+                let mut special = terms;
+                self.special_terms(calibration, &mut special, time.seconds_from(tick.turn_on));
+                terms = special;
+            }
             let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
-            bias = array::from_fn(|i| bias[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+            let [_, plain, magnetic, meander] = terms;
+            (weight, bias) = (terms[0], plain);
+            if self.calm.modal {
+                bias = array::from_fn(|i| plain[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
+            }
         }
         let readings: [f64; N] = *raw.readings.lanes();
         let scale =
             Scale { weight, times_s: (calibration.gyro_output == OutputKind::Mean).then_some(duration_s) };
         let mut clamped = SensorMask::NONE;
         if self.calm.follows.force | self.calm.follows.rates {
-            let mut drift =
-                if self.calm.follows.force { self.drift_with_force::<N>(shares) } else { [0.0; N] };
-            if self.calm.follows.rates {
-                let limits = narrow::<N>(&calibration.gyro_limits);
-                let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
-                let rates = scale.angles(within).map(|angle| angle / duration_s);
-                clamped = self.weigh_over_rate::<N>(calibration, shares, &rates, &mut drift);
-            }
+            let drift;
+            (drift, clamped) = self.drift_with_motion(calibration, shares, scale, readings, duration_s);
             bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
         if reversal.is_some() | self.calm.special {
@@ -133,23 +153,27 @@ impl Corrector {
         let mut rates: [f64; N] = increments.map(|increment| increment / duration_s);
         self.note_rates(sound, flags, rates);
 
-        let seen = &mut self.seen.gyros;
-        seen.count = count;
-        put(&mut seen.reading, readings);
-        put::<N>(&mut seen.rate, array::from_fn(|i| rates[i] + subtrahend[i]));
-        put(&mut seen.bias, bias);
-        seen.flags = flags;
+        self.seen.gyros.note([readings, array::from_fn(|i| rates[i] + subtrahend[i]), bias], count, flags);
         out.gyro_flags = of_sensors(flags, count);
 
-        if reversal.is_some() | self.calm.special {
-            let mut bridged = increments;
-            out.flags |= self.substitute(reversal, &mut bridged[..count]);
-            increments = bridged;
+        match reversal {
+            Some((_, input)) if self.substitution.passes(&input) => {
+                let mut of_sensors = [f64::NAN; MAX_SENSORS];
+                put(&mut of_sensors, rates);
+                of_sensors.iter_mut().take(N).skip(count).for_each(|rate| *rate = f64::NAN);
+                self.substitution.pass(&input, of_sensors);
+            }
+            None if !self.calm.special => {}
+            _ => {
+                let mut bridged = increments;
+                out.flags |= self.substitute(reversal, &mut bridged[..count]);
+                increments = bridged;
+            }
         }
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
         }
-        if self.calm.follows.any && self.holds_back() {
+        if self.calm.follows.delays {
             let (mut held, mut counted) = (increments, usable);
             let given = self.hold_gyros_back(calibration, tick, &mut out.flags, (&mut held, &mut counted));
             (increments, usable, rates) = (held, counted, given.unwrap_or(rates));
@@ -242,7 +266,7 @@ impl Corrector {
             let watched = &watched[..orientation.sensors()];
             excluded = axes.watch(orientation, usable, watched, (&mut out.gyro_parity, &mut out.flags));
         }
-        let (angle, trusted) = axes.resolve(orientation, usable, &increments, out.end_time);
+        let (angle, trusted) = axes.resolve(orientation, usable, (&increments, None), out.end_time);
         out.delta_angle = self.slewing().map_or(angle, |slewing| {
             let copied = increments;
             slewing.axes(angle, slewing.from.gyro_axes.as_ref(), usable, &copied[..orientation.sensors()])

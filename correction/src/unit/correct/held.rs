@@ -95,12 +95,6 @@ impl HeldBack {
 }
 
 impl Corrector {
-    /// Whether sensors are held back, or something of them still is.
-    #[inline]
-    pub(super) fn holds_back(&self) -> bool {
-        self.motion.held.is_some() || self.calm.follows.delays
-    }
-
     /// What is held back; before a tick that is the first of its series, nothing.
     fn held(&mut self, tick: &Paired<'_>) -> &mut HeldBack {
         let is_first = tick.before.restart || self.seen.duration == Span::ZERO;

@@ -48,8 +48,6 @@ pub(super) struct MotionMemory {
     reason = "terms that a unit has or has not, each asked for by its name"
 )]
 pub(super) struct Follows {
-    /// Any of these, or what is still held back.
-    pub(super) any: bool,
     /// Drift with the specific force.
     pub(super) force: bool,
     /// Weights of gyros over their rate.
@@ -57,10 +55,10 @@ pub(super) struct Follows {
     /// Any weights of gyros that are not the same at every rate.
     pub(super) rates: bool,
     /// Second-order terms of accelerometers.
-    squares: bool,
+    pub(super) squares: bool,
     /// Accelerometers away from the reference point.
-    positions: bool,
-    /// Sensors that lag less than another.
+    pub(super) positions: bool,
+    /// Sensors that lag less than another, or of which something is still held back.
     pub(super) delays: bool,
 }
 
@@ -124,7 +122,8 @@ impl Corrector {
         old: Option<&[Lanes; T]>,
         shares: Shares<'_>,
     ) -> [[f64; N]; T] {
-        let terms = bank.map_or([[0.0; N]; T], |bank| bank.at(shares));
+        // Not `map_or`, which would be a call.
+        let terms = if let Some(bank) = bank { bank.at(shares) } else { [[0.0; N]; T] };
         let Some(slewing) = self.slewing() else { return terms };
         // A copy: lanes of which nobody has the address stay in registers.
         let mut slewed = terms;
@@ -139,13 +138,12 @@ impl Corrector {
         let curves = motions().any(Motion::has_curves);
         let is_asymmetric = |banks: &MotionBanks| banks.gyros.has_any([ASYMMETRY; 2]);
         Follows {
-            any: motions().next().is_some() || self.motion.held.is_some(),
             force: motions().any(|motion| motion.feels_force),
             curves,
             rates: curves || old.is_some() || self.thermal.motion.as_deref().is_some_and(is_asymmetric),
             squares: motions().any(Motion::has_squares),
             positions: motions().any(|motion| motion.has_positions),
-            delays: motions().any(|motion| motion.holds_back),
+            delays: motions().any(|motion| motion.holds_back) || self.motion.held.is_some(),
         }
     }
 
@@ -217,64 +215,56 @@ impl Corrector {
     }
 
     /// Notes the specific force of a tick in case axes, from what the accelerometers feel (m/s²), for the gyros that drift with it; where
-    /// it is not to be had, the last one stands.
-    #[inline(never)]
+    /// it is not to be had, the last one stands. Gives the inverse of the axes, where that is of all accelerometers.
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
     pub(super) fn note_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        forces: &[f64; N],
+        forces: [f64; N],
         time: Timestamp,
-    ) {
-        if !self.calm.follows.force {
-            return;
-        }
-        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
-        else {
-            return;
-        };
-        let (force, trusted) = axes.resolve(orientation, axes.included(), forces, time);
+    ) -> Option<[[f64; 4]; N]> {
+        let (orientation, axes) =
+            (calibration.accel_orientation.as_ref()?, self.thermal.accel_axes.as_mut()?);
+        let (included, inverse) = (axes.included(), axes.inverse(time));
+        let (force, trusted) = axes.resolve(orientation, included, (&forces, inverse), time);
         if trusted {
             self.motion.force = force;
         }
+        inverse
     }
 
     /// Takes second-order terms out of the forces that the accelerometers feel (m/s²): m = f + K2·f² has the solution
     /// f = 2m/(1 + √(1 + 4·K2·m)) next to m.
     #[inline(never)]
-    pub(super) fn remove_squares<const N: usize>(&self, shares: Shares<'_>, forces: &mut [f64; N]) {
-        if !self.calm.follows.squares {
-            return;
-        }
+    pub(super) fn remove_squares<const N: usize>(&self, shares: Shares<'_>, forces: [f64; N]) -> [f64; N] {
         let [second_order] = self.accel_motion::<N>(shares);
-        *forces = array::from_fn(|lane| {
+        array::from_fn(|lane| {
             let root = libm::sqrt((1.0 + 4.0 * second_order[lane] * forces[lane]).max(0.0));
             2.0 * forces[lane] / (1.0 + root)
-        });
+        })
     }
 
     /// Takes out what accelerometers feel for sitting elsewhere: ω × (ω × r) + α × r along the input axis.
-    #[inline(never)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    #[inline(always)]
     pub(super) fn remove_size_effect<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        missed: u64,
         out: &CorrectedTick,
-        forces: &mut [f64; N],
-    ) {
-        if !self.calm.follows.positions {
-            return;
-        }
+        mut forces: [f64; N],
+    ) -> [f64; N] {
+        let (rate, acceleration) = self.turning(out);
         let slewed;
         let positions = if let (None, Some(motion)) = (self.slewing(), calibration.motion.as_deref()) {
             &motion.positions_m
         } else {
-            slewed = [0, 1, 2].map(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]));
+            slewed = self.positions_on_their_way(calibration);
             &slewed
         };
-        let (rate, acceleration) = self.turning(missed, out);
         let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
         else {
-            return;
+            return forces;
         };
         let axes = orientation.axes_at(axes.temperature_deg_c(out.end_time));
         // Two lanes at a time, so that all of it stays in registers.
@@ -290,13 +280,20 @@ impl Corrector {
                 *force -= along(0, lane) + along(1, lane) + along(2, lane);
             }
         }
+        forces
+    }
+
+    /// Where the accelerometers sit, axis by axis (m), in the middle of a swap.
+    #[cold]
+    fn positions_on_their_way(&self, calibration: &Calibration) -> [Lanes; 3] {
+        [0, 1, 2].map(|axis| self.on_its_way(calibration, |motion| &motion.positions_m[axis]))
     }
 
     /// Angular rate (rad/s) and acceleration (rad/s²) of a tick, in case axes. A tick that carries the restored angle of a mode switch
     /// turns as the one before it.
     #[inline]
-    fn turning(&mut self, missed: u64, out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
-        if missed > 0 {
+    fn turning(&mut self, out: &CorrectedTick) -> ([f64; 3], [f64; 3]) {
+        if self.seen.missed > 0 {
             self.motion.interrupt();
         }
         if out.flags.intersects(TickFlags::ANGLE_RESTORED | TickFlags::ANGLE_INVALID) {
@@ -304,9 +301,7 @@ impl Corrector {
             self.motion.interrupt();
             return (rate, [0.0; 3]);
         }
-        let per_second = 1.0 / out.duration.as_s();
-        let rate = out.delta_angle.map(|angle| angle * per_second);
-        let middle = out.end_time - Span::from_ns(out.duration.as_ns() / 2);
+        let (rate, middle) = (self.seen.angular_rate, out.end_time - Span::from_ns(out.duration.as_ns() / 2));
         (rate, self.motion.acceleration(rate, middle))
     }
 }

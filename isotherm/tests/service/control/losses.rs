@@ -38,7 +38,7 @@ async fn a_state_folder_that_is_removed_is_told_refuses_swaps_and_a_new_one_gets
     remove(&folders.state);
     let status = until_service(&stand, |status| told(status, "state_folder").is_some()).await;
     let words = told(&status, "state_folder").unwrap();
-    assert!(words.contains("was removed") && words.contains("make an empty writable folder"), "{words}");
+    assert!(words.contains(folders.state.to_str().unwrap()), "{words}");
     let reply = stand.swap(UNIT, &document(UNIT, 3.0), &plain()).await;
     assert_refused(&reply, &["cannot be written to the state folder", "nothing has changed", "was removed"]);
     assert_eq!(stand.revisions(UNIT, 20).await, [2], "the stream does not notice");
@@ -94,7 +94,7 @@ async fn an_emptied_audit_file_is_told_and_no_revision_is_given_twice() {
     let mut stand = Stand::start(folders.settings()).await;
     let status = until_service(&stand, |_| true).await;
     let words = told(&status, "audit_file").expect("told");
-    assert!(words.contains("the history is lost") && words.contains("3 documents are kept"), "{words}");
+    assert!(words.contains("3 documents"), "{words}");
     let revisions = stand.revisions(UNIT, 20).await;
     assert!(revisions.len() == 1 && revisions[0] > 3, "{revisions:?}");
     assert!(words.contains(&format!("continue from {}", revisions[0])), "{words}");
@@ -130,8 +130,7 @@ async fn a_damaged_acceptance_is_told_with_what_is_in_force_in_its_place() {
         let mut stand = Stand::start(folders.settings()).await;
         let status = until_service(&stand, |_| true).await;
         let words = told(&status, "audit_file").expect("told").to_owned();
-        assert!(words.contains("unit ZLG-7: revision 3 was accepted"), "{words}");
-        assert!(words.contains("the older revision 2 is in force"), "{words}");
+        assert!([UNIT, "revision 3", "revision 2"].iter().all(|part| words.contains(part)), "{words}");
         assert_eq!(stand.revisions(UNIT, 20).await, [2]);
         assert_accepted(&stand.swap(UNIT, &document(UNIT, 3.0), &plain()).await, 4);
         until_service(&stand, |status| told(status, "audit_file").is_none()).await;

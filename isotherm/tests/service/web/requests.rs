@@ -247,7 +247,7 @@ async fn a_swap_a_rollback_and_a_command_are_those_of_the_bus() {
     }
     assert_eq!(send(address, "POST", &command, &[], "standby").status, 400);
     let forged = post(address, &command, &json!({ "command": "standby", "by": "CN=eve" }));
-    assert!(forged.status == 409 && forged.body.contains("reserved for names of certificates"), "{forged:?}");
+    assert!(forged.status == 409 && forged.body.contains("CN=eve"), "{forged:?}");
     let entries = stand.history(UNIT).await;
     let by: Vec<_> = entries
         .iter()
@@ -260,7 +260,7 @@ async fn a_swap_a_rollback_and_a_command_are_those_of_the_bus() {
     assert_eq!(read(address, &format!("/api/unit/{UNIT}/document")).body, document(UNIT, 1.0));
     let strange = post(address, "/api/unit/STRANGE/command", &json!({ "command": "standby", "by": "bob" }));
     assert_eq!(strange.status, 409);
-    assert!(strange.body.contains("has not appeared"), "{strange:?}");
+    assert!(strange.body.contains("STRANGE"), "{strange:?}");
     stand.stop().await;
 }
 

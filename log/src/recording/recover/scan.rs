@@ -1,7 +1,7 @@
 //! Whole records of a file, found again behind what is damaged.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io;
 use std::path::Path;
 
 use mcap::McapError;
@@ -10,10 +10,9 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::recording::record::{LONGEST_RECORD, chunk_records, metadata_length, parse};
+use crate::recording::walk::{HEAD, RecordFile, head_of, number};
 use crate::recording::{MAGIC, METADATA};
 
-/// Opcode and length of a record.
-const HEAD: usize = 9;
 /// The shortest head of a chunk's own: times, lengths, CRC, no compression.
 const CHUNK_HEAD: usize = 40;
 /// Bytes that are looked through at once for a record.
@@ -52,10 +51,9 @@ pub(super) fn profile(piece: Option<&Piece>) -> Option<&str> {
 /// Goes through a file.
 #[derive(Debug)]
 pub(super) struct Scanner {
-    file: BufReader<File>,
+    records: RecordFile<File>,
     /// Where the next piece begins.
     offset: u64,
-    length: u64,
     /// Behind the footer only the magic follows.
     footer: bool,
 }
@@ -67,12 +65,11 @@ impl Scanner {
     /// [`Error::File`].
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let failed = |source| Error::file(path, "open the recording", source);
-        let mut file = File::open(path).map_err(failed)?;
-        let length = file.metadata().map_err(failed)?.len();
-        let mut magic = Vec::new();
-        (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
-        let offset = if magic == MAGIC { length.min(MAGIC.len() as u64) } else { 0 };
-        Ok(Self { file: BufReader::with_capacity(WINDOW, file), offset, length, footer: false })
+        let file = File::open(path).map_err(failed)?;
+        let mut records = RecordFile::new(file, WINDOW).map_err(failed)?;
+        let magic = records.load(0, MAGIC.len()).map_err(failed)?;
+        let offset = if magic == MAGIC { MAGIC.len() as u64 } else { 0 };
+        Ok(Self { records, offset, footer: false })
     }
 
     /// Whether it begins as a recording does. Called before the first piece is taken.
@@ -82,7 +79,7 @@ impl Scanner {
 
     /// Length of the file (bytes).
     pub(super) fn length(&self) -> u64 {
-        self.length
+        self.records.length()
     }
 
     /// Where the next piece begins (bytes).
@@ -96,10 +93,10 @@ impl Scanner {
     /// Where the file cannot be read.
     pub(super) fn next_piece(&mut self) -> io::Result<Option<Piece>> {
         let begin = self.offset;
-        if self.footer && self.load(begin, MAGIC.len())? == MAGIC {
-            self.offset = self.length;
+        if self.footer && self.records.load(begin, MAGIC.len())? == MAGIC {
+            self.offset = self.length();
         }
-        if self.offset >= self.length {
+        if self.offset >= self.length() {
             return Ok(None);
         }
         match self.piece_at(begin)? {
@@ -118,14 +115,14 @@ impl Scanner {
 
     /// The whole piece at a place and its length, or why there is none.
     fn piece_at(&mut self, at: u64) -> io::Result<Result<(Piece, u64), String>> {
-        let head = self.load(at, HEAD)?;
+        let head = self.records.load(at, HEAD)?;
         let Some((opcode, length)) = head_of(&head) else {
             return Ok(Err("ends in the middle of a record".to_owned()));
         };
         if !is_opcode(opcode) {
             return Ok(Err(format!("no record begins with {opcode:#04x}")));
         }
-        let rest = self.length - at - HEAD as u64;
+        let rest = self.length() - at - HEAD as u64;
         if length > rest {
             let what = name(opcode);
             return Ok(Err(format!("{what} of {length} bytes has only {rest} before the file ends")));
@@ -133,15 +130,15 @@ impl Scanner {
         let Some(short) = usize::try_from(length).ok().filter(|length| *length <= LONGEST_RECORD) else {
             return Ok(Err(format!("{} of {length} bytes is longer than {LONGEST_RECORD}", name(opcode))));
         };
-        let data = self.load(at + HEAD as u64, short)?;
+        let data = self.records.load(at + HEAD as u64, short)?;
         Ok(whole(opcode, &data).map(|piece| (piece, length + HEAD as u64)))
     }
 
     /// Where the next record begins that is sure to be one; the file's end where there is none.
     fn next_whole(&mut self, from: u64) -> io::Result<u64> {
         let mut begin = from;
-        while begin < self.length {
-            let window = self.load(begin, WINDOW + HEAD + CHUNK_HEAD)?;
+        while begin < self.length() {
+            let window = self.records.load(begin, WINDOW + HEAD + CHUNK_HEAD)?;
             let last = window.len().min(WINDOW);
             for index in 0..last {
                 let at = begin + index as u64;
@@ -152,16 +149,15 @@ impl Scanner {
             }
             begin += last as u64;
         }
-        Ok(self.length)
+        Ok(self.length())
     }
 
     /// Whether a record of a kind that can be told from chance may begin here.
     fn may_be(&self, here: &[u8], at: u64) -> bool {
         let Some((opcode, length)) = head_of(here) else { return false };
-        let rest = self.length - at - HEAD as u64;
+        let rest = self.length() - at - HEAD as u64;
         let fits = length <= rest && length <= LONGEST_RECORD as u64;
         let body = here.get(HEAD..).unwrap_or_default();
-        let number = |at: usize| body.get(at..).and_then(|from| from.first_chunk()).copied();
         match opcode {
             // The compression's name, and lengths that go together.
             op::CHUNK if fits && length >= CHUNK_HEAD as u64 => {
@@ -170,7 +166,7 @@ impl Scanner {
                     [(b"\x04\0\0\0zstd", 4), (b"\x03\0\0\0lz4", 3), (b"\0\0\0\0", 0)];
                 let found = compressions.iter().find(|(start, _)| name.starts_with(start));
                 found.is_some_and(|(_, letters)| {
-                    let compressed = number(32 + letters).map_or(u64::MAX, u64::from_le_bytes);
+                    let compressed = number(body, 32 + letters).unwrap_or(u64::MAX);
                     compressed.checked_add((CHUNK_HEAD + letters) as u64) == Some(length)
                 })
             }
@@ -182,25 +178,6 @@ impl Scanner {
             _ => false,
         }
     }
-
-    /// Bytes of the file, fewer at its end.
-    fn load(&mut self, at: u64, length: usize) -> io::Result<Vec<u8>> {
-        let here = self.file.stream_position()?;
-        match i64::try_from(at).ok().zip(i64::try_from(here).ok()) {
-            // Keeps what is buffered.
-            Some((at, here)) => self.file.seek_relative(at - here)?,
-            None => self.file.seek(SeekFrom::Start(at)).map(|_| ())?,
-        }
-        let mut bytes = Vec::new();
-        (&mut self.file).take(length as u64).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    }
-}
-
-/// Opcode and length of a record.
-fn head_of(bytes: &[u8]) -> Option<(u8, u64)> {
-    let opcode = *bytes.first()?;
-    Some((opcode, u64::from_le_bytes(*bytes.get(1..)?.first_chunk()?)))
 }
 
 /// The piece that these bytes are, with everything checked that can be.

@@ -195,7 +195,7 @@ fn what_is_no_recording_is_refused_and_nothing_is_written_over() {
     let (input, output) = (folder.path().join("x"), folder.path().join("y"));
     std::fs::write(&input, "sequence,end_time_ns\n".repeat(1000)).unwrap();
     let error = recover(&input, &output, RecordingOptions::default()).unwrap_err();
-    assert!(error.to_string().contains("not a recording"), "{error}");
+    assert!(error.to_string().starts_with(input.to_str().unwrap()), "{error}");
     assert!(!output.exists());
     let overwrite = RecordingOptions { overwrite: true, ..RecordingOptions::default() };
     assert!(recover(&input, &input, overwrite).is_err());

@@ -1,12 +1,12 @@
 //! A stream follows another one: frames at once, entries late, and the same bits in the end.
 
 use isotherm_correction::operation::{Command, State};
-use isotherm_correction::sample::{GyroTick, OutputKind};
+use isotherm_correction::sample::{ChannelName, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 
 use super::*;
 use crate::codec;
-use crate::raw::GyroBatch;
+use crate::raw::{GyroBatch, TemperatureBatch};
 
 const TICK_NS: u64 = 5_000_000;
 
@@ -80,7 +80,7 @@ impl Standby {
     fn new() -> Self {
         Self {
             stream: UnitStream::new(id(), UnitSettings::default()),
-            follower: Follower::new(id()),
+            follower: Follower::new(id(), Default::default()),
             now_ns: 1,
         }
     }
@@ -96,7 +96,7 @@ impl Standby {
 
     /// Whether the memory must be asked for anew.
     fn go_on(&mut self) -> bool {
-        let (rebuilt, stuck) = self.follower.advance(&self.stream, self.now_ns);
+        let (rebuilt, stuck) = self.follower.advance(&self.stream, 0, self.now_ns);
         if let Some(rebuilt) = rebuilt {
             assert!(rebuilt.exact);
             self.stream = rebuilt.stream;
@@ -213,5 +213,43 @@ fn an_order_that_waits_for_lost_frames_holds_when_the_leader_is_gone() {
             stream = rebuilt.stream;
         }
         assert_eq!(stream.unit().state(), State::Standby, "{joins}");
+    }
+}
+
+/// A thermometer is read every few seconds: what was heard before the following began is not waited for.
+#[test]
+fn whoever_has_heard_what_the_memory_has_joins_at_once() {
+    let reading = TemperatureReading {
+        channel: ChannelName::from("gyro").unwrap(),
+        time: Timestamp::from_ns(0),
+        raw: 20.0,
+    };
+    let thermal = codec::encode(&TemperatureBatch { readings: vec![reading] }).unwrap();
+    let temperature = Input::Raw(RawStream::Temperature);
+    for (has_heard, joins) in [(true, true), (false, false)] {
+        let (mut leader, mut standby) = (Leader::new(), Standby::new());
+        leader.stream.receive(temperature, &thermal).unwrap();
+        if has_heard {
+            standby.stream.receive(temperature, &thermal).unwrap();
+        }
+        for sequence in 0..5 {
+            leader.take(sequence);
+            standby.take(sequence);
+        }
+        standby.follower = Follower::new(id(), standby.stream.heard());
+        for sequence in 5..10 {
+            leader.take(sequence);
+            standby.take(sequence);
+        }
+        let memory = leader.memory();
+        standby.take(10);
+        leader.take(10);
+        assert!(standby.entry(memory));
+        standby.take(11);
+        leader.take(11);
+        assert_eq!(standby.follower.has_joined(), joins);
+        if joins {
+            assert_eq!(standby.stream.memory(), leader.stream.memory());
+        }
     }
 }

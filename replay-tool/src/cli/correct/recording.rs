@@ -7,6 +7,7 @@ use std::thread::available_parallelism;
 use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_log::diff::DiffOptions;
+use isotherm_log::error::few;
 use isotherm_log::file::read_small;
 use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
 use isotherm_log::part::{LogFiles, Part};
@@ -19,8 +20,6 @@ use super::sink::Sink;
 use crate::cli::{print, show};
 use crate::error::Error;
 
-/// Most units that a sentence names.
-const NAMED: usize = 8;
 /// Gyro ticks in a message of a text log.
 const TEXT_BATCH: usize = 64;
 
@@ -125,9 +124,6 @@ fn plans(
     mut calibrations: BTreeMap<UnitId, Loaded>,
 ) -> Result<(Vec<UnitPlan>, Option<String>), Error> {
     let wanted = args.log.units()?;
-    if let Some(unit) = wanted.iter().find(|unit: &&UnitId| !outlines.units.contains_key(*unit)) {
-        return Err(Error::Usage(format!("--unit {unit}: the log has nothing of this unit")));
-    }
     let (mut plans, mut without) = (Vec::new(), Vec::new());
     for (id, outline) in outlines.units {
         if !outline.has_raw || !(wanted.is_empty() || wanted.contains(&id)) {
@@ -158,14 +154,9 @@ fn plans(
         plans.push(UnitPlan { id, basis, compare });
     }
     let without = (!without.is_empty()).then(|| {
-        let named = without.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-        let more = match without.len().saturating_sub(NAMED) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
         format!(
-            "there is no journal to correct {named}{more} by: give --calibration FILE for each, or choose the other \
-             units with --unit"
+            "there is no journal to correct {} by: give --calibration FILE for each, or choose the other units with --unit",
+            few(&without)
         )
     });
     // What was asked for by name must be there.

@@ -8,10 +8,10 @@ use crate::cli::show;
 pub(super) fn readings(unit: &UnitInfo) -> String {
     let mut rows = Vec::new();
     let mut add = |name: String, info: &ReadingInfo| {
-        let ReadingInfo { readings, missing, min, max, mean, .. } = info;
+        let ReadingInfo { unit, readings, missing, min, max, mean, .. } = info;
         let counts = [readings, missing].map(ToString::to_string);
         let [readings, missing] = counts;
-        rows.push([name, readings, figure(*min), figure(*max), figure(*mean), missing]);
+        rows.push([name, unit.clone(), readings, figure(*min), figure(*max), figure(*mean), missing]);
     };
     for (what, sensors) in [("gyro", &unit.gyros), ("accelerometer", &unit.accelerometers)] {
         sensors.iter().zip(1..).for_each(|(info, number)| add(format!("{what} {number}"), info));
@@ -22,7 +22,7 @@ pub(super) fn readings(unit: &UnitInfo) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    show::grid(["as sent", "readings", "minimum", "maximum", "mean", "missing"], rows, 1..)
+    show::grid(["as sent", "unit", "readings", "minimum", "maximum", "mean", "missing"], rows, 2..)
 }
 
 /// A number in seven digits, without an exponent where it needs none.
@@ -30,12 +30,14 @@ fn figure(number: f64) -> String {
     match number.abs() {
         0.0 => "0".to_owned(),
         1e-3..1e9 => {
-            let shown = format!("{number:.7}");
-            let (whole, fraction) = shown.split_once('.').unwrap_or((&shown, ""));
-            let digits = whole.trim_start_matches(['-', '0']).len();
-            let kept = fraction.get(..7_usize.saturating_sub(digits)).unwrap_or_default();
-            let kept = kept.trim_end_matches('0');
-            if kept.is_empty() { whole.to_owned() } else { format!("{whole}.{kept}") }
+            let whole = format!("{:.0}", number.abs().trunc());
+            let digits = whole.trim_start_matches('0').len();
+            let shown = format!("{number:.*}", 7_usize.saturating_sub(digits));
+            if shown.contains('.') {
+                shown.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                shown
+            }
         }
         _ => format!("{number:.6e}"),
     }
@@ -50,6 +52,9 @@ mod tests {
         for (number, expected) in [
             (0.0, "0"),
             (9.806_65, "9.80665"),
+            (std::f64::consts::PI, "3.141593"),
+            (999.999_99, "1000"),
+            (-120.0, "-120"),
             (-0.012_345_678_9, "-0.0123457"),
             (123_456_789.0, "123456789"),
             (1.5e-9, "1.500000e-9"),

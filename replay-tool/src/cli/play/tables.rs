@@ -2,16 +2,14 @@
 
 use super::{Report, show};
 use crate::play::{Acknowledge, PlayOptions, PlayReport, UnitReport};
+use isotherm_log::error::few;
 use isotherm_log::source::LogReport;
-
-/// Most serials that are listed in a warning.
-const LISTED: usize = 5;
 
 /// What whoever reads only the table must know.
 pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
     let of = |chosen: fn(&UnitReport) -> bool| {
         let units: Vec<_> = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).collect();
-        (!units.is_empty()).then(|| list(&units))
+        (!units.is_empty()).then(|| few(&units))
     };
     let uncalibrated =
         of(|unit| unit.returned.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
@@ -26,14 +24,6 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
         format!("{units}: some of the log's messages cannot be read; they were played unchanged")
     });
     uncalibrated.into_iter().chain(mixed).chain(unreadable).collect()
-}
-
-/// Serials, not all where they are many.
-pub(super) fn list(units: &[&str]) -> String {
-    match units.len().checked_sub(LISTED) {
-        Some(more) if more > 0 => format!("{} and {more} more", units[..LISTED].join(", ")),
-        _ => units.join(", "),
-    }
 }
 
 /// The summary as tables.

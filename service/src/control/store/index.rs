@@ -5,9 +5,11 @@ use std::collections::{BTreeMap, VecDeque};
 use isotherm_protocol::control::Order;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{
-    AuditEntry, AuditEvent, CarriedFile, CarriedUnit, GoodSet, Intent, MAX_CARRIED, Source,
+    AuditEntry, AuditEvent, CarriedFile, CarriedUnit, CommandRecord, GoodSet, Intent, MAX_CARRIED, Source,
 };
 use isotherm_protocol::key::UnitId;
+
+use crate::control::command::PRE_LAUNCH_ENDED;
 
 /// Most good sets of one unit that are kept in memory.
 const MAX_SETS: usize = 1000;
@@ -48,8 +50,27 @@ struct OfUnit {
     folder: Option<Digest>,
     /// What an operator wants of it.
     intent: Intent,
+    /// The last command that its stream took.
+    command: Option<TakenCommand>,
     /// Highest revision that was given and whose acceptance cannot be read.
     lost: Option<u64>,
+}
+
+/// A command that a unit's stream took, and what the unit did then.
+#[derive(Debug)]
+pub(crate) struct TakenCommand {
+    pub(crate) command: String,
+    pub(crate) state_after: String,
+}
+
+impl TakenCommand {
+    /// `None` for what is done to a unit's calibration, and for what a pre-launch calibration came to.
+    fn of(record: &CommandRecord) -> Option<Self> {
+        let other = matches!(record.order, Some(Order::Rollback { .. } | Order::Forget));
+        let taken = !other && record.command != PRE_LAUNCH_ENDED;
+        let CommandRecord { command, state_after, .. } = record;
+        taken.then(|| Self { command: command.clone(), state_after: state_after.clone() })
+    }
 }
 
 impl Default for Index {
@@ -127,7 +148,9 @@ impl Index {
                     // Its numbers are not given again.
                     *of_unit = OfUnit { highest_revision: of_unit.highest_revision, ..OfUnit::default() };
                 } else {
-                    self.units.entry(unit).or_default().intent.note(record);
+                    let of_unit = self.units.entry(unit).or_default();
+                    of_unit.intent.note(record);
+                    of_unit.command = TakenCommand::of(record).or_else(|| of_unit.command.take());
                 }
             }
             AuditEvent::CarriedFile(carried) => {
@@ -175,6 +198,11 @@ impl Index {
     /// What an operator wants of a unit.
     pub(super) fn intent(&self, unit: &UnitId) -> Option<&Intent> {
         self.units.get(unit).map(|of_unit| &of_unit.intent)
+    }
+
+    /// The last command that a unit's stream took, as far as it stands in this audit file.
+    pub(super) fn command(&self, unit: &UnitId) -> Option<&TakenCommand> {
+        self.units.get(unit)?.command.as_ref()
     }
 
     /// The units that were ever given a calibration or a command.

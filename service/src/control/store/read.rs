@@ -1,9 +1,8 @@
 //! What is read back: what holds by the entries so far, documents, the newest entries; and audit files line by line, whatever is
 //! in them.
 
-use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use isotherm_document::file::check_regular;
@@ -11,6 +10,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEntry, GoodSet, Intent, MAX_LINE_BYTES};
 use isotherm_protocol::key::UnitId;
 
+use super::index::TakenCommand;
 use super::{Journal, Store, StoreError};
 
 impl Store {
@@ -58,6 +58,11 @@ impl Store {
     #[must_use]
     pub fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
         self.index.previous(unit)
+    }
+
+    /// The last command that a unit's stream took, as far as it stands in this audit file.
+    pub(crate) fn last_command(&self, unit: &UnitId) -> Option<&TakenCommand> {
+        self.index.command(unit)
     }
 
     /// The good set of a revision.
@@ -109,33 +114,64 @@ impl Store {
     }
 
     /// The newest entries of a unit, or of all, the oldest of them first: at most `limit`, and no more than 10 000. They are
-    /// read from the audit file and the full one before it; carried-over entries are left out where that one is there.
+    /// read from the audit file, from its end, and the full one before it; carried-over entries are left out where that one is there.
     ///
     /// # Errors
     /// [`StoreError::Read`].
     pub fn history(&self, unit: Option<&UnitId>, limit: usize) -> Result<Vec<AuditEntry>, StoreError> {
-        let limit = limit.min(MAX_ENTRIES);
+        self.history_after(0, unit, limit)
+    }
+
+    /// The same of those with a higher number alone.
+    ///
+    /// # Errors
+    /// [`StoreError::Read`].
+    pub(crate) fn history_after(
+        &self,
+        after: u64,
+        unit: Option<&UnitId>,
+        limit: usize,
+    ) -> Result<Vec<AuditEntry>, StoreError> {
+        let mut newest = Newest::new(unit, limit.min(MAX_ENTRIES), after);
         match &self.journal {
             Journal::Folder { log, .. } => {
                 let (before, current) = log.files()?;
-                let mut newest = newest_in(current, unit, limit, before.is_none())?;
-                if let Some(before) = before.filter(|_| newest.len() < limit) {
-                    let mut older = newest_in(&before, unit, limit - newest.len(), false)?;
-                    older.append(&mut newest);
-                    newest = older;
+                if !newest.read(current, before.is_none())?
+                    && let Some(before) = before
+                {
+                    newest.read(&before, false)?;
                 }
-                Ok(newest)
+                newest.entries.reverse();
+                Ok(newest.entries)
             }
             Journal::Memory(recent) => {
                 let of_unit = |entry: &&AuditEntry| {
                     unit.is_none_or(|unit| entry.unit.as_deref() == Some(unit.as_str()))
                 };
-                let mut newest: Vec<_> = recent.iter().rev().filter(of_unit).take(limit).cloned().collect();
+                let recent = recent.iter().rev().take_while(|entry| entry.number > after);
+                let mut newest: Vec<_> = recent.filter(of_unit).take(limit).cloned().collect();
                 newest.reverse();
                 Ok(newest)
             }
         }
     }
+
+    /// Whether an entry of a unit is written down, under whatever number.
+    ///
+    /// # Errors
+    /// [`StoreError::Read`].
+    pub(crate) fn has_written(&mut self, unit: &UnitId, entry: &AuditEntry) -> Result<bool, StoreError> {
+        if !self.written.contains_key(unit) {
+            let entries = self.history(Some(unit), MAX_ENTRIES)?;
+            self.written.insert(unit.clone(), entries.iter().map(likeness).collect());
+        }
+        Ok(self.written.get(unit).is_some_and(|written| written.contains(&likeness(entry))))
+    }
+}
+
+/// What an entry has in common with its copies in the audit files of other instances.
+pub(super) fn likeness(entry: &AuditEntry) -> Digest {
+    Digest::of(&serde_json::to_vec(&(&entry.time, &entry.by, &entry.event)).unwrap_or_default())
 }
 
 /// Where the lines of a file end.
@@ -211,33 +247,124 @@ const MAX_ENTRIES: usize = 10_000;
 /// Within how many bytes of a line its unit, author and event are named.
 const MAX_HEAD: usize = 512;
 
-/// The newest `limit` entries of a file, of one unit or of all, the oldest of them first. Damaged lines are skipped: they
-/// were told when the file was opened.
-fn newest_in(
-    path: &Path,
-    unit: Option<&UnitId>,
+/// Bytes of a file that are read at once, from its end.
+const BLOCK: usize = 1 << 16;
+
+/// Collects the newest entries of one unit or of all.
+struct Newest {
+    /// What a line of the unit has in it.
+    mark: Option<String>,
     limit: usize,
-    carried: bool,
-) -> Result<Vec<AuditEntry>, StoreError> {
-    // Cheaper than JSON: most lines of a large file are another unit's, or too old.
-    let mark = unit.map(|unit| format!("\"unit\":\"{unit}\""));
-    let mut newest: VecDeque<Vec<u8>> = VecDeque::new();
-    let read = lines(path, |Line { bytes: line, .. }| {
-        let of_unit = mark.as_ref().is_none_or(|mark| contains(line, mark));
-        let wanted = of_unit && (carried || !contains(line, "\"event\":\"carried-"));
-        if wanted && AuditEntry::is_whole(line) {
-            newest.push_back(line.to_vec());
-            if newest.len() > limit {
-                newest.pop_front();
+    after: u64,
+    /// The newest first.
+    entries: Vec<AuditEntry>,
+}
+
+impl Newest {
+    fn new(unit: Option<&UnitId>, limit: usize, after: u64) -> Self {
+        Self { mark: unit.map(|unit| format!("\"unit\":\"{unit}\"")), limit, after, entries: Vec::new() }
+    }
+
+    /// Reads a file from its end; whether nothing older is wanted. Damaged lines are skipped: they were told when the file was
+    /// opened.
+    fn read(&mut self, path: &Path, carried: bool) -> Result<bool, StoreError> {
+        let mut done = self.entries.len() >= self.limit;
+        let read = lines_from_end(path, |line| {
+            // Cheaper than JSON: most lines of a large file are another unit's.
+            let of_unit = self.mark.as_ref().is_none_or(|mark| contains(line, mark));
+            let wanted = of_unit && (carried || !contains(line, "\"event\":\"carried-"));
+            if let Some(entry) = wanted.then(|| AuditEntry::from_line(line).ok()).flatten() {
+                done = entry.number <= self.after;
+                if !done {
+                    self.entries.push(entry);
+                    done = self.entries.len() >= self.limit;
+                }
             }
+            !done
+        });
+        read.map_err(StoreError::read(path))?;
+        Ok(done)
+    }
+}
+
+/// Calls `visit` with each line that has a line feed, the last one first, for as long as it says so. One that is longer than any entry
+/// is left out.
+fn lines_from_end(path: &Path, mut visit: impl FnMut(&[u8]) -> bool) -> io::Result<()> {
+    check_regular(path)?;
+    let mut file = File::open(path)?;
+    let mut at = file.seek(SeekFrom::End(0))?;
+    // What stands behind the last line feed is no line.
+    let (mut rest, mut skips): (Vec<u8>, bool) = (Vec::new(), true);
+    while at > 0 {
+        let length = at.min(BLOCK as u64);
+        at -= length;
+        file.seek(SeekFrom::Start(at))?;
+        let mut block = Vec::new();
+        file.by_ref().take(length).read_to_end(&mut block)?;
+        block.append(&mut rest);
+        let mut end = block.len();
+        while let Some(feed) = block.get(..end).and_then(|block| block.iter().rposition(|it| *it == b'\n')) {
+            let line = block.get(feed + 1..end).unwrap_or_default();
+            if !std::mem::take(&mut skips) && !visit(line) {
+                return Ok(());
+            }
+            end = feed;
         }
-    });
-    read.map_err(StoreError::read(path))?;
-    Ok(newest.iter().filter_map(|line| AuditEntry::from_line(line).ok()).collect())
+        block.truncate(end);
+        rest = block;
+        if rest.len() > MAX_LINE_BYTES {
+            (rest, skips) = (Vec::new(), true);
+        }
+    }
+    if !skips {
+        visit(&rest);
+    }
+    Ok(())
 }
 
 /// Whether a line has this mark near its beginning, where unit and event stand. No other text of an entry can hold it: a
 /// quotation mark within a text has a backslash before it.
 fn contains(line: &[u8], mark: &str) -> bool {
     String::from_utf8_lossy(line.get(..MAX_HEAD).unwrap_or(line)).contains(mark)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_from_the_end_are_those_of_the_file_the_last_one_first() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines");
+        let overlong = "x".repeat(MAX_LINE_BYTES + 2 * BLOCK);
+        let long = "y".repeat(BLOCK);
+        for lines in [
+            vec![],
+            vec!["a", "", "b"],
+            vec![&long, "a", &long, "b"],
+            vec!["a", &overlong, "b", &long],
+            vec![&overlong, "b"],
+        ] {
+            for torn in ["", "torn", &long] {
+                let text: String = lines.iter().flat_map(|line| [line, "\n"]).collect();
+                std::fs::write(&path, text + torn).unwrap();
+                let mut read = Vec::new();
+                lines_from_end(&path, |line| {
+                    read.push(line.to_vec());
+                    true
+                })
+                .unwrap();
+                let kept = lines.iter().rev().filter(|line| line.len() <= MAX_LINE_BYTES);
+                let kept: Vec<_> = kept.map(|line| line.as_bytes().to_vec()).collect();
+                assert!(read == kept, "{} lines of {}", read.len(), lines.len());
+                let mut first = 0;
+                lines_from_end(&path, |_| {
+                    first += 1;
+                    false
+                })
+                .unwrap();
+                assert_eq!(first, kept.len().min(1));
+            }
+        }
+    }
 }

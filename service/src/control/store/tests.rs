@@ -171,6 +171,14 @@ fn a_full_audit_file_is_put_aside_and_what_holds_is_carried_over() {
     }
 
     let shown = store.history(Some(&one), 5).unwrap();
+    let after = shown[shown.len() - 2].number;
+    assert_eq!(store.history_after(after, Some(&one), 5).unwrap(), shown[shown.len() - 1..]);
+    assert_eq!(store.history_after(u64::MAX, Some(&one), 5).unwrap(), []);
+    // A copy of it has a number of its own.
+    let copy = AuditEntry { number: 7_000, ..shown[0].clone() };
+    assert!(store.has_written(&one, &copy).unwrap());
+    let other = AuditEntry { by: "somebody else".to_owned(), ..copy };
+    assert!(!store.has_written(&one, &other).unwrap());
     let names: Vec<_> = shown.iter().map(|entry| entry.event.name()).collect();
     assert_eq!(names, ["accepted", "accepted", "accepted", "accepted", "withdrawn"]);
     // In the second round none of it stands in the two files that are read any more, but for what was carried over.
@@ -404,4 +412,27 @@ fn old_audit_files_and_documents_that_nothing_goes_back_to_are_removed() {
     drop(store);
     let (store, opened) = Store::open(folder.path()).unwrap();
     assert_eq!((store.last_good(&one).unwrap().revision, opened.warnings().count()), (1, 0));
+}
+
+/// What another instance says its stream was ordered is compared with it.
+#[test]
+fn the_last_command_of_a_stream_is_no_rollback_and_no_end_of_a_calibration() {
+    let (mut store, one) = (Store::in_memory(), unit("ZLG-1"));
+    assert!(store.last_command(&one).is_none());
+    let rollback = CommandRecord {
+        command: "rollback".to_owned(),
+        accepted: true,
+        reason: None,
+        state_before: "standby".to_owned(),
+        state_after: "standby".to_owned(),
+        last_sequence: None,
+        order: Some(Order::Rollback { revision: None, dry_run: false }),
+    };
+    let events = [command("run"), AuditEvent::Command(rollback), command("pre-launch ended")];
+    for event in events {
+        store.append(at(1), Some(&one), "", event).unwrap();
+        assert_eq!(store.last_command(&one).unwrap().command, "run");
+    }
+    store.append(at(2), Some(&one), "", command("standby")).unwrap();
+    assert_eq!(store.last_command(&one).unwrap().command, "standby");
 }

@@ -9,7 +9,9 @@ mod unit;
 
 use std::fmt;
 
-use super::page::{Samples, Type};
+use prometheus_client::encoding::{MetricEncoder, NoLabelSet};
+pub(super) use prometheus_client::metrics::MetricType as Type;
+
 use super::source::{Look, UnitLook};
 
 /// A metric, and all its samples.
@@ -21,7 +23,7 @@ pub(super) struct Family {
     pub(super) unit: &'static str,
     /// Type.
     pub(super) kind: Type,
-    /// Names of its labels.
+    /// Names of its labels, but for that of the unit.
     pub(super) labels: &'static [&'static str],
     /// What it says.
     pub(super) help: &'static str,
@@ -31,57 +33,116 @@ pub(super) struct Family {
 /// What its samples are of.
 #[derive(Debug, Clone, Copy)]
 enum Source {
-    Service(OfService),
-    /// Each unit by itself, with its serial.
-    Unit(OfUnit),
+    Service(fn(&Look) -> Vec<Sample<'_>>),
+    /// Each unit by itself; its serial is the first label.
+    Unit(fn(&UnitLook) -> Vec<Sample<'_>>),
 }
 
-type OfService = fn(&Look, &mut Samples<'_>) -> fmt::Result;
-type OfUnit = fn(&str, &UnitLook, &mut Samples<'_>) -> fmt::Result;
+/// One value of a metric.
+#[derive(Debug)]
+pub(super) struct Sample<'l> {
+    /// Values of the labels, in their order.
+    pub(super) labels: Vec<&'l str>,
+    pub(super) value: Value,
+}
 
-type Text = &'static str;
-/// Name and unit of measure, as in [`Family`].
-type Name = (Text, Text);
-type Labels = &'static [Text];
+#[derive(Debug)]
+pub(super) enum Value {
+    /// A number of things, or 1 for yes and 0 for no.
+    Whole(u64),
+    /// A quantity; what is no finite number is left out.
+    Number(f64),
+    /// Sum and number of what was counted, upper bounds with the counts from one to the next.
+    Histogram(f64, u64, Vec<(f64, u64)>),
+}
 
-impl Family {
-    /// A gauge of the service.
-    const fn gauge((name, unit): Name, labels: Labels, help: Text, samples: OfService) -> Self {
-        Self { name, unit, kind: Type::Gauge, labels, help, source: Source::Service(samples) }
-    }
-
-    /// A counter of the service.
-    const fn counter((name, unit): Name, labels: Labels, help: Text, samples: OfService) -> Self {
-        Self { kind: Type::Counter, ..Self::gauge((name, unit), labels, help, samples) }
-    }
-
-    /// A gauge of each unit.
-    const fn unit_gauge((name, unit): Name, labels: Labels, help: Text, samples: OfUnit) -> Self {
-        Self { name, unit, kind: Type::Gauge, labels, help, source: Source::Unit(samples) }
-    }
-
-    /// A counter of each unit.
-    const fn unit_counter((name, unit): Name, labels: Labels, help: Text, samples: OfUnit) -> Self {
-        Self { kind: Type::Counter, ..Self::unit_gauge((name, unit), labels, help, samples) }
-    }
-
-    /// A histogram of each unit.
-    const fn unit_histogram((name, unit): Name, labels: Labels, help: Text, samples: OfUnit) -> Self {
-        Self { kind: Type::Histogram, ..Self::unit_gauge((name, unit), labels, help, samples) }
-    }
-
-    /// Gives its samples.
-    pub(super) fn give(&self, look: &Look, out: &mut Samples<'_>) -> fmt::Result {
-        match self.source {
-            Source::Service(samples) => samples(look, out),
-            Source::Unit(samples) => {
-                look.units.iter().try_for_each(|unit| samples(&unit.status.unit, unit, out))
+impl Value {
+    pub(super) fn encode(&self, kind: Type, encoder: &mut MetricEncoder<'_>) -> fmt::Result {
+        match (self, kind) {
+            (Self::Whole(value), Type::Counter) => encoder.encode_counter::<NoLabelSet, _, f64>(value, None),
+            (Self::Whole(value), _) => encoder.encode_gauge(value),
+            (Self::Number(value), _) => encoder.encode_gauge(value),
+            (Self::Histogram(sum, count, buckets), _) => {
+                encoder.encode_histogram::<NoLabelSet>(*sum, *count, buckets, None)
             }
         }
     }
 }
 
-/// Every metric, in the order of the page.
+impl From<u64> for Value {
+    fn from(count: u64) -> Self {
+        Self::Whole(count)
+    }
+}
+
+impl From<bool> for Value {
+    fn from(flag: bool) -> Self {
+        Self::Whole(flag.into())
+    }
+}
+
+impl From<f64> for Value {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+/// A metric without labels of its own, or none where nothing is known.
+fn known<'l>(value: Option<impl Into<Value>>) -> Vec<Sample<'l>> {
+    value.into_iter().map(|value| Sample { labels: Vec::new(), value: value.into() }).collect()
+}
+
+/// A metric without labels of its own.
+fn one<'l>(value: impl Into<Value>) -> Vec<Sample<'l>> {
+    known(Some(value))
+}
+
+/// A value for each value of a label.
+fn each<'l, V: Into<Value>>(values: impl IntoIterator<Item = (&'l str, V)>) -> Vec<Sample<'l>> {
+    values.into_iter().map(|(label, value)| Sample { labels: vec![label], value: value.into() }).collect()
+}
+
+/// Metrics as a table: type, name, unit of measure, labels, what it says, and the samples.
+macro_rules! families {
+    ($of:ident $prefix:literal: $($kind:ident $name:literal $unit:literal [$($label:literal),*] $help:literal
+        |$look:ident| $samples:expr;)+) => {
+        pub(super) const FAMILIES: &[Family] = &[$(Family {
+            name: concat!($prefix, $name),
+            unit: $unit,
+            kind: Type::$kind,
+            labels: &[$($label),*],
+            help: $help,
+            source: Source::$of(|$look| $samples),
+        },)+];
+    };
+}
+use families;
+
+impl Family {
+    /// Names of all labels, in their order.
+    pub(super) fn label_names(&self) -> impl Iterator<Item = &'static str> {
+        let unit = matches!(self.source, Source::Unit(_)).then_some("unit");
+        unit.into_iter().chain(self.labels.iter().copied())
+    }
+
+    /// Its samples in a look.
+    pub(super) fn samples<'l>(&self, look: &'l Look) -> Vec<Sample<'l>> {
+        match self.source {
+            Source::Service(samples) => samples(look),
+            Source::Unit(samples) => {
+                let of_unit = |unit: &'l UnitLook| {
+                    samples(unit).into_iter().map(|mut sample| {
+                        sample.labels.insert(0, unit.status.unit.as_str());
+                        sample
+                    })
+                };
+                look.units.iter().flat_map(of_unit).collect()
+            }
+        }
+    }
+}
+
+/// All of them.
 pub(super) fn all() -> impl Iterator<Item = &'static Family> {
     service::FAMILIES.iter().chain(unit::FAMILIES).chain(counters::FAMILIES)
 }

@@ -1,9 +1,13 @@
+use std::time::Duration;
+
 use isotherm_correction::sample::{GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::document::Document;
+use isotherm_protocol::raw::GyroBatch;
 
 use super::*;
+use crate::receive::unit::Outlet;
 
 fn gyro_frame(sequence: u64) -> Vec<u8> {
     let tick = GyroTick {

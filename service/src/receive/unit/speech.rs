@@ -31,7 +31,7 @@ const MUTUAL: Duration = Duration::from_millis(100);
 /// How the instance stands to the others, as a unit needs to know it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Standing {
-    /// How late the other's output may be.
+    /// How long the other may be silent.
     pub(crate) takeover: Duration,
     /// Whether corrected ticks go out while another instance speaks, too.
     pub(crate) active: bool,
@@ -105,7 +105,7 @@ impl UnitActor {
         }
         self.speech.doubled = None;
         self.speech.memory_due = false;
-        self.speech.following = Some(Box::new(Following::new(self.stream.id().clone(), now, footing)));
+        self.speech.following = Some(Box::new(Following::new(&self.stream, now, footing)));
         self.status_due = true;
     }
 
@@ -161,7 +161,7 @@ impl UnitActor {
         let Some(following) = &mut self.speech.following else { return };
         let ns = following.ns(now);
         let had_joined = following.follower.has_joined();
-        let (rebuilt, stuck) = following.follower.advance(&self.stream, ns);
+        let (rebuilt, stuck) = following.follower.advance(&self.stream, following.kept.made(), ns);
         if stuck {
             following.lose();
         }
@@ -169,7 +169,8 @@ impl UnitActor {
         if !rebuilt.exact {
             tracing::debug!(unit = %self.stream.id(), "the last frame that the other instance received is unknown");
         }
-        following.kept.replace(rebuilt.frames, had_joined, now);
+        let before = had_joined.then_some(rebuilt.before);
+        following.kept.replace(rebuilt.frames, before, now);
         (following.isolated, following.intact) = (false, true);
         self.stream = rebuilt.stream;
         if !had_joined && following.follower.has_joined() {
@@ -250,7 +251,7 @@ impl UnitActor {
         let Following { mut kept, doubt, orders, follower, .. } = *following;
         // Of what an operator ordered nothing is lost with the instance that took it.
         if let Some(rebuilt) = follower.finish(&mut self.stream) {
-            kept.replace(rebuilt.frames, true, now);
+            kept.replace(rebuilt.frames, Some(rebuilt.before), now);
             self.stream = rebuilt.stream;
         }
         self.publish_kept(kept.due(now, overlap));

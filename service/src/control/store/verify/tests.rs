@@ -78,7 +78,6 @@ fn what_a_service_has_written_holds_over_restarts_and_full_files() {
     fs::remove_file(&full_files(folder.path()).unwrap()[0]).unwrap();
     let found = verified(&folder);
     assert!(found.holds && found.first > Some(1), "{found:?}");
-    assert!(found.to_string().contains("older files are gone"), "{found}");
     // One in the middle is missed.
     let file = full_files(folder.path()).unwrap().remove(2);
     fs::remove_file(file).unwrap();
@@ -94,7 +93,6 @@ fn a_file_of_before_is_read_and_its_end_is_where_the_chain_begins() {
     write(&folder, &old);
     let found = verified(&folder);
     assert!(found.holds && found.begins.is_none() && found.head.is_none(), "{found:?}");
-    assert!(found.to_string().contains("no entry has a digest"), "{found}");
     let (mut store, opened) = Store::open(folder.path()).unwrap();
     assert_eq!((opened.entries, opened.warnings().count(), opened.losses().count()), (5, 0, 0));
     run(&mut store, 3);
@@ -102,7 +100,6 @@ fn a_file_of_before_is_read_and_its_end_is_where_the_chain_begins() {
     let found = verified(&folder);
     assert!(found.holds, "{:?}", found.breaks);
     assert_eq!((found.entries, found.first, found.begins), (8, Some(1), Some(6)));
-    assert!(found.to_string().contains("entries before 6 have no digest"), "{found}");
     // It covers the last line of before.
     let mut changed = lines(&folder);
     let entry = AuditEntry { by: "eve".to_owned(), ..AuditEntry::from_line(old[4].as_bytes()).unwrap() };
@@ -151,9 +148,9 @@ fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
     let behind = Fault::Behind { last: 4 }.to_string();
     assert!(places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2 == behind, "{exchanged:?}");
     let inserted = with(&|lines| lines.insert(3, bare(&lines[3])));
-    assert!(places(&inserted) == [(4, 4)] && inserted[0].2.contains("has no digest"), "{inserted:?}");
+    assert_eq!(places(&inserted), [(4, 4)], "{inserted:?}");
     let cut = with(&|lines| lines.truncate(4));
-    assert!(places(&cut) == [(4, 4)] && cut[0].2.contains("entries 5 to 6 are missing behind it"), "{cut:?}");
+    assert!(places(&cut) == [(4, 4)] && cut[0].2.contains("5 to 6"), "{cut:?}");
 }
 
 #[test]
@@ -229,7 +226,7 @@ fn files_that_others_take_away_are_missed() {
     fs::remove_file(folder.path().join(NAME)).unwrap();
     run(&mut store, 1);
     let found = verified(&folder);
-    assert!(found.first > Some(1) && found.to_string().contains("older files are gone"), "{found}");
+    assert!(found.first > Some(1), "{found}");
     drop(store);
     // While no service runs: the number tells.
     fs::write(folder.path().join(NAME), "").unwrap();

@@ -1,17 +1,13 @@
-//! A metric for each counter of a unit, under the counter's own name (`docs/wire.md`).
+//! Counters of a unit, in the words of `docs/wire.md`.
 
-use super::Family;
+use super::{Family, Source, Type, one};
 
-/// Declares the metric of each counter.
+/// Declares the metrics, each by the name that its counter has in a status.
 macro_rules! counters {
     ($($name:literal: $help:literal,)+) => {
-        /// All of them.
-        pub(super) const FAMILIES: &[Family] = &[$(Family::unit_counter(
-            (concat!("isotherm_unit_", $name), ""),
-            &["unit"],
-            $help,
-            |unit, look, out| out.counter(&[unit], look.status.counter($name)),
-        ),)+];
+        super::families! { Unit "isotherm_unit_":
+            $(Counter $name "" [] $help |look| one(look.status.counter($name));)+
+        }
     };
 }
 

@@ -5,7 +5,6 @@ use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 
-use super::super::page::Type;
 use super::*;
 use crate::receive::fault::FaultKind;
 
@@ -13,14 +12,13 @@ impl Family {
     /// As it stands on the page.
     fn whole_name(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!("_{}", self.unit) };
-        let total = if self.kind == Type::Counter { "_total" } else { "" };
+        let total = if matches!(self.kind, Type::Counter) { "_total" } else { "" };
         format!("{}{unit}{total}", self.name)
     }
 
     /// An item of the list, with the labels that not every metric of a unit has.
     fn item(&self) -> String {
-        let labels = self.labels.iter().filter(|label| **label != "unit");
-        let labels: Vec<_> = labels.map(|label| format!("`{label}`")).collect();
+        let labels: Vec<_> = self.labels.iter().map(|label| format!("`{label}`")).collect();
         let labels = if labels.is_empty() { String::new() } else { format!(" ({})", labels.join(", ")) };
         format!("- `{}`{labels}: {}\n", self.whole_name(), self.help)
     }

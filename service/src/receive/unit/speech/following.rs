@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
-use isotherm_protocol::key::UnitId;
 use isotherm_protocol::replay::Follower;
 use isotherm_protocol::stream::UnitStream;
 
@@ -40,9 +39,9 @@ pub(super) struct Following {
 
 impl Following {
     /// One that begins at a time, with the stream as it is.
-    pub(super) fn new(unit: UnitId, now: Instant, footing: Footing) -> Self {
+    pub(super) fn new(stream: &UnitStream, now: Instant, footing: Footing) -> Self {
         Self {
-            follower: Follower::new(unit),
+            follower: Follower::new(stream.id().clone(), stream.heard()),
             since: now,
             kept: Kept::default(),
             asked: None,

@@ -3,10 +3,12 @@
 use std::time::{Duration, Instant};
 
 use isotherm_correction::operation::State;
+use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::raw::GyroBatch;
+use isotherm_protocol::stream::UnitStream;
 
 use super::{Alarm, Footing, Standing};
 use crate::control::Notice;
@@ -90,7 +92,8 @@ impl UnitActor {
     pub(crate) fn hear_journal(&mut self, entry: JournalEntry, now: Instant, standing: &Standing) {
         // Another instance speaks too, and goes before this one.
         if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
-            self.follow(now, Footing::All);
+            let footing = if self.does_as(&entry.event) { Footing::All } else { Footing::Nothing };
+            self.follow(now, footing);
         }
         let Some(following) = &mut self.speech.following else {
             self.adopt(entry);
@@ -102,6 +105,9 @@ impl UnitActor {
             JournalEvent::Changed { .. } | JournalEvent::Commanded { accepted: true, .. }
         );
         let order = order.then(|| entry.clone());
+        // It publishes what it has made until its memory has come, should the other be gone by then.
+        let at_once =
+            following.intact && !following.follower.has_joined() && !following.follower.has_memory();
         let documents = match &entry.event {
             JournalEvent::Memory { document, pending, .. } => Some([document, pending].map(Clone::clone)),
             _ => None,
@@ -111,10 +117,22 @@ impl UnitActor {
                 following.documents = documents.into_iter().flatten().collect();
             }
             if let Some(order) = order {
+                // With the memory it is done once more, in its place.
+                let done = at_once && self.stream.carry_out(&order.event).is_ok();
                 following.note_order(order);
+                if done {
+                    self.look();
+                }
             }
         }
         self.catch_up(now);
+    }
+
+    /// Whether the unit is in the state that another instance's memory says it is in. Where it is not, that instance may be silent
+    /// on purpose: nothing is said in its place before its memory is taken.
+    fn does_as(&self, memory: &JournalEvent) -> bool {
+        let mut other = UnitStream::new(self.stream.id().clone(), UnitSettings::default());
+        other.carry_out(memory).is_ok() && other.unit().state() == self.stream.unit().state()
     }
 
     /// Another instance that spoke too took an order: it holds here, as this one goes on.
@@ -130,13 +148,14 @@ impl UnitActor {
         }
         let (unit, name, before) = (self.stream.id().clone(), entry.event.name(), self.stream.unit().state());
         if let Err(error) = self.stream.carry_out(&entry.event) {
-            tracing::warn!(%unit, instance = entry.instance, "{name} was done by another instance, not here: {error}");
+            tracing::warn!(%unit, instance = entry.instance, "an order of another instance ({name}) cannot be \
+                carried out here: {error}");
             return;
         }
         // A command that changed nothing is not told again, or two that speak would tell it to each other for ever.
         let is_change = matches!(entry.event, JournalEvent::Changed { .. });
         if is_change || self.stream.unit().state() != before {
-            tracing::info!(%unit, instance = entry.instance, "{name} was done by another instance, and here too");
+            tracing::info!(%unit, instance = entry.instance, "an order of another instance ({name}) holds here too");
             self.journal(|_| entry.event.clone());
             self.notices.push(Notice::Followed(Box::new(entry)));
         }

@@ -55,6 +55,8 @@ pub(super) struct Settled {
 #[derive(Debug, Default)]
 pub(super) struct Kept {
     frames: VecDeque<Frame>,
+    /// How many there were, those that are given up with them.
+    made: u64,
     heard: BTreeMap<Id, Heard>,
     last_heard: Option<Id>,
     /// When something was last heard, or else first computed.
@@ -70,6 +72,7 @@ impl Kept {
         let ids: Vec<_> = ticks.iter().map(id).collect();
         let heard = ids.iter().any(|id| self.was_heard(id));
         self.heard_at.get_or_insert(now);
+        self.made += 1;
         self.frames.push_back(Frame { bytes, ids, at: now, heard, out: false });
         if heard {
             self.frames.iter_mut().for_each(|frame| frame.heard = true);
@@ -96,18 +99,28 @@ impl Kept {
         }
     }
 
-    /// The stream has been taken back: these are the frames that it has made again. What it made before the place that it was taken back
-    /// to holds. Of a stream that had not joined, no frame does, and nothing that was heard until now is compared.
-    pub(super) fn replace(&mut self, frames: Vec<Vec<u8>>, had_joined: bool, now: Instant) {
+    /// How many frames were computed.
+    pub(super) fn made(&self) -> u64 {
+        self.made
+    }
+
+    /// The stream has been taken back: these are the frames that it has made again, and so many of those that it made before hold. Of a
+    /// stream that had not joined (`None`) no frame does, and nothing that was heard until now is compared.
+    pub(super) fn replace(&mut self, frames: Vec<Vec<u8>>, holds: Option<u64>, now: Instant) {
         let mut before = std::mem::take(&mut self.frames);
         let mut marks: BTreeMap<Id, (Instant, bool, bool)> = BTreeMap::new();
         for frame in &before {
             marks.extend(frame.ids.iter().map(|id| (*id, (frame.at, frame.heard, frame.out))));
         }
-        if !had_joined {
+        if holds.is_none() {
             self.since = Some(now);
         }
-        let oldest = before.front().and_then(|frame| frame.ids.first().copied());
+        if let Some(holds) = holds {
+            let given_up = usize::try_from(self.made.saturating_sub(holds)).unwrap_or(usize::MAX);
+            self.frames.extend(before.drain(..before.len().saturating_sub(given_up)));
+            self.made = holds + frames.len() as u64;
+        }
+        let oldest = marks.first_key_value().map(|(id, _)| *id);
         let mut again = VecDeque::new();
         for bytes in frames {
             let Ok(batch) = codec::decode::<CorrectedBatch>(&bytes) else { continue };
@@ -121,13 +134,6 @@ impl Kept {
             let heard = was_heard || ids.iter().any(|id| self.was_heard(id));
             again.push_back(Frame { bytes, ids, at, heard, out });
         }
-        if had_joined {
-            let first = again.front().and_then(|frame| frame.ids.first());
-            let place =
-                first.and_then(|first| before.iter().position(|frame| frame.ids.last() >= Some(first)));
-            before.truncate(place.unwrap_or(before.len()));
-            self.frames = before;
-        }
         self.frames.append(&mut again);
         let last = self.frames.iter().rposition(|frame| frame.heard);
         for frame in self.frames.iter_mut().take(last.unwrap_or(0)) {
@@ -135,17 +141,25 @@ impl Kept {
         }
     }
 
-    /// When the oldest frame that waits to be heard has waited for that long.
+    /// When nothing has been heard for that long while a frame waits to be heard: counted from what was last heard, as subscribers do,
+    /// where the frame has waited for three quarters of it by then.
     pub(super) fn late_at(&self, limit: Duration) -> Option<Instant> {
-        let waiting = self.frames.iter().rev().take_while(|frame| !frame.heard).last();
-        waiting.map(|frame| frame.at + limit)
+        let oldest = self.oldest_waiting()?;
+        let silent = self.heard_at.map_or(oldest.at, |heard_at| heard_at.min(oldest.at)) + limit;
+        Some(silent.max(oldest.at + limit * 3 / 4))
     }
 
-    /// Whether frames were computed and nothing was heard for that long.
+    /// Whether nothing was heard for that long, while a frame waited to be: where nothing is computed either, nothing is to be heard.
     pub(super) fn is_silent(&self, now: Instant, limit: Duration) -> bool {
-        let last = self.heard_at.or_else(|| self.frames.front().map(|frame| frame.at));
-        let computes = self.frames.back().is_some_and(|frame| !frame.heard);
-        computes && last.is_some_and(|last| now.saturating_duration_since(last) >= limit)
+        self.oldest_waiting().is_some_and(|oldest| {
+            let since = self.heard_at.map_or(oldest.at, |heard_at| heard_at.max(oldest.at));
+            now.saturating_duration_since(since) >= limit
+        })
+    }
+
+    /// The oldest frame that waits to be heard.
+    fn oldest_waiting(&self) -> Option<&Frame> {
+        self.frames.iter().rev().take_while(|frame| !frame.heard).last()
     }
 
     /// Compares what is old enough, where the stream is `in_step`, and gives it up.
@@ -282,28 +296,68 @@ mod tests {
             assert!(!kept.computed(frame(sequence), start));
         }
         kept.heard(batch(1), start);
-        kept.replace((2..6).map(frame).collect(), false, start);
+        kept.replace((2..6).map(frame).collect(), None, start);
         let late = start + TAKEOVER * 3;
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [2, 3, 4, 5]);
         // What the other says now it need not say again, nor does this one.
         kept.heard(batch(5), late);
-        kept.replace((2..7).map(frame).collect(), true, late);
+        kept.replace((2..7).map(frame).collect(), Some(kept.made() - 4), late);
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [6]);
         assert!(kept.due(late, TAKEOVER).is_empty());
+    }
+
+    #[test]
+    fn silence_counts_from_what_was_last_heard_if_the_next_tick_was_due_soon() {
+        let start = Instant::now();
+        // Time of the next tick behind what was heard, and of the takeover (ms).
+        for (next, late) in [(1, 20), (5, 20), (6, 21), (100, 115)] {
+            let mut kept = Kept::default();
+            kept.computed(frame(0), start);
+            kept.heard(batch(0), start);
+            assert_eq!(kept.late_at(TAKEOVER), None);
+            kept.computed(frame(1), start + Duration::from_millis(next));
+            assert_eq!(kept.late_at(TAKEOVER), Some(start + Duration::from_millis(late)));
+        }
+        // What is behind by itself is late no later for that.
+        let mut kept = Kept::default();
+        for sequence in 0..3 {
+            kept.computed(frame(sequence), start);
+        }
+        kept.heard(batch(0), start + Duration::from_millis(10));
+        assert_eq!(kept.late_at(TAKEOVER), Some(start + TAKEOVER));
+    }
+
+    #[test]
+    fn a_pause_of_the_producer_is_no_silence_of_the_other() {
+        let (mut kept, start) = (Kept::default(), Instant::now());
+        kept.computed(frame(0), start);
+        kept.heard(batch(0), start);
+        let next = start + Duration::from_secs(2);
+        kept.computed(frame(1), next);
+        let limit = Duration::from_millis(100);
+        assert!(!kept.is_silent(next + Duration::from_millis(5), limit));
+        assert!(kept.is_silent(next + limit, limit));
     }
 
     /// The stream's own memory may be younger than what waits.
     #[test]
     fn what_was_made_before_the_stream_was_taken_back_is_kept() {
         let start = Instant::now();
-        for (heard, again, due) in [(2, 5..7, 3..7), (4, 5..7, 5..7), (2, 7..7, 3..7), (2, 7..9, 3..9)] {
+        // The last one: what was made behind the place that it was taken back to is none of the stream's, as after a command to stand by.
+        for (heard, holds, again, due) in [
+            (2, 5, 5..7, 3..7),
+            (4, 5, 5..7, 5..7),
+            (2, 7, 7..7, 3..7),
+            (2, 7, 7..9, 3..9),
+            (2, 5, 5..5, 3..5),
+        ] {
             let mut kept = Kept { since: Some(start), ..Kept::default() };
             let late = start + LONGEST_WAIT;
             for sequence in 0..7 {
                 kept.computed(frame(sequence), late);
             }
             (0..=heard).for_each(|sequence| kept.heard(batch(sequence), late));
-            kept.replace(again.map(frame).collect(), true, late);
+            kept.replace(again.map(frame).collect(), Some(holds), late);
             let settled = kept.settle(late + SETTLED, true);
             assert_eq!((settled.compared, settled.differing), (heard + 1, 0));
             assert_eq!(sequences(&kept.due(late + SETTLED, Duration::ZERO)), due.collect::<Vec<_>>());

@@ -1,5 +1,7 @@
 //! Who has lost the other instance does not say what that one may contradict.
 
+use isotherm_protocol::journal::JournalEntry;
+
 use super::*;
 
 const TAKEOVER: Duration = Duration::from_millis(20);
@@ -107,4 +109,43 @@ fn of_two_that_speak_the_one_that_goes_before_goes_on() {
         actor.hear(&encode(&batch).unwrap(), now, &standing);
         assert_eq!(actor.speaks(), !yields);
     }
+}
+
+#[test]
+fn one_that_yields_to_an_instance_that_stands_by_says_nothing_in_its_place() {
+    for (command, speaks) in [(None, true), (Some(Command::Standby), false)] {
+        let (mut other, ..) = deserted();
+        other.journal_to(Journal { instance: "other".into(), outlet: Arc::new(|_, _| Ok(())) });
+        if let Some(command) = command {
+            other.command(&command).unwrap();
+        }
+        let (mut actor, sink, start) = deserted();
+        let standing = Standing { yields: true, alone_since: None, deserted: false, ..lost(start) };
+        actor.hear_journal(other.memory("other"), start + ms(20), &standing);
+        assert!(!actor.speaks());
+        give(&mut actor, 30..40, start + ms(20));
+        // By the clock of this machine: frames are kept with the time at which they were computed.
+        let late = Instant::now() + TAKEOVER * 2;
+        assert_eq!(
+            (actor.watch_speech(late, &standing).spoke, sink.sequences().len() > 30),
+            (speaks, speaks)
+        );
+    }
+}
+
+#[test]
+fn what_the_other_was_ordered_holds_for_one_that_has_just_yielded_too() {
+    let (mut actor, sink, start) = deserted();
+    let standing = Standing { alone_since: None, deserted: false, ..lost(start) };
+    actor.follow(start + ms(20), Footing::All);
+    give(&mut actor, 30..35, start + ms(20));
+    let command = Command::Standby;
+    let event = JournalEvent::Commanded { command, accepted: true, words: String::new() };
+    let (unit, instance) = (actor.id().to_string(), "other".to_owned());
+    let entry = JournalEntry { unit, instance, number: 7, heard: actor.stream.heard(), event };
+    actor.hear_journal(entry, start + ms(30), &standing);
+    give(&mut actor, 35..40, start + ms(40));
+    // By the clock of this machine: frames are kept with the time at which they were computed.
+    assert!(actor.watch_speech(Instant::now() + TAKEOVER * 2, &standing).spoke);
+    assert_eq!(sink.sequences(), (0..35).collect::<Vec<_>>());
 }
