@@ -14,7 +14,6 @@ use isotherm_log::diff::is_csv;
 use super::bar;
 use super::driver::emit;
 use super::files::PageArgs;
-use super::limits::within;
 use super::runs::{LogArgs, Reading};
 use super::units::Logs;
 use crate::document::Written;
@@ -24,6 +23,7 @@ use crate::fits::drift::columns::{Columns, Kind};
 use crate::fits::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::fits::impact::over_starts;
 use crate::fits::impact::scenario::Voyage;
+use crate::limits::within;
 use crate::report::short;
 use crate::runs::cut::Cut;
 
@@ -55,11 +55,10 @@ pub(super) struct ImpactArgs {
         value_name = "DEG_PER_H2",
         alias = "trend-deg-per-h2",
         allow_hyphen_values = true,
-        conflicts_with = "log"
-    )]
+        conflicts_with = "log", value_parser = within(-100.0, 100.0))]
     trend: Option<f64>,
     /// Constant that appears at departure, as after a shock (°/h)
-    #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
+    #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"], value_parser = within(-1000.0, 1000.0))]
     constant: Option<f64>,
     /// Gyro with the trend or the constant (default: each alone, with --seeds all at once)
     #[arg(long, value_enum)]
@@ -74,19 +73,19 @@ pub(super) struct ImpactArgs {
     #[arg(long, hide_short_help = true, value_name = "SEED", default_value_t = 1)]
     seed: u64,
     /// Latitude (°)
-    #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true, value_parser = within(-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG))]
     latitude: f64,
     /// Length of the voyage without position (h)
-    #[arg(long, value_name = "HOURS", default_value_t = 48.0)]
+    #[arg(long, value_name = "HOURS", default_value_t = 48.0, value_parser = within(0.5, MOST_HOURS))]
     hours: f64,
     /// Length of the calibration before it (h)
-    #[arg(long, value_name = "HOURS", default_value_t = 21.0)]
+    #[arg(long, value_name = "HOURS", default_value_t = 21.0, value_parser = within(0.5, MOST_HOURS))]
     calibration_hours: f64,
     /// Rate of the platform about the vertical (multiples of the Earth's)
-    #[arg(long, hide_short_help = true, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true, value_parser = within(-1000.0, 1000.0))]
     turn_ratio: f64,
     /// Standard error of the reference rate per minute (°/h)
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H", default_value_t = 0.001)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H", default_value_t = 0.001, value_parser = within(0.0, 1000.0))]
     reference_sigma: f64,
     /// No velocity log: level gyros are not observed during the voyage
     #[arg(long, hide_short_help = true)]
@@ -129,7 +128,7 @@ impl ImpactArgs {
         let mut parts = self.parts()?;
         let cut = Cut::default();
         let starts = self.starts(&mut parts, &cut)?;
-        let mut report = if !self.log.is_empty() {
+        let mut sailed = if !self.log.is_empty() {
             self.sail_log(&mut voyage, &parts, &cut)?
         } else if self.seeds.is_some()
             || (self.trend.is_none()
@@ -143,7 +142,8 @@ impl ImpactArgs {
             let words = "give a drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
-        report.notes.extend(starts);
+        sailed.notes.extend(starts);
+        let report = sailed.report();
         let files = self.page.files();
         files.page(Path::to_path_buf, || report.to_html())?;
         emit(files.json, || report.to_json(), || report.to_text())?;
@@ -152,15 +152,6 @@ impl ImpactArgs {
 
     /// Checks the numbers.
     fn voyage(&self) -> Result<Voyage, Error> {
-        within([
-            ("--latitude", Some(self.latitude), [-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG], ""),
-            ("--hours", Some(self.hours), [0.5, MOST_HOURS], ""),
-            ("--calibration-hours", Some(self.calibration_hours), [0.5, MOST_HOURS], ""),
-            ("--turn-ratio", Some(self.turn_ratio), [-1000.0, 1000.0], ""),
-            ("--reference-sigma", Some(self.reference_sigma), [0.0, 1000.0], ""),
-            ("--trend", self.trend, [-100.0, 100.0], ""),
-            ("--constant", self.constant, [-1000.0, 1000.0], ""),
-        ])?;
         if self.gyro.is_some() && self.trend.is_none() && self.constant.is_none() {
             let words = "--gyro needs --trend or --constant: it names the gyro that has them";
             return Err(Error::Usage(words.to_owned()));

@@ -17,7 +17,7 @@ use crate::axes::{main_axis, output_name};
 use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::{median, real};
-use crate::report::{Curve as Residual, FitReport, Rest, judge};
+use crate::report::{Curve as Residual, Report, Rest, judge};
 use crate::runs::table::{Rows, Takes};
 use crate::runs::{Run, Watch};
 
@@ -253,7 +253,7 @@ impl Made {
     }
 
     /// The report.
-    pub fn report(&self) -> FitReport {
+    pub fn report(&self) -> Report {
         super::report::report(self)
     }
 }

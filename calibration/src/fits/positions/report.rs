@@ -14,7 +14,7 @@ use super::solve::Fit;
 use crate::axes::AXES;
 use crate::document::accelerometers;
 use crate::report::{
-    Coefficient, Curve, Figure, FitReport, Verdict, counted, fixed, output_unit, per_deg_c, short, six,
+    Coefficient, Curve, Figure, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six,
 };
 
 /// A set of judged positions with the names of its runs.
@@ -33,9 +33,9 @@ pub fn report(
     settings: &Settings,
     inside: Set<'_>,
     outside: Option<Set<'_>>,
-) -> FitReport {
+) -> Report {
     let mut report =
-        FitReport::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
+        Report::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
     report.residuals = curves(inside.judged, inside.runs, Sample::In);
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
@@ -187,12 +187,9 @@ fn coefficients(
                 let factor = by_power(power) * ARCSEC_PER_RAD;
                 let sigma = fit.axis_sigma(&settings.plan, index, power);
                 for i in across(sensor.axis[0]) {
-                    all.push(Coefficient::new(
-                        format!("accelerometer {name} C{power}{what} along {}", AXES[i]),
-                        per_deg_c("″", power),
-                        row[i] * factor,
-                        Some(sigma[i] * factor * analysis.widened),
-                    ));
+                    let name = format!("accelerometer {name} C{power}{what} along {}", AXES[i]);
+                    let sigma = sigma[i] * factor * analysis.widened;
+                    all.push(Coefficient::new(name, per_deg_c("″", power), row[i] * factor, Some(sigma)));
                 }
             }
         }

@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
 use crate::numbers::{Size, hull, median};
-use crate::report::{Figure, FitReport, Verdict, of_logs};
+use crate::report::{Figure, Report, Verdict, of_logs};
 use crate::runs::{Run, Watch};
 
 /// Rounds in which the Earth's turning and the fit settle.
@@ -293,7 +293,7 @@ impl Made {
     }
 
     /// The report.
-    pub fn report(&self) -> FitReport {
+    pub fn report(&self) -> Report {
         super::report::report(self)
     }
 }

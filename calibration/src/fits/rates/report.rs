@@ -10,7 +10,7 @@ use super::over_temperature::OverTemperature;
 use crate::axes::{AXES, main_axis};
 use crate::finding::Kind;
 use crate::numbers::dot;
-use crate::report::{Coefficient, FitReport, counted, fixed, gyros, per_deg_c, short, together};
+use crate::report::{Report, counted, fixed, gyros, per_deg_c, short, together};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
@@ -20,10 +20,10 @@ const SEEN: f64 = 4.0;
 const OTHER_WEIGHT: f64 = 0.1;
 
 /// The report.
-pub(super) fn report(made: &Made) -> FitReport {
+pub(super) fn report(made: &Made) -> Report {
     let document = &made.written.document;
     let mut report =
-        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
+        Report::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
             .counting("steps");
     report.verdicts.clone_from(&made.verdicts);
     report.warnings.extend(made.warnings.iter().map(ToString::to_string));
@@ -78,7 +78,7 @@ pub(super) fn report(made: &Made) -> FitReport {
 }
 
 /// Slopes of axes and scale factors, with the figure beside the accelerometers.
-fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport) {
+fn over_temperature(made: &Made, over: &OverTemperature, report: &mut Report) {
     let document = &made.written.document;
     report.notes.push(format!(
         "Axes and scale factors at {} temperatures; weights, axes and linearity are those at {} °C.",
@@ -87,12 +87,7 @@ fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport)
     ));
     for (sensor, line) in document.gyro.sensor.iter().zip(&over.lines) {
         let mut add = |what: String, unit: String, value: f64, sigma: f64| {
-            report.coefficients.push(Coefficient::new(
-                format!("gyro {} {what}", sensor.name),
-                unit,
-                value,
-                Some(sigma),
-            ));
+            report.coefficient(format!("gyro {} {what}", sensor.name), unit, value, sigma);
         };
         for (power, (value, sigma)) in line.scale_ppm.iter().zip(&line.scale_sigma_ppm).enumerate() {
             add(
@@ -139,11 +134,11 @@ fn judged(made: &Made) -> Table {
     Table::of(head, made.judged.iter().map(row))
 }
 
-fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {
+fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut Report) {
     let [gain, sigma] = found.gain;
     let relative = sigma / gain.abs();
     let mut add = |what: &str, unit: &str, value: f64, sigma: f64| {
-        report.coefficients.push(Coefficient::new(format!("gyro {name} {what}"), unit, value, Some(sigma)));
+        report.coefficient(format!("gyro {name} {what}"), unit, value, sigma);
     };
     if let Some((weight, unit)) = weight {
         add("increment weight", unit, weight, relative * weight.abs());
@@ -206,7 +201,7 @@ fn widened(made: &Made) -> Option<String> {
     })
 }
 
-fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
+fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut Report) {
     let axis =
         found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
     let input = |step: usize| -> f64 { made.steps.get(step).map_or(0.0, |step| dot(step.rate, axis)) };

@@ -1,7 +1,6 @@
 //! What may be asked of a thermal fit.
 
 use clap::ValueEnum;
-use isotherm_protocol::document::Created;
 
 use super::stand::{Site, Stand};
 
@@ -57,8 +56,6 @@ pub struct Settings {
     pub window_s: Option<f64>,
     /// Smoothing of the temperature (s); `None` to search it.
     pub smoothing_s: Option<f64>,
-    /// Date that the document states; `None` for the base document's.
-    pub created: Option<Created>,
 }
 
 impl Default for Settings {
@@ -70,7 +67,6 @@ impl Default for Settings {
             fit_window_s: 10.0,
             window_s: None,
             smoothing_s: None,
-            created: None,
         }
     }
 }
