@@ -277,11 +277,11 @@ fn not_level(at_beginning: bool, force: Option<[f64; 3]>, troubles: &[String]) -
             format!("the mean force {of}is ({parts}) m/s²; it must be within 2 % of one g, x not vertical")
         },
     );
-    let troubles: String = troubles.iter().map(|trouble| format!("; {trouble}")).collect();
-    format!(
+    let what = format!(
         "the unit cannot be levelled{when}: {force}. Give --pitch and --roll{moment}, or correct the columns of the \
-         accelerometers in the mapping{troubles}"
-    )
+         accelerometers in the mapping"
+    );
+    [&[what], troubles].concat().join("; ")
 }
 
 fn in_rest(rest: Option<([f64; 2], usize)>, others: &[usize]) -> String {

@@ -11,7 +11,6 @@ use super::runs::LogArgs;
 use super::units::Logs;
 use crate::error::Error;
 use crate::limits::above_0;
-use crate::report::Report;
 use crate::validate::{JudgedLog, Wanted, validate};
 
 /// Judge a calibration document on logs that it was not made from

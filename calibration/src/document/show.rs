@@ -35,8 +35,8 @@ pub fn show(written: &Written) -> Result<Report, Error> {
     let tree = tree(document)?;
     let terms = terms(&tree);
     let range = range_of(&terms);
-    let title = format!("Calibration of unit {}", document.unit);
-    let mut sheet = Report::saying(title, name, about::words(document));
+    let heading = format!("Calibration of unit {}", document.unit);
+    let mut sheet = Report::saying(heading, name, about::words(document));
     sheet.notes = about::notes(document, &terms);
     sheet.warnings.extend(written.loaded.warnings.iter().map(ToString::to_string));
     about::tables(&mut sheet, document);

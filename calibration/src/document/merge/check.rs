@@ -14,37 +14,42 @@ use crate::error::Error;
 /// # Errors
 /// [`Error::Refused`].
 pub(super) fn same_unit(base: &Written, parts: &[Written]) -> Result<(), Error> {
-    let stated: [(&str, fn(&Document) -> Option<String>); 5] = [
-        ("unit", |document| Some(document.unit.clone())),
-        ("gyro.sensor", |document| Some(names(document.gyro.sensor.iter().map(|sensor| &sensor.name)))),
-        ("gyro.output", |document| {
-            let counts = document.gyro.output == GyroOutput::Counts;
-            Some(if counts { "counts" } else { "mean rate" }.to_owned())
-        }),
-        ("accel.sensor", |document| {
-            document.accel.as_ref().map(|accel| names(accel.sensor.iter().map(|sensor| &sensor.name)))
-        }),
-        ("accel.output", |document| {
-            let words = match document.accel.as_ref()?.output {
-                AccelOutput::Counts => "counts",
-                AccelOutput::Volts => "volts (V)",
-                AccelOutput::MetresPerSecondSquared => "specific force (m/s²)",
-            };
-            Some(words.to_owned())
-        }),
-    ];
     let mut reasons = Vec::new();
-    for (part, (key, of)) in parts.iter().flat_map(|part| stated.map(|stated| (part, stated))) {
-        if let (Some(here), Some(there)) = (of(&base.document), of(&part.document))
-            && here != there
-        {
-            reasons.push(format!(
-                "{key} is {here} in {} and {there} in {}: only documents of one unit with the same sensors can be merged",
-                base.name, part.name
-            ));
+    for part in parts {
+        for ((key, here), (_, there)) in stated(&base.document).into_iter().zip(stated(&part.document)) {
+            if let (Some(here), Some(there)) = (here, there)
+                && here != there
+            {
+                reasons.push(format!(
+                    "{key} is {here} in {} and {there} in {}: only documents of one unit with the same sensors can be \
+                     merged",
+                    base.name, part.name
+                ));
+            }
         }
     }
     if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
+}
+
+/// What documents of one unit have in common.
+fn stated(document: &Document) -> [(&'static str, Option<String>); 5] {
+    let accel = document.accel.as_ref();
+    let gyro_output = match document.gyro.output {
+        GyroOutput::Counts => "counts",
+        GyroOutput::Mean => "mean rate",
+    };
+    let accel_output = accel.map(|accel| match accel.output {
+        AccelOutput::Counts => "counts",
+        AccelOutput::Volts => "volts (V)",
+        AccelOutput::MetresPerSecondSquared => "specific force (m/s²)",
+    });
+    [
+        ("unit", Some(document.unit.clone())),
+        ("gyro.sensor", Some(names(document.gyro.sensor.iter().map(|sensor| &sensor.name)))),
+        ("gyro.output", Some(gyro_output.to_owned())),
+        ("accel.sensor", accel.map(|accel| names(accel.sensor.iter().map(|sensor| &sensor.name)))),
+        ("accel.output", accel_output.map(str::to_owned)),
+    ]
 }
 
 fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {

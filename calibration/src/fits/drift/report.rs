@@ -59,7 +59,7 @@ impl Found {
         report.tell(self.noise_words());
         let notes = self
             .stated()
-            .flat_map(|(name, found)| found.notes.iter().map(|note| format!("gyro {name}: {note}.")));
+            .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}.")));
         report.tell(notes.collect::<Vec<_>>());
         report.tell(self.line_words());
         report.summary = Some(self.summary());
@@ -329,7 +329,7 @@ impl Found {
             json!({ "tau_s": row.tau_s, "plain": plain, "overlapping": overlapping, "modified": modified })
         };
         let allan: Vec<Value> = sensor.allan.iter().map(deviations).collect();
-        let mut noise = serde_json::Map::new();
+        let mut noise = Map::new();
         for term in Term::ALL {
             let (factor, unit) = stated_in(term, self.kind);
             let value = match sensor.stated_noise().map(|noise| noise.of_term(term)) {
