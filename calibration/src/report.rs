@@ -189,7 +189,7 @@ impl Report {
     pub fn to_text(&self) -> String {
         let mut found = verdict::sentences(&self.verdicts);
         let summary = self.summary.as_ref().map(table).unwrap_or_default();
-        if found.len() + summary.lines().count() <= MOST_FOUND {
+        if self.unit.is_empty() || found.len() + summary.lines().count() <= MOST_FOUND {
             found.extend(summary.lines().map(str::to_owned));
         }
         let warnings: Vec<String> = self.warnings.iter().map(|words| format!("warning: {words}")).collect();
@@ -208,6 +208,9 @@ impl Report {
         let lines: Vec<String> = warnings.chain(self.notes.iter().cloned()).collect();
         if !lines.is_empty() {
             let _ = writeln!(text, "\n{}", lines.join("\n"));
+        }
+        if let Some(summary) = &self.summary {
+            let _ = writeln!(text, "\n{}", table(summary));
         }
         for (heading, rows) in &self.tables {
             let _ = writeln!(text, "\n{heading}\n{}", table(rows));

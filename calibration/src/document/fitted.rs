@@ -28,7 +28,7 @@ pub struct About {
     pub method: &'static str,
     /// Name of its table in `origin.details`.
     pub key: &'static str,
-    /// What that table has besides verdict, warnings and coefficients with their standard errors: an object.
+    /// What that table has besides verdict, warnings, notes and coefficients with their standard errors: an object.
     pub details: Value,
     /// Standard errors, as what compares documents reads them.
     pub sigmas: Sigmas,
@@ -50,7 +50,6 @@ impl About {
         report: &Report,
         created: Created,
     ) -> Result<Written, Error> {
-        let value = |of: Value| toml::Value::try_from(of).map_err(|error| Error::document(&error));
         let mut origin = origin(logs, &command_line())?;
         origin.method = Some(self.method.to_owned());
         origin.range_deg_c = self.range_deg_c;
@@ -62,22 +61,38 @@ impl About {
             // What the rest of the document rests on.
             let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
             let earlier = json!({ "tool": tool, "method": method, "log": before.log });
-            details.insert("before".to_owned(), value(earlier)?);
+            details.extend(kept(earlier).map(|earlier| ("before".to_owned(), earlier)));
         }
         let mut own = json!({
             "verdict": report.headline(),
             "warnings": report.warnings,
+            "notes": report.notes,
             "coefficients": report.coefficients_by_name(),
         });
         if let (Some(own), Some(more)) = (own.as_object_mut(), self.details.as_object()) {
             own.extend(more.clone());
         }
-        details.insert(self.key.to_owned(), value(own)?);
+        details.extend(kept(own).map(|own| (self.key.to_owned(), own)));
         self.sigmas.write(&mut details);
         origin.details = Some(details);
         document.origin = Some(origin);
         document.created = Some(created);
         Written::of(&document)
+    }
+}
+
+/// As a document keeps it, which has no null: what is not known is left out, and in a list it is no number.
+fn kept(value: Value) -> Option<toml::Value> {
+    match value {
+        Value::Null => None,
+        Value::Array(all) => {
+            Some(all.into_iter().map(|one| kept(one).unwrap_or(f64::NAN.into())).collect::<Vec<_>>().into())
+        }
+        Value::Object(all) => {
+            let known = all.into_iter().filter_map(|(key, one)| Some((key, kept(one)?)));
+            Some(toml::Value::Table(known.collect()))
+        }
+        other => toml::Value::try_from(other).ok(),
     }
 }
 

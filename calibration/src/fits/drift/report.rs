@@ -56,7 +56,7 @@ impl Found {
             self.length_h,
             if corrected { ", corrected and along the case axes" } else { ", raw readings" }
         ));
-        report.tell(self.noise_words());
+        report.warnings.extend(self.noise_words());
         let notes = self
             .stated()
             .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}.")));
