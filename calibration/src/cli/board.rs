@@ -1,7 +1,6 @@
 //! `isotherm-calibrate board`.
 
 use clap::{Arg, Args};
-use serde_json::json;
 
 use super::driver::{Job, Task};
 use super::output::OutputArgs;
@@ -74,10 +73,9 @@ impl BoardArgs {
         let about = About {
             method: "board ratio from cycles in two positions",
             key: "board",
-            details: json!({}),
             sigmas: made.sigmas(),
             range_deg_c: made.range_deg_c(),
-            rate_range_deg_c_per_s: None,
+            ..About::default()
         };
         Ok(Fitted { written: made.written, report: made.report, about })
     }

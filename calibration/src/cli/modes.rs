@@ -33,15 +33,8 @@ pub(super) struct ModesArgs {
     base: BaseArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Order of the static polynomial, 0…3 (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
-    static_order: Option<u8>,
-    /// Order of the magnetic polynomial, 0…3 (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
-    magnetic_order: Option<u8>,
-    /// Order of the slow meander, 0 or 1 (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=1))]
-    meander_order: Option<u8>,
+    #[command(flatten)]
+    asked: Asked,
     /// Ticks lost by a switch, 1…32 (default: found in the log)
     #[arg(long, hide_short_help = true, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_TRANSITION_TICKS)))]
     transition_ticks: Option<u8>,
@@ -73,23 +66,18 @@ impl ModesArgs {
     fn fit(&self, job: &Job<'_>, place: Option<Place>) -> Result<Fitted, Error> {
         let work = job.work;
         let base = work.base()?;
-        let order = |order: Option<u8>| order.map(usize::from);
         let made = make(
             &Wanted {
                 runs: &work.runs,
                 judge: &work.judges,
                 base: &base.document,
                 place,
-                asked: Asked {
-                    static_order: order(self.static_order),
-                    magnetic_order: order(self.magnetic_order),
-                    meander_order: order(self.meander_order),
-                },
+                asked: self.asked,
                 transition_ticks: self.transition_ticks,
                 settle_s: self.settle,
                 reference_deg_c: self.reference,
             },
-            || job.bar(),
+            &mut job.bar(),
         )?;
         let ranges = made.gyros.iter().flatten().map(|fit| fit.range_deg_c);
         let about = About {
@@ -98,7 +86,7 @@ impl ModesArgs {
             details: details(&made),
             sigmas: sigmas(&made),
             range_deg_c: hull(ranges),
-            rate_range_deg_c_per_s: None,
+            ..About::default()
         };
         Ok(Fitted { report: made.report(), written: made.written, about })
     }

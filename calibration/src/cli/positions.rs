@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Arg, Args};
-use isotherm_cli::Bar;
 
 use super::driver::{Job, Task, close};
 use super::output::OutputArgs;
@@ -25,7 +24,7 @@ use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
 use crate::limits::{above_0, from_0};
-use crate::runs::Run;
+use crate::runs::{Run, Watch};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
 #[derive(Debug, Args)]
@@ -146,13 +145,13 @@ impl PositionsArgs {
         settings: &Settings,
         about_gravity: Option<&String>,
     ) -> Result<Fitted, Error> {
-        let (work, bar) = (job.work, || job.bar());
+        let (work, watch) = (job.work, &mut job.bar());
         let runs = &work.runs;
         let add = "add [accel] with their channels, nominal scale factors and axes";
         let base = &*work.base_with_accelerometers(add, || {
-            Written::of(&of_run(work.run()?, &self.accelerometer_unit, bar())?)
+            Written::of(&of_run(work.run()?, &self.accelerometer_unit, &mut *watch)?)
         })?;
-        let tracks = tracks(runs, base, bar)?;
+        let tracks = tracks(runs, base, watch)?;
         let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;
         analysis.warnings.extend(about_gravity.cloned());
         let document = complete(&base.document, &analysis, settings.gravity);
@@ -160,8 +159,8 @@ impl PositionsArgs {
         let after = Written::of(&document)?;
         let inside: Vec<(Pose, usize)> =
             analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
-        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], bar)?;
-        let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], bar)?;
+        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], watch)?;
+        let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], watch)?;
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
         let report = report(
@@ -177,7 +176,7 @@ impl PositionsArgs {
             details: details(&analysis, settings),
             sigmas: sigmas(&document, &analysis, settings),
             range_deg_c: Some(range(&analysis)),
-            rate_range_deg_c_per_s: None,
+            ..About::default()
         };
         let accepted = report.verdicts.iter().all(|verdict| verdict.accepted);
         let written = if accepted { after } else { Written::of(&base.document)? };
@@ -191,18 +190,18 @@ fn outside(
     analysis: &Analysis,
     runs: &[Run],
     [before, after, base]: [&Written; 3],
-    bar: impl Fn() -> Bar + Copy,
+    watch: &mut dyn Watch,
 ) -> Result<Option<Vec<Judgement>>, Error> {
     if runs.is_empty() {
         return Ok(None);
     }
-    let (poses, _) = positions(&tracks(runs, base, bar)?, settings).map_err(Error::Refused)?;
-    Ok(Some(judged(settings, analysis, &poses, runs, [before, after], bar)?))
+    let (poses, _) = positions(&tracks(runs, base, watch)?, settings).map_err(Error::Refused)?;
+    Ok(Some(judged(settings, analysis, &poses, runs, [before, after], watch)?))
 }
 
 /// Runs tick by tick, corrected with a document.
-fn tracks(runs: &[Run], written: &Written, bar: impl Fn() -> Bar + Copy) -> Result<Vec<Track>, Error> {
-    runs.iter().map(|run| Track::of(run, &written.loaded, bar())).collect()
+fn tracks(runs: &[Run], written: &Written, watch: &mut dyn Watch) -> Result<Vec<Track>, Error> {
+    runs.iter().map(|run| Track::of(run, &written.loaded, &mut *watch)).collect()
 }
 
 /// Poses of runs, before and after.
@@ -212,9 +211,9 @@ fn judged(
     poses: &[(Pose, usize)],
     runs: &[Run],
     [before, after]: [&Written; 2],
-    bar: impl Fn() -> Bar + Copy,
+    watch: &mut dyn Watch,
 ) -> Result<Vec<Judgement>, Error> {
-    let (before, after) = (tracks(runs, before, bar)?, tracks(runs, after, bar)?);
+    let (before, after) = (tracks(runs, before, watch)?, tracks(runs, after, watch)?);
     let errors = analysis.fit.stand.map(|(error, _)| error);
     Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
 }

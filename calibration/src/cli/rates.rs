@@ -99,14 +99,14 @@ impl RatesArgs {
             table_ppm: self.table_ppm,
             with_bias: self.with_bias,
         };
-        let made = make(&wanted, || job.bar())?;
+        let made = make(&wanted, &mut job.bar())?;
         let about = About {
             method: "rate table, weighted least squares",
             key: "rates",
             details: details(&made),
             sigmas: sigmas(&made),
             range_deg_c: made.range_deg_c(),
-            rate_range_deg_c_per_s: None,
+            ..About::default()
         };
         Ok(Fitted { report: made.report(), written: made.written, about })
     }

@@ -12,7 +12,7 @@ use super::output::OutputArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
 use super::units::{Logs, Work};
 use crate::error::Error;
-use crate::fits::thermal::{Method, Settings, Terms, fit};
+use crate::fits::thermal::{Settings, fit};
 use crate::limits::within;
 pub(super) use stands::StandArgs;
 
@@ -31,12 +31,8 @@ pub(super) use stands::StandArgs;
 pub(super) struct ThermalArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Method of the fit
-    #[arg(long, value_enum, default_value_t = Method::Joint)]
-    method: Method,
-    /// Choice of terms: cross-validation, or the largest model
-    #[arg(long, value_enum, default_value_t = Terms::Auto)]
-    terms: Terms,
+    #[command(flatten)]
+    settings: Settings,
     #[command(flatten)]
     judge: JudgeArgs,
     /// Start this long after each judging log's beginning (s)
@@ -54,15 +50,6 @@ pub(super) struct ThermalArgs {
     output: OutputArgs,
     #[command(flatten)]
     stands: StandArgs,
-    /// Length of the windows of the fit (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(1.0, 600.0))]
-    fit_window: f64,
-    /// Windows of the stated residuals (s) (default: those of the fit, up to ten of them in runs of hours)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", value_parser = within(1.0, 3600.0))]
-    window: Option<f64>,
-    /// Smoothing of the temperature (s) (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", value_parser = within(0.0, 3600.0))]
-    smoothing: Option<f64>,
 }
 
 impl ThermalArgs {
@@ -121,13 +108,7 @@ impl ThermalArgs {
     }
 
     fn settings(&self, work: &Work) -> Result<Settings, Error> {
-        Ok(Settings {
-            method: self.method,
-            terms: self.terms,
-            stands: self.stands.stands(work.runs.len(), work.judges.len())?,
-            fit_window_s: self.fit_window,
-            window_s: self.window,
-            smoothing_s: self.smoothing,
-        })
+        let stands = self.stands.stands(work.runs.len(), work.judges.len())?;
+        Ok(Settings { stands, ..self.settings.clone() })
     }
 }

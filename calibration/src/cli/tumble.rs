@@ -104,8 +104,7 @@ impl TumbleArgs {
             key: "tumble",
             details: details(&tumble, &settings),
             sigmas: sigmas(&document, &tumble),
-            range_deg_c: None,
-            rate_range_deg_c_per_s: None,
+            ..About::default()
         };
         // Gyros are relative to the axes of the accelerometers that were found with them.
         let accepted = report.verdicts.first().is_some_and(|accel| accel.accepted);

@@ -22,7 +22,7 @@ pub struct Fitted {
 }
 
 /// What a document says of a fit beside its coefficients.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct About {
     /// Method.
     pub method: &'static str,

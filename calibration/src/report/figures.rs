@@ -1,7 +1,7 @@
 //! Figures as text: digits, tables.
 
 use crate::numbers::ends;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::CellAlignment;
 
 /// Most significant digits of a figure among others: more are in `--json`.
 const MOST_DIGITS: f64 = 8.0;
@@ -95,8 +95,7 @@ pub fn within(value: f64, [low, high]: [f64; 2]) -> String {
 
 /// A table with its columns one below the other, those that hold figures aligned to the right.
 pub fn table(table: &isotherm_pages::Table) -> String {
-    let mut text = Table::new();
-    text.load_preset(presets::NOTHING).set_header(&table.head).add_rows(&table.rows);
+    let mut text = isotherm_cli::table(&table.head, &table.rows, ..0);
     for (index, column) in text.column_iter_mut().enumerate().skip(1) {
         let figure = |row: &Vec<String>| {
             row.get(index).is_none_or(|cell| {

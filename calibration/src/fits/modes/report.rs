@@ -11,46 +11,53 @@ use crate::report::{Curve, Figure, Report, counted, fixed, per_deg_c, short, tog
 /// Models of the cross-validation that the report lists for each gyro.
 const MODELS: usize = 5;
 
-/// The report.
-pub(super) fn report(made: &Made) -> Report {
-    let unit = made.written.document.unit.clone();
-    let mut report = Report::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
-    let verdicts = Curve::verdicts(&made.residuals).into_iter();
-    report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
-    report.residuals.clone_from(&made.residuals);
-    report.warnings.clone_from(&made.warnings);
-    notes(made, &mut report);
-    let mut validation = Vec::new();
-    let mut told: Vec<(&str, String)> = Vec::new();
-    for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
-        match made.gyros.get(index) {
-            Some(Ok(fit)) => {
-                gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
-                if fit.left_out > 0 {
-                    let are = counted(fit.left_out, "mean is", "means are");
-                    told.push((&sensor.name, format!("{are} far off and left out")));
+impl Made {
+    /// The report.
+    pub fn report(&self) -> Report {
+        let made = self;
+        let unit = made.written.document.unit.clone();
+        let mut report =
+            Report::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
+        let verdicts = Curve::verdicts(&made.residuals).into_iter();
+        report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
+        report.residuals.clone_from(&made.residuals);
+        report.warnings.clone_from(&made.warnings);
+        notes(made, &mut report);
+        let mut validation = Vec::new();
+        let mut told: Vec<(&str, String)> = Vec::new();
+        for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
+            match made.gyros.get(index) {
+                Some(Ok(fit)) => {
+                    gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
+                    if fit.left_out > 0 {
+                        let are = counted(fit.left_out, "mean is", "means are");
+                        told.push((&sensor.name, format!("{are} far off and left out")));
+                    }
+                    told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
                 }
-                told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
+                Some(Err(reason)) => refuse(made, index, reason, &mut report),
+                None => {}
             }
-            Some(Err(reason)) => refuse(made, index, reason, &mut report),
-            None => {}
-        }
-        match made.servos.get(index) {
-            Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
-            Some(Err(reason)) => {
-                let old =
-                    if sensor.servo.is_some() { "the document's servo stays" } else { "no servo is written" };
-                told.push((&sensor.name, format!("{reason}; {old}")));
+            match made.servos.get(index) {
+                Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
+                Some(Err(reason)) => {
+                    let old = if sensor.servo.is_some() {
+                        "the document's servo stays"
+                    } else {
+                        "no servo is written"
+                    };
+                    told.push((&sensor.name, format!("{reason}; {old}")));
+                }
+                None => {}
             }
-            None => {}
         }
+        report.warnings.extend(together(&told));
+        if !validation.is_empty() {
+            let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
+            report.validation = Some(Table::of(head, validation));
+        }
+        report
     }
-    report.warnings.extend(together(&told));
-    if !validation.is_empty() {
-        let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
-        report.validation = Some(Table::of(head, validation));
-    }
-    report
 }
 
 fn notes(made: &Made, report: &mut Report) {
