@@ -189,7 +189,7 @@ impl Report {
     pub fn to_text(&self) -> String {
         let mut found = verdict::sentences(&self.verdicts);
         let summary = self.summary.as_ref().map(table).unwrap_or_default();
-        if self.unit.is_empty() || found.len() + summary.lines().count() <= MOST_FOUND {
+        if found.len() + summary.lines().count() <= MOST_FOUND {
             found.extend(summary.lines().map(str::to_owned));
         }
         let warnings: Vec<String> = self.warnings.iter().map(|words| format!("warning: {words}")).collect();
@@ -201,8 +201,8 @@ impl Report {
         dozen(&found, &warnings, &rest)
     }
 
-    /// Everything that is not a chart, as text.
-    pub fn whole_text(&self) -> String {
+    /// Everything but charts and tables, as text.
+    pub fn summary_text(&self) -> String {
         let mut text = format!("{}\n", self.headline());
         let warnings = self.warnings.iter().map(|words| format!("warning: {words}"));
         let lines: Vec<String> = warnings.chain(self.notes.iter().cloned()).collect();
@@ -212,6 +212,12 @@ impl Report {
         if let Some(summary) = &self.summary {
             let _ = writeln!(text, "\n{}", table(summary));
         }
+        text
+    }
+
+    /// Everything that is not a chart, as text.
+    pub fn whole_text(&self) -> String {
+        let mut text = self.summary_text();
         for (heading, rows) in &self.tables {
             let _ = writeln!(text, "\n{heading}\n{}", table(rows));
         }

@@ -128,7 +128,7 @@ impl ImpactArgs {
         let report = sailed.report();
         let files = self.page.files();
         files.page(Path::to_path_buf, || report.to_html())?;
-        emit(files.json, || report.to_json(), || report.to_text())?;
+        emit(files.json, || report.to_json(), || report.summary_text())?;
         Error::end(Vec::new(), cut.words().map(str::to_owned).into_iter().collect())
     }
 
