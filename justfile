@@ -49,9 +49,9 @@ pair:
     cargo test --release --workspace --locked --test operators pair:: -- --include-ignored --skip soak --nocapture --test-threads=1
 
 # Half an hour with 20 units at 200 Hz, swaps, commands, failovers and watchers, and a day of ticks at full speed; prints what grows
-# (ISOTHERM_SOAK=MINUTES)
+# (ISOTHERM_SOAK=MINUTES,UNITS,SECONDS_BETWEEN_FAILOVERS), with as many heaps as under systemd
 soak:
-    cargo test --release --workspace --locked --test operators pair::soak:: -- --ignored --nocapture --test-threads=1
+    MALLOC_ARENA_MAX=2 cargo test --release --workspace --locked --test operators pair::soak:: -- --ignored --nocapture --test-threads=1
 
 # Show the account of every fault of links, peers and machine, then of links in network namespaces (the latter need root)
 faults:

@@ -117,15 +117,22 @@ impl SessionOptions {
         Ok(is("access_control/enabled", "true") || is("mode", "\"client\""))
     }
 
+    /// The endpoints that a session connects to: the configured ones, and those of the Zenoh configuration.
+    ///
+    /// # Errors
+    /// As [`Self::to_config`].
+    pub fn connects_to(&self) -> Result<Vec<String>, BusError> {
+        Ok(endpoints(&self.to_config()?, "connect/endpoints"))
+    }
+
     /// What an opening session may have to wait for, in words: "a router or peer at tcp/127.0.0.1:7447".
     ///
     /// # Errors
     /// As [`Self::to_config`].
     pub fn awaited(&self) -> Result<String, BusError> {
-        let endpoints = endpoints(&self.to_config()?, "connect/endpoints");
-        Ok(match endpoints.as_slice() {
+        Ok(match self.connects_to()?.as_slice() {
             [] => "a router or peer that scouting finds (no endpoint to connect to is configured)".to_owned(),
-            _ => format!("a router or peer at {}", endpoints.join(" or ")),
+            endpoints => format!("a router or peer at {}", endpoints.join(" or ")),
         })
     }
 }

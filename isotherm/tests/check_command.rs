@@ -96,6 +96,23 @@ fn a_folder_of_calibrations_that_is_not_there_is_a_problem_with_state_or_without
 }
 
 #[test]
+fn only_one_instance_of_a_pair_connects_to_the_other() {
+    let folder = TempDir::new().unwrap();
+    write(&folder, "zenoh.json5", "{ connect: { endpoints: ['tcp/127.0.0.1:7'] } }");
+    let pair = "[pair]\nother = \"127.0.0.1:7\"\n";
+    let service = write(&folder, "file.toml", &format!("{pair}[zenoh]\nconfig = \"zenoh.json5\"\n"));
+    let output = check(&[&service]);
+    assert_eq!((output.status.code(), lines(&output.stderr).len()), (Some(78), 1));
+    let service = write(&folder, "plain.toml", pair);
+    assert_eq!(check(&[&service]).status.code(), Some(0));
+    let serve = Command::new(env!("CARGO_BIN_EXE_isotherm"))
+        .args(["serve", "--config", &service, "--listen", "127.0.0.1:0", "--connect", "127.0.0.1:7"])
+        .output()
+        .unwrap();
+    assert_eq!(serve.status.code(), Some(78), "{}", String::from_utf8_lossy(&serve.stderr));
+}
+
+#[test]
 fn a_zenoh_configuration_with_a_strange_key_or_value_is_bad() {
     let folder = TempDir::new().unwrap();
     for (name, text) in

@@ -151,6 +151,21 @@ impl Settings {
             .map_err(ServiceError::Configuration)
     }
 
+    /// Whether this one leaves the connection to the other instance to that, as `pair.other` says.
+    ///
+    /// # Errors
+    /// What is wrong with the address.
+    pub(crate) fn check_other(&self) -> Result<(), String> {
+        let Some(other) = &self.pair.other else { return Ok(()) };
+        // Addresses that cannot be read are reported elsewhere.
+        if self.zenoh.session.connects_to().unwrap_or_default().contains(other) {
+            return Err(format!(
+                "is {other:?}, which this instance connects to: only one of the two may connect"
+            ));
+        }
+        Ok(())
+    }
+
     /// Where the console in the browser is served and no address is given, the usual one on loopback.
     pub(crate) fn listen_for_web(&mut self) {
         if self.web.enabled {

@@ -75,6 +75,9 @@ pub enum ServiceError {
     /// Something about the Zenoh session.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// Both instances of a pair connect to each other.
+    #[error("pair.other {0}")]
+    Other(String),
     /// The other instance of a pair does not connect to this one.
     #[error(
         "the other instance at {other} (pair.other) does not connect to this one: state this one's address there \
@@ -99,9 +102,10 @@ impl ServiceError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Configuration(_) | Self::BadCalibrations { .. } | Self::NoCalibrations { .. } => {
-                Exit::BadConfiguration
-            }
+            Self::Configuration(_)
+            | Self::Other(_)
+            | Self::BadCalibrations { .. }
+            | Self::NoCalibrations { .. } => Exit::BadConfiguration,
             // An address that is not allowed, not one that somebody else has.
             Self::Metrics { source, .. } if source.kind() == std::io::ErrorKind::Other => {
                 Exit::BadConfiguration

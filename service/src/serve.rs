@@ -131,6 +131,7 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
         configured.namespace.clone_from(&given.namespace);
     }
     configured.listen_by_default();
+    settings.check_other().map_err(ServiceError::Other)?;
     Ok(settings)
 }
 

@@ -26,7 +26,7 @@ use super::{LogArgs, print, seconds, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
-use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, play, wanted};
+use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, UnitReport, play, wanted};
 use screen::Screen;
 
 /// Most copies of a unit.
@@ -262,8 +262,11 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     let report = Report { play: &play, log: &log };
     print(if args.json { show::json(&report) } else { tables::human(&report, &options) }.as_bytes())?;
     ended?;
-    if play.units.is_empty() {
+    let lost = play.lost_data() || log.lost_data();
+    // What `--loss` withholds was there.
+    let found = |unit: &UnitReport| unit.counts.messages_sent + unit.counts.messages_withheld > 0;
+    if !lost && !play.stopped && !play.units.iter().any(found) {
         return Err(Error::NothingPlayed);
     }
-    Ok(Exit::of_loss(play.lost_data() || log.lost_data()))
+    Ok(Exit::of_loss(lost))
 }

@@ -199,6 +199,15 @@ fn playing_needs_a_service_unless_told_otherwise() {
 }
 
 #[test]
+fn playing_nothing_fails() {
+    let folder = simulated();
+    let text = ["play", "mems.csv", "-u", "MEMS-0001", "--no-acknowledge", "--listen", "127.0.0.1:0"];
+    for nothing in [["--start", "1000"], ["--topic", "x/**"]] {
+        check(&replay(folder.path(), &[&text[..], &nothing].concat()), 1, "nothing was played");
+    }
+}
+
+#[test]
 fn no_output_is_written_over_an_input() {
     let folder = simulated();
     let path = folder.path();

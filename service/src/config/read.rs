@@ -49,6 +49,9 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     {
         r.report("zenoh", error.to_string());
     }
+    if let Err(reason) = settings.check_other() {
+        r.report("pair.other", reason);
+    }
     settings.listen_for_web();
     Some(settings)
 }
@@ -89,14 +92,6 @@ fn names(r: &mut Reader<'_>, settings: &mut Settings) {
     }
     if let Some(other) = &settings.pair.other {
         match endpoint(other) {
-            Ok(other)
-                if settings.zenoh.session.connect.iter().any(|it| endpoint(it).as_ref() == Ok(&other)) =>
-            {
-                r.report(
-                    "pair.other",
-                    format!("is {other:?}, as in zenoh.connect: only one of the two connects"),
-                );
-            }
             Ok(other) => settings.pair.other = Some(other),
             Err(reason) => r.report("pair.other", format!("is {other:?}, {reason}")),
         }

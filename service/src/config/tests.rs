@@ -169,7 +169,7 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         ),
         (
             "[pair]\nother = \"a:7\"\n[zenoh]\nconnect = [\"tcp/a:7\"]",
-            "2:9: pair.other: is \"tcp/a:7\", as in zenoh.connect: only one of the two connects",
+            "2:9: pair.other: is \"tcp/a:7\", which this instance connects to: only one of the two may connect",
         ),
         ("pairing_window_ms = 0", "1:21: pairing_window_ms: is 0, must be a whole number from 1 to 10000"),
         (

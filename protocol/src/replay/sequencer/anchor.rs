@@ -65,13 +65,12 @@ impl Sequencer {
         }
         if self.search.mark.as_ref() != Some(mark) {
             self.search = Search { mark: Some(mark.clone()), ..Search::default() };
-        }
-        let Search { order, found, .. } = &mut self.search;
-        if let Some(before) = &self.before {
-            for ((found, heard), before) in found.iter_mut().zip(&mark.heard).zip(before) {
-                *found |= before.frames > 0 && before.crc == heard.crc;
+            let before = self.before.iter().flatten();
+            for ((found, heard), before) in self.search.found.iter_mut().zip(&mark.heard).zip(before) {
+                *found = before.frames > 0 && before.crc == heard.crc;
             }
         }
+        let Search { order, found, .. } = &mut self.search;
         for ((found, heard), frames) in found.iter_mut().zip(&mark.heard).zip(&self.waiting) {
             let mut fresh = frames.iter().rev().take_while(|frame| frame.order > *order);
             *found |= heard.frames == 0 || fresh.any(|frame| frame.crc() == heard.crc);

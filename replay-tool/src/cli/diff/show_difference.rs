@@ -74,7 +74,8 @@ fn row(marker: &str, name: &str, tick: Option<&LogTick>) -> [String; 8] {
         return [marker, "", name, "—", "", "", "", ""].map(str::to_owned);
     };
     let CorrectedTick { sequence, delta_angle, delta_velocity, revision, flags, .. } = tick;
-    let vector = |vector: &[f64; 3]| vector.map(|value| format!("{value:?}")).join("  ");
+    // Every digit of what differs stands above.
+    let vector = |vector: &[f64; 3]| vector.map(|value| format!("{value:>10.3e}")).join(" ");
     let flags: Vec<_> = flags.iter_names().map(|(name, _)| name).collect();
     [
         marker.to_owned(),

@@ -19,12 +19,14 @@ use crate::documents::{BASE_UNIT, base};
 
 /// How often is measured.
 const INTERVAL: Duration = Duration::from_secs(5);
-/// From one failover to the next.
-const FAILOVER: Duration = Duration::from_secs(30);
 
-/// How long the pair is watched: `ISOTHERM_SOAK` in minutes.
-fn minutes() -> f64 {
-    std::env::var("ISOTHERM_SOAK").map_or(30.0, |minutes| minutes.parse().expect("minutes"))
+/// How long the pair is watched, with how many units, and the time from one failover to the next: `ISOTHERM_SOAK=MINUTES[,UNITS,SECONDS]`.
+fn size() -> (Duration, usize, Duration) {
+    let given = std::env::var("ISOTHERM_SOAK").unwrap_or_default();
+    let mut given = given.split(',').filter(|it| !it.is_empty()).map(|it| it.parse().expect("a number"));
+    let mut next = |default: u32| given.next().unwrap_or(default);
+    let (minutes, units, seconds) = (next(30), next(20), next(30));
+    (Duration::from_secs(60 * u64::from(minutes)), units as usize, Duration::from_secs(seconds.into()))
 }
 
 /// What is measured of a process, over the time of the test.
@@ -74,17 +76,18 @@ fn share(sorted: &[Duration], percent: usize) -> Option<f64> {
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "takes half an hour: just soak"]
 async fn a_pair_that_is_never_left_alone_does_not_grow() {
-    let mut stand = Stand::start(20, &configuration("")).await;
+    let (whole, units, failover) = size();
+    let mut stand = Stand::start(units, &configuration("")).await;
     // The last unit is given commands, and its ticks are not judged.
     stand.judged = stand.units() - 1;
     until_compared(&stand.session, stand.units(), 50).await;
     let ids: Vec<u32> = stand.pair.services.iter().flatten().map(Service::id).collect();
     let mut watched = [(); 3].map(|()| Watched::default());
     let [mut p50, mut p99] = [(); 2].map(|()| Series::default());
-    let (begin, whole) = (Instant::now(), Duration::from_secs_f64(minutes() * 60.0));
+    let begin = Instant::now();
     let hours = |at: Instant| (at - begin).as_secs_f64() / 3600.0;
     let watchers = watchers(&stand).await;
-    let (mut failovers, mut swaps, mut commands, mut next) = (0_u64, 0_u64, 0_u64, begin + FAILOVER);
+    let (mut failovers, mut swaps, mut commands, mut next) = (0_u64, 0_u64, 0_u64, begin + failover);
     let mut pauses = Vec::new();
     while begin.elapsed() < whole {
         // Undisturbed but for swaps, commands and those who watch.
@@ -113,7 +116,7 @@ async fn a_pair_that_is_never_left_alone_does_not_grow() {
             // The processes stay the same, so that what grows is seen: kills are for `just pair`.
             let mishap = if failovers % 2 == 0 { Mishap::Stopped } else { Mishap::Link(Fault::Cut) };
             pauses.push(stand.suffer(mishap).await);
-            (failovers, next) = (failovers + 1, Instant::now() + FAILOVER);
+            (failovers, next) = (failovers + 1, Instant::now() + failover);
         }
     }
     watchers.iter().for_each(tokio::task::JoinHandle::abort);
