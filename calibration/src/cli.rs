@@ -7,7 +7,6 @@ mod drift;
 mod driver;
 mod files;
 mod impact;
-mod limits;
 mod merge;
 mod modes;
 mod output;

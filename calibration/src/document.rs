@@ -8,6 +8,7 @@
 //! | [`show`] | a document in words and curves |
 
 pub mod diff;
+mod fitted;
 pub mod merge;
 mod plain;
 mod provenance;
@@ -16,10 +17,12 @@ mod written;
 
 use isotherm_protocol::document::{AccelSensor, Document};
 
-pub(crate) use plain::{follows, plain};
+pub use fitted::{About, Fitted};
+pub(crate) use fitted::{by_name, rows};
+pub(crate) use plain::{channels, faults, follows, plain};
 pub(crate) use provenance::files_of;
 pub use provenance::{TOOL, command_line, origin, recordings_in};
-pub use written::{Written, matrix, name_of, numbers, tidy, write_file};
+pub use written::{Written, name_of, tidy, write_file};
 
 /// The accelerometers of a document.
 pub fn accelerometers(document: &Document) -> &[AccelSensor] {

@@ -27,6 +27,7 @@ pub mod finding;
 pub mod fits;
 #[cfg(test)]
 mod fixture;
+mod limits;
 pub mod lsq;
 pub mod numbers;
 pub mod report;

@@ -6,11 +6,10 @@
 //! | [`weighted`] | rows with weights, outliers without; standard errors under correlated residuals |
 //! | [`correlated`] | rows under white noise, a Markov drift and rounding to counts, made independent by a Kalman filter |
 //! | [`nonlinear`] | Levenberg and Marquardt's method, with the covariance of what was found |
-//! | [`blocks`], [`folds`] | cross-validation: fits without one block after the other, free or shrunk |
+//! | [`folds`] | cross-validation: fits without one block after the other, shrunk |
 //! | [`local`] | a parabola over a stretch, for smoothing |
 //! | [`search`] | the smallest value of a function of one to three numbers |
 
-pub mod blocks;
 pub mod correlated;
 pub mod folds;
 pub mod linear;

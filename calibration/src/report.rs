@@ -1,6 +1,6 @@
-//! The report of a fit, the same for all of them: verdict, before and after, coefficients, cross-validation, warnings.
+//! The report of a command, the same for all of them: verdicts, before and after, coefficients, cross-validation, tables, charts.
 //!
-//! A fit fills a [`FitReport`]; what is said of it as text, as JSON and as a page is written here once. Its verdicts are
+//! A command fills a [`Report`]; what is said of it as text, as JSON and as a page is written here once. The verdicts of a fit are
 //! also what the document states as its residuals ([`residuals`]), so that no two places can say different things.
 //!
 //! | module | holds |
@@ -8,7 +8,6 @@
 //! | [`verdict`] | what came of one sensor, and its sentence |
 //! | [`curve`] | before and after over time and temperature, taken from a corrected run |
 //! | [`batch`] | several units at once, and the table that closes them |
-//! | [`sheet`] | a line, tables and charts where nothing was fitted |
 //! | `figures` | digits, tables |
 //! | [`sigma`] | standard errors as documents keep them |
 //! | `words` | the lines of a terminal; one sentence for all gyros, or logs, that it holds of |
@@ -19,25 +18,30 @@ pub mod curve;
 mod figures;
 mod json;
 mod page;
-pub mod sheet;
 pub mod sigma;
 #[cfg(test)]
 mod tests;
 pub mod verdict;
 mod words;
 
+use std::fmt::Write;
+
 use isotherm_pages::{Chart, Table};
 use serde_json::{Value, json};
 
-pub use batch::{BatchRow, BatchTable, UnitReport, in_parallel, of_unit};
+pub use batch::{Batch, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
 pub use figures::{alike, counted, fixed, per_deg_c, short, six, superscript, table, within};
 pub(crate) use page::bars;
-pub use sheet::Sheet;
 pub use sigma::Sigmas;
 pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
 
-pub(crate) use words::{dozen, grouped, gyros, of_logs, together};
+pub(crate) use words::{grouped, gyros, of_logs, together};
+
+use words::dozen;
+
+/// Most lines of a terminal for what was found; the others are for what is to be looked at.
+const MOST_FOUND: usize = 9;
 
 /// One fitted coefficient.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -59,12 +63,12 @@ impl Coefficient {
     }
 }
 
-/// What a fit has to say; lists that do not apply stay empty.
+/// What a command has to say; lists that do not apply stay empty.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct FitReport {
+pub struct Report {
     /// What was done, such as "Thermal calibration, method joint".
     pub title: String,
-    /// Serial of the unit.
+    /// Serial of the unit; empty where it is of documents or of no unit.
     pub unit: String,
     /// What came of each sensor: the first lines.
     pub verdicts: Vec<Verdict>,
@@ -84,9 +88,13 @@ pub struct FitReport {
     pub tables: Vec<(String, Table)>,
     /// Further charts, each with its heading.
     pub charts: Vec<(String, Chart)>,
+    /// A row for each sensor, or case, where sizes before and after do not say what came of it.
+    pub summary: Option<Table>,
+    /// What its JSON has besides.
+    pub figures: serde_json::Map<String, Value>,
 }
 
-impl FitReport {
+impl Report {
     /// A report with nothing in it but what was done to which unit.
     pub fn new(title: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { title: title.into(), unit: unit.into(), ..Self::default() }
@@ -98,9 +106,57 @@ impl FitReport {
         self
     }
 
-    /// All sizes as a table.
-    fn size_rows(&self) -> Table {
-        verdict::rows(&self.verdicts, self.counted.unwrap_or("windows"))
+    /// A report of something that has one sentence to say.
+    pub fn saying(title: impl Into<String>, of: impl Into<String>, words: impl Into<String>) -> Self {
+        let verdicts = vec![Verdict::said(of, words)];
+        Self { title: title.into(), verdicts, ..Self::default() }
+    }
+
+    /// Adds a coefficient with its standard error, where that is known.
+    pub fn coefficient(
+        &mut self,
+        name: impl Into<String>,
+        unit: impl Into<String>,
+        value: f64,
+        sigma: impl Into<Option<f64>>,
+    ) {
+        self.coefficients.push(Coefficient::new(name, unit, value, sigma.into()));
+    }
+
+    /// Adds a table unless it has no rows.
+    pub fn table(
+        &mut self,
+        heading: &str,
+        head: impl IntoIterator<Item = impl Into<String>>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) {
+        let table = Table::of(head, rows);
+        if !table.rows.is_empty() {
+            self.tables.push((heading.to_owned(), table));
+        }
+    }
+
+    /// Adds a chart unless it has no panels.
+    pub fn chart(&mut self, heading: &str, chart: Chart) {
+        if !chart.panels.is_empty() {
+            self.charts.push((heading.to_owned(), chart));
+        }
+    }
+
+    /// Adds sentences, of which those that begin with "warning: " are to be looked at.
+    pub fn tell(&mut self, words: impl IntoIterator<Item = String>) {
+        for words in words {
+            match words.strip_prefix("warning: ") {
+                Some(warning) => self.warnings.push(warning.to_owned()),
+                None => self.notes.push(words),
+            }
+        }
+    }
+
+    /// What came of each sensor as a table: of sizes in and out of sample, or of those that decide.
+    fn rows(&self, only_deciding: bool) -> Table {
+        let sizes = || verdict::rows(&self.verdicts, self.counted.unwrap_or("windows"), only_deciding);
+        self.summary.clone().unwrap_or_else(sizes)
     }
 
     /// Every verdict, one sentence each, in one line.
@@ -129,16 +185,49 @@ impl FitReport {
         refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
     }
 
-    /// What a terminal shows: the verdicts in the first lines, and what is to be looked at.
+    /// What an engineer decides by, as the lines of a terminal.
     pub fn to_text(&self) -> String {
+        let mut found = verdict::sentences(&self.verdicts);
+        let summary = self.summary.as_ref().map(table).unwrap_or_default();
+        if found.len() + summary.lines().count() <= MOST_FOUND {
+            found.extend(summary.lines().map(str::to_owned));
+        }
         let warnings: Vec<String> = self.warnings.iter().map(|words| format!("warning: {words}")).collect();
-        let rest = format!(
-            "{}, unit {}: what was done, {} and all tables",
-            self.title,
-            self.unit,
-            counted(self.coefficients.len(), "coefficient", "coefficients")
-        );
-        dozen(&verdict::sentences(&self.verdicts), &warnings, &rest)
+        let coefficients = match self.coefficients.len() {
+            0 => String::new(),
+            count => format!("{} and ", counted(count, "coefficient", "coefficients")),
+        };
+        let rest = format!("{}: what was done, {coefficients}all tables", self.heading());
+        dozen(&found, &warnings, &rest)
+    }
+
+    /// Everything but charts and tables, as text.
+    pub fn summary_text(&self) -> String {
+        let mut text = format!("{}\n", self.headline());
+        let warnings = self.warnings.iter().map(|words| format!("warning: {words}"));
+        let lines: Vec<String> = warnings.chain(self.notes.iter().cloned()).collect();
+        if !lines.is_empty() {
+            let _ = writeln!(text, "\n{}", lines.join("\n"));
+        }
+        if let Some(summary) = &self.summary {
+            let _ = writeln!(text, "\n{}", table(summary));
+        }
+        text
+    }
+
+    /// Everything that is not a chart, as text.
+    pub fn whole_text(&self) -> String {
+        let mut text = self.summary_text();
+        for (heading, rows) in &self.tables {
+            let _ = writeln!(text, "\n{heading}\n{}", table(rows));
+        }
+        text
+    }
+
+    /// What was done to which unit.
+    fn heading(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(", unit {}", self.unit) };
+        format!("{}{unit}", self.title)
     }
 
     /// Coefficients as a table; the first column numbers them as the chart does.

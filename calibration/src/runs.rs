@@ -376,7 +376,7 @@ impl Watch for () {
 }
 
 /// One that is lent, for several readings one after the other.
-impl<W: Watch> Watch for &mut W {
+impl<W: Watch + ?Sized> Watch for &mut W {
     fn begin(&mut self, progress: Progress) {
         (**self).begin(progress);
     }

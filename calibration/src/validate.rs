@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::judging;
 use crate::numbers::{Size, is_white, norm, real};
-use crate::report::{Curve, FLAT, Figure, FitReport, Rest, SAME_SHARE, Verdict, short};
+use crate::report::{Curve, FLAT, Figure, Report, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
 use crate::runs::swapped::{Shown, force_at_rest};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
@@ -56,10 +56,10 @@ pub fn validate(
     logs: &[JudgedLog],
     wanted: Wanted,
     mut watch: impl Watch,
-) -> Result<FitReport, Error> {
+) -> Result<Report, Error> {
     let Written { name, document, .. } = written;
     let bare = Written::compiled(&document.nominal())?;
-    let mut report = FitReport::new(format!("Judgement of {name}"), document.unit.clone());
+    let mut report = Report::new(format!("Judgement of {name}"), document.unit.clone());
     let mut coverage = Coverage::of(written);
     let mut readings = Vec::new();
     for log in logs {
@@ -236,7 +236,7 @@ fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error>
 }
 
 /// Axes that nothing can be said of.
-fn missing(document: &Document, report: &mut FitReport) -> Result<(), Error> {
+fn missing(document: &Document, report: &mut Report) -> Result<(), Error> {
     let accels = document.accel.is_some().then_some("accelerometer");
     for kind in ["gyro"].into_iter().chain(accels) {
         let has = |axis: &str| report.verdicts.iter().any(|verdict| verdict.of == format!("{kind} {axis}"));

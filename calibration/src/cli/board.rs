@@ -3,14 +3,15 @@
 use clap::{Arg, Args};
 
 use super::driver::{Job, Task};
-use super::limits::within;
-use super::output::{About, Fitted, OutputArgs};
+use super::output::OutputArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::thermal::StandArgs;
 use super::units::Logs;
+use crate::document::{About, Fitted};
 use crate::error::Error;
 use crate::fits::board::{Wanted, fit};
 use crate::fits::thermal::Site;
+use crate::limits::within;
 
 /// Ratio of the accelerometers' board over its temperature, from cycles of the chamber in two positions
 #[derive(Debug, Args)]
@@ -27,10 +28,10 @@ pub(super) struct BoardArgs {
     #[command(flatten)]
     base: BaseArgs,
     /// Temperature of the board at which the ratio is 1 (°C) (default: the middle of its range)
-    #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true, value_parser = within(-100.0, 200.0))]
     reference: Option<f64>,
     /// Length of the windows of the fit (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(1.0, 600.0))]
     fit_window: f64,
     #[command(flatten)]
     stands: StandArgs,
@@ -41,13 +42,9 @@ pub(super) struct BoardArgs {
 impl BoardArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        within([
-            ("--fit-window", Some(self.fit_window), [1.0, 600.0], "s"),
-            ("--reference", self.reference, [-100.0, 200.0], "°C"),
-        ])?;
         let logs = Logs::apart(&self.log, &self.judge, &self.base);
         let task = Task::new("Boards of several units", self.output.files(), logs);
-        task.run(|job| self.fit(job)?.done(&self.output, job))
+        task.run(|job| self.output.done(self.fit(job)?, job))
     }
 
     fn fit(&self, job: &Job<'_>) -> Result<Fitted, Error> {
@@ -76,9 +73,9 @@ impl BoardArgs {
         let about = About {
             method: "board ratio from cycles in two positions",
             key: "board",
-            details: made.details(),
             sigmas: made.sigmas(),
             range_deg_c: made.range_deg_c(),
+            ..About::default()
         };
         Ok(Fitted { written: made.written, report: made.report, about })
     }

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::driver::emit;
+use super::driver::close;
 use super::files::PageArgs;
 use crate::document::Written;
 use crate::document::diff::series::Series;
 use crate::error::Error;
+use crate::limits::above_0;
 
 /// Compare calibration documents in order of time, such as those before, between and after shock and vibration
 #[derive(Debug, Args)]
@@ -26,7 +27,7 @@ pub(super) struct DiffArgs {
     #[arg(value_name = "B", required = true)]
     after: Vec<PathBuf>,
     /// Standard error of a direction cosine (″), for a document that states none
-    #[arg(long, value_name = "ARCSEC")]
+    #[arg(long, value_name = "ARCSEC", value_parser = above_0)]
     axis_sigma: Option<f64>,
     #[command(flatten)]
     page: PageArgs,
@@ -35,9 +36,6 @@ pub(super) struct DiffArgs {
 impl DiffArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        if let Some(sigma) = self.axis_sigma.filter(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
-            return Err(Error::Usage(format!("--axis-sigma is {sigma}, must be a number of ″ above 0")));
-        }
         let paths: Vec<&Path> = [&self.before].into_iter().chain(&self.after).map(PathBuf::as_path).collect();
         let files = self.page.files();
         files.check(&paths)?;
@@ -50,11 +48,10 @@ impl DiffArgs {
             }
         }
         let series = Series::of(&documents, self.axis_sigma)?;
-        let (sheet, json) = match series.steps.as_slice() {
-            [only] => (only.sheet(), only.to_json()),
-            _ => (series.sheet(), series.to_json()),
+        let sheet = match series.steps.as_slice() {
+            [only] => only.sheet(),
+            _ => series.sheet(),
         };
-        files.page(Path::to_path_buf, || sheet.to_html())?;
-        emit(files.json, || json, || sheet.to_text())
+        close(&files, &sheet)
     }
 }

@@ -5,7 +5,6 @@ use isotherm_log::diff::is_csv;
 use serde_json::json;
 
 use super::driver::{Done, Job, Task};
-use super::limits::above_0;
 use super::output::OutputArgs;
 use super::runs::{BaseArgs, LogArgs};
 use super::units::{Logs, Unit, Work};
@@ -15,8 +14,10 @@ use crate::fits::drift::columns::{Columns, Kind, unnamed};
 use crate::fits::drift::document::{Parameters, put};
 use crate::fits::drift::fit::analyse;
 use crate::fits::drift::pieces::Grid;
-use crate::fits::drift::report::Report;
+use crate::fits::drift::report::Found;
 use crate::fits::drift::trend::FIT_H;
+use crate::limits::{above_0, not_0};
+use crate::report::Report;
 
 /// Noise and drift of a log at rest: Allan deviation, Markov drift, trend, spectrum, estimator parameters
 #[derive(Debug, Args)]
@@ -36,15 +37,15 @@ pub(super) struct DriftArgs {
     #[arg(long, conflicts_with_all = ["document", "increment_weight"])]
     corrected: bool,
     /// Gyro angle per count (″), for counts without a document
-    #[arg(long, value_name = "ARCSEC", conflicts_with = "document")]
+    #[arg(long, value_name = "ARCSEC", conflicts_with = "document", value_parser = not_0)]
     increment_weight: Option<f64>,
     #[command(flatten)]
     base: BaseArgs,
     /// Sigma of the constant part at start (°/h), if known from several starts
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H")]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H", value_parser = above_0)]
     initial_sigma: Option<f64>,
     /// Length of the trend fit before extrapolation (h)
-    #[arg(long, hide_short_help = true, value_name = "HOURS", default_value_t = FIT_H)]
+    #[arg(long, hide_short_help = true, value_name = "HOURS", default_value_t = FIT_H, value_parser = above_0)]
     fit_hours: f64,
     #[command(flatten)]
     output: OutputArgs,
@@ -53,11 +54,6 @@ pub(super) struct DriftArgs {
 impl DriftArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        above_0([
-            ("--increment-weight", self.increment_weight.map(f64::abs)),
-            ("--initial-sigma", self.initial_sigma),
-            ("--fit-hours", Some(self.fit_hours)),
-        ])?;
         let files = self.output.files();
         if files.out.is_some() && (self.base.document.is_none() || self.accelerometers) {
             return Err(Error::Usage(
@@ -80,47 +76,28 @@ impl DriftArgs {
         Ok(vec![(unit, Ok(Work::new(None, Vec::new(), Vec::new())))])
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Done<Report>, Error> {
-        let report = self.report(job)?;
+    fn analyse(&self, job: &Job<'_>) -> Result<Done, Error> {
+        let columns = self.columns(job)?;
+        let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
+        let grid = Grid::of(columns)?;
+        let working = job.at_work("Allan deviations, drift, spectrum");
+        let sensors = analyse(&grid, self.fit_hours);
+        working.finish();
+        let rates = sensors.iter().filter(|_| kind == Kind::Rate);
+        let parameters =
+            rates.map(|sensor| (sensor.name.clone(), Parameters::of(sensor, self.initial_sigma)));
+        let found = Found { kind, length_h: grid.length_h(), parameters: parameters.collect(), sensors };
+        let mut report = found.report(&unit, corrected, grid);
+        report.warnings.splice(0..0, job.work.told());
         // Where every gyro is refused there is nothing new to say.
-        let stated = self.output.files().out.is_some() && !report.parameters.is_empty();
+        let stated = self.output.files().out.is_some() && found.stated().next().is_some();
         let base = job.work.base.as_ref().filter(|_| stated);
-        let document = base.map(|base| self.document(base, job.work, &report)).transpose()?;
+        let document = base.map(|base| self.document(base, job.work, (&found, &report))).transpose()?;
         Ok(Done { report, document })
     }
 
     fn is_corrected(&self) -> bool {
         self.corrected || self.log.log.iter().any(|path| is_csv(path))
-    }
-
-    /// Analyses a unit.
-    fn report(&self, job: &Job<'_>) -> Result<Report, Error> {
-        let columns = self.columns(job)?;
-        let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
-        let mut grid = Grid::of(columns)?;
-        grid.notes.splice(0..0, job.work.told());
-        let working = job.at_work("Allan deviations, drift, spectrum");
-        let sensors = analyse(&grid, self.fit_hours);
-        working.finish();
-        let mut parameters = Vec::new();
-        for sensor in sensors.iter().filter(|_| kind == Kind::Rate) {
-            match Parameters::of(sensor, self.initial_sigma) {
-                Ok(found) => parameters.push((sensor.name.clone(), found)),
-                Err(why) => grid.refused.push(why),
-            }
-        }
-        Ok(Report {
-            unit,
-            kind,
-            corrected,
-            tick_s: grid.tick_s,
-            ticks: grid.ticks,
-            length_h: grid.length_h(),
-            notes: grid.notes,
-            refused: grid.refused,
-            sensors,
-            parameters,
-        })
     }
 
     fn columns(&self, job: &Job<'_>) -> Result<Columns, Error> {
@@ -141,25 +118,29 @@ impl DriftArgs {
     }
 
     /// The unit's document with the parameters in it.
-    fn document(&self, base: &Written, work: &Work, report: &Report) -> Result<Written, Error> {
+    fn document(
+        &self,
+        base: &Written,
+        work: &Work,
+        (found, report): (&Found, &Report),
+    ) -> Result<Written, Error> {
         let mut document = base.document.clone();
         // What the document says of the constant part holds, unless something else was stated.
-        put(&mut document, &report.parameters, self.initial_sigma.is_none())?;
+        put(&mut document, found, self.initial_sigma.is_none())?;
         document.created = Some(self.output.date()?);
         let of_log = origin(&work.logs(), &command_line())?;
         let mut whole = document.origin.take().unwrap_or_default();
         let mut details = whole.details.take().unwrap_or_default();
-        let notes: Vec<String> = report
-            .parameters
-            .iter()
+        let notes: Vec<String> = found
+            .stated()
             .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}")))
             .collect();
         let about = json!({
             "tool": TOOL,
             "command": of_log.command,
             "method": "restricted maximum likelihood of a first-order Markov drift; N from the overlapping Allan variance",
-            "length_h": report.length_h,
-            "verdict": report.verdict(),
+            "length_h": found.length_h,
+            "verdict": report.headline(),
             "notes": notes,
             "log": of_log.log,
         });

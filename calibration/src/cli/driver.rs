@@ -11,7 +11,7 @@ use super::files::Files;
 use super::units::{Logs, Unit, Work};
 use crate::document::Written;
 use crate::error::Error;
-use crate::report::{BatchTable, UnitReport, in_parallel, of_unit};
+use crate::report::{Batch, Report, in_parallel, of_unit};
 
 /// What a command that works on logs has to say of itself before it is carried out.
 pub(super) struct Task<'a> {
@@ -28,8 +28,8 @@ pub(super) struct Task<'a> {
 }
 
 /// What came of a unit: what is said of it, and its new document where there is something new to say and it was asked for.
-pub(super) struct Done<R> {
-    pub(super) report: R,
+pub(super) struct Done {
+    pub(super) report: Report,
     pub(super) document: Option<Written>,
 }
 
@@ -65,18 +65,15 @@ impl<'a> Task<'a> {
     }
 
     /// Carries it out on the units that its logs have.
-    pub(super) fn run<R: UnitReport + Send>(
-        &self,
-        of_unit: impl Fn(&Job<'_>) -> Result<Done<R>, Error> + Sync,
-    ) -> Result<(), Error> {
+    pub(super) fn run(&self, of_unit: impl Fn(&Job<'_>) -> Result<Done, Error> + Sync) -> Result<(), Error> {
         self.run_on(|| self.logs.units(), of_unit)
     }
 
     /// Carries it out: as many units at a time as there are processors, and one that comes to nothing does not stop the others.
-    pub(super) fn run_on<R: UnitReport + Send>(
+    pub(super) fn run_on(
         &self,
         units: impl FnOnce() -> Result<Vec<Unit>, Error>,
-        of_unit: impl Fn(&Job<'_>) -> Result<Done<R>, Error> + Sync,
+        of_unit: impl Fn(&Job<'_>) -> Result<Done, Error> + Sync,
     ) -> Result<(), Error> {
         let files = self.files;
         files.check(&self.logs.inputs().into_iter().chain(self.beside).collect::<Vec<_>>())?;
@@ -118,8 +115,8 @@ impl<'a> Task<'a> {
 
     /// Prints what came of several units, the table that closes them last. What was refused comes back, and after that the units that
     /// came to nothing.
-    fn close<R: UnitReport>(&self, units: &[(String, Result<R, Error>)]) -> Result<Vec<String>, Error> {
-        let mut batch = BatchTable::of::<R>();
+    fn close(&self, units: &[(String, Result<Report, Error>)]) -> Result<Vec<String>, Error> {
+        let batch = Batch(units);
         let (mut refused, mut failed, mut reports) = (Vec::new(), Vec::new(), Vec::new());
         for (unit, came) in units {
             match came {
@@ -129,13 +126,9 @@ impl<'a> Task<'a> {
                     } else {
                         print(format!("{}\n", report.to_text()).as_bytes())?;
                     }
-                    batch.add(unit, Ok(report.rows()));
                     refused.extend(refusals(report, self.accept_partial));
                 }
-                Err(error) => {
-                    batch.add(unit, Err(error.to_string()));
-                    failed.push(format!("{unit}: {error}"));
-                }
+                Err(error) => failed.push(format!("{unit}: {error}")),
             }
         }
         self.files.page(Path::to_path_buf, || batch.to_html(self.title))?;
@@ -146,8 +139,8 @@ impl<'a> Task<'a> {
 }
 
 /// What was refused of a unit. A part of the sensors is no failure where that is accepted; all of them are.
-fn refusals<R: UnitReport>(report: &R, accept_partial: bool) -> Vec<String> {
-    let partial = accept_partial && report.rows().iter().any(|row| row.accepted);
+fn refusals(report: &Report, accept_partial: bool) -> Vec<String> {
+    let partial = accept_partial && report.verdicts.iter().any(|verdict| verdict.accepted);
     if partial { Vec::new() } else { report.refusals() }
 }
 
@@ -158,6 +151,12 @@ pub(super) fn emit(
     text: impl FnOnce() -> String,
 ) -> Result<(), Error> {
     print(if as_json { format!("{}\n", json()) } else { text() }.as_bytes())
+}
+
+/// What is said of documents: page, and all tables or JSON.
+pub(super) fn close(files: &Files<'_>, report: &Report) -> Result<(), Error> {
+    files.page(Path::to_path_buf, || report.to_html())?;
+    emit(files.json, || report.to_json(), || report.whole_text())
 }
 
 /// Writes to standard output; a reader that has gone away is no error.

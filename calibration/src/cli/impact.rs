@@ -14,21 +14,18 @@ use isotherm_log::diff::is_csv;
 use super::bar;
 use super::driver::emit;
 use super::files::PageArgs;
-use super::limits::within;
 use super::runs::{LogArgs, Reading};
 use super::units::Logs;
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::drift::HOUR_S;
 use crate::fits::drift::columns::{Columns, Kind};
-use crate::fits::impact::ins::{GREATEST_LATITUDE_DEG, TURN_RATIO};
 use crate::fits::impact::over_starts;
 use crate::fits::impact::scenario::Voyage;
+use crate::limits::within;
 use crate::report::short;
 use crate::runs::cut::Cut;
 
-/// Most hours of either part.
-const MOST_HOURS: f64 = 1000.0;
 /// Sizes of the gyros in tables 1 and 2 of 002, for a drift without a document: σ, τ, σ1, τ1, constant part, N.
 const SIZES_DEG_H: [f64; 6] = [0.0034, 9.5, 0.000_08, 140.0, 0.05, 0.0002];
 
@@ -55,11 +52,10 @@ pub(super) struct ImpactArgs {
         value_name = "DEG_PER_H2",
         alias = "trend-deg-per-h2",
         allow_hyphen_values = true,
-        conflicts_with = "log"
-    )]
+        conflicts_with = "log", value_parser = within(-100.0, 100.0))]
     trend: Option<f64>,
     /// Constant that appears at departure, as after a shock (°/h)
-    #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"])]
+    #[arg(long, value_name = "DEG_PER_H", alias = "constant-deg-per-h", allow_hyphen_values = true, conflicts_with_all = ["log", "seeds"], value_parser = within(-1000.0, 1000.0))]
     constant: Option<f64>,
     /// Gyro with the trend or the constant (default: each alone, with --seeds all at once)
     #[arg(long, value_enum)]
@@ -73,24 +69,8 @@ pub(super) struct ImpactArgs {
     /// The first seed
     #[arg(long, hide_short_help = true, value_name = "SEED", default_value_t = 1)]
     seed: u64,
-    /// Latitude (°)
-    #[arg(long, value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true)]
-    latitude: f64,
-    /// Length of the voyage without position (h)
-    #[arg(long, value_name = "HOURS", default_value_t = 48.0)]
-    hours: f64,
-    /// Length of the calibration before it (h)
-    #[arg(long, value_name = "HOURS", default_value_t = 21.0)]
-    calibration_hours: f64,
-    /// Rate of the platform about the vertical (multiples of the Earth's)
-    #[arg(long, hide_short_help = true, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true)]
-    turn_ratio: f64,
-    /// Standard error of the reference rate per minute (°/h)
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_H", default_value_t = 0.001)]
-    reference_sigma: f64,
-    /// No velocity log: level gyros are not observed during the voyage
-    #[arg(long, hide_short_help = true)]
-    no_log_aid: bool,
+    #[command(flatten)]
+    voyage: Voyage,
     #[command(flatten)]
     page: PageArgs,
 }
@@ -125,11 +105,12 @@ impl Gyro {
 impl ImpactArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let mut voyage = self.voyage()?;
+        self.check()?;
+        let mut voyage = self.voyage;
         let mut parts = self.parts()?;
         let cut = Cut::default();
         let starts = self.starts(&mut parts, &cut)?;
-        let mut report = if !self.log.is_empty() {
+        let mut sailed = if !self.log.is_empty() {
             self.sail_log(&mut voyage, &parts, &cut)?
         } else if self.seeds.is_some()
             || (self.trend.is_none()
@@ -143,24 +124,16 @@ impl ImpactArgs {
             let words = "give a drift: a LOG, --calibration DOC, --trend DEG_PER_H2 or --constant DEG_PER_H";
             return Err(Error::Usage(words.to_owned()));
         };
-        report.notes.extend(starts);
+        sailed.notes.extend(starts);
+        let report = sailed.report();
         let files = self.page.files();
         files.page(Path::to_path_buf, || report.to_html())?;
-        emit(files.json, || report.to_json(), || report.to_text())?;
+        emit(files.json, || report.to_json(), || report.summary_text())?;
         Error::end(Vec::new(), cut.words().map(str::to_owned).into_iter().collect())
     }
 
-    /// Checks the numbers.
-    fn voyage(&self) -> Result<Voyage, Error> {
-        within([
-            ("--latitude", Some(self.latitude), [-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG], ""),
-            ("--hours", Some(self.hours), [0.5, MOST_HOURS], ""),
-            ("--calibration-hours", Some(self.calibration_hours), [0.5, MOST_HOURS], ""),
-            ("--turn-ratio", Some(self.turn_ratio), [-1000.0, 1000.0], ""),
-            ("--reference-sigma", Some(self.reference_sigma), [0.0, 1000.0], ""),
-            ("--trend", self.trend, [-100.0, 100.0], ""),
-            ("--constant", self.constant, [-1000.0, 1000.0], ""),
-        ])?;
+    /// Checks what goes together, and the files.
+    fn check(&self) -> Result<(), Error> {
         if self.gyro.is_some() && self.trend.is_none() && self.constant.is_none() {
             let words = "--gyro needs --trend or --constant: it names the gyro that has them";
             return Err(Error::Usage(words.to_owned()));
@@ -172,15 +145,7 @@ impl ImpactArgs {
         }
         let inputs: Vec<&Path> =
             self.log.iter().chain(&self.start_log).chain(&self.document).map(PathBuf::as_path).collect();
-        self.page.files().check(&inputs)?;
-        Ok(Voyage {
-            latitude_deg: self.latitude,
-            turn_ratio: self.turn_ratio,
-            calibration_h: self.calibration_hours,
-            hours: self.hours,
-            log_aids_level: !self.no_log_aid,
-            reference_sigma_rad_per_s: AngularRate::from_deg_per_h(self.reference_sigma).as_rad_per_s(),
-        })
+        self.page.files().check(&inputs)
     }
 
     /// What the estimator is to expect: the document's, or gyros of the size of 002's, where there is none or where it only corrects

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_protocol::document::Created;
 
-use super::driver::emit;
+use super::driver::close;
 use super::files::Files;
 use super::output::{a_date, date};
 use crate::document::merge::{Merged, Take, merge};
@@ -56,7 +56,7 @@ impl MergeArgs {
         merged.written = Written::of(&document)?;
         merged.written.save(&self.out, self.overwrite)?;
         let name = name_of(&self.out);
-        emit(self.json, || merged.to_json(&name), || merged.sheet(&name).to_text())
+        close(&files, &merged.sheet(&name))
     }
 }
 

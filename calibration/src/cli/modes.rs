@@ -5,15 +5,16 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::reversal::MAX_TRANSITION_TICKS;
 
 use super::driver::{Job, Task};
-use super::limits::within;
-use super::output::{About, Fitted, OutputArgs};
+use super::output::OutputArgs;
 use super::place::PlaceArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
+use crate::document::{About, Fitted};
 use crate::error::Error;
 use crate::fits::modes::document::{details, sigmas};
 use crate::fits::modes::fit::{Wanted, make};
 use crate::fits::modes::model::Asked;
+use crate::limits::within;
 use crate::numbers::hull;
 
 /// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
@@ -32,20 +33,13 @@ pub(super) struct ModesArgs {
     base: BaseArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Order of the static polynomial, 0…3 (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
-    static_order: Option<u8>,
-    /// Order of the magnetic polynomial, 0…3 (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=3))]
-    magnetic_order: Option<u8>,
-    /// Order of the slow meander, 0 or 1 (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(0..=1))]
-    meander_order: Option<u8>,
+    #[command(flatten)]
+    asked: Asked,
     /// Ticks lost by a switch, 1…32 (default: found in the log)
     #[arg(long, hide_short_help = true, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_TRANSITION_TICKS)))]
     transition_ticks: Option<u8>,
     /// Time to leave out after every switch (s) (default: the servo's transient)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS")]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", value_parser = within(0.0, 3600.0))]
     settle: Option<f64>,
     /// Reference temperature of the polynomials (°C) (default: the document's, else 20)
     #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true)]
@@ -60,36 +54,30 @@ const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not state
 impl ModesArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        within([("--settle", self.settle, [0.0, 3600.0], "s")])?;
         if self.base.document.is_none() {
             return Err(Error::Usage(NO_DOCUMENT.to_owned()));
         }
         let place = self.place.place()?;
         let logs = Logs::apart(&self.log, &self.judge, &self.base);
         let task = Task::new("Mode-reversed gyros of several units", self.output.files(), logs);
-        task.run(|job| self.fit(job, place)?.done(&self.output, job))
+        task.run(|job| self.output.done(self.fit(job, place)?, job))
     }
 
     fn fit(&self, job: &Job<'_>, place: Option<Place>) -> Result<Fitted, Error> {
         let work = job.work;
         let base = work.base()?;
-        let order = |order: Option<u8>| order.map(usize::from);
         let made = make(
             &Wanted {
                 runs: &work.runs,
                 judge: &work.judges,
                 base: &base.document,
                 place,
-                asked: Asked {
-                    static_order: order(self.static_order),
-                    magnetic_order: order(self.magnetic_order),
-                    meander_order: order(self.meander_order),
-                },
+                asked: self.asked,
                 transition_ticks: self.transition_ticks,
                 settle_s: self.settle,
                 reference_deg_c: self.reference,
             },
-            || job.bar(),
+            &mut job.bar(),
         )?;
         let ranges = made.gyros.iter().flatten().map(|fit| fit.range_deg_c);
         let about = About {
@@ -98,6 +86,7 @@ impl ModesArgs {
             details: details(&made),
             sigmas: sigmas(&made),
             range_deg_c: hull(ranges),
+            ..About::default()
         };
         Ok(Fitted { report: made.report(), written: made.written, about })
     }

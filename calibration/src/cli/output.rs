@@ -4,16 +4,13 @@ use std::path::PathBuf;
 use std::time::SystemTime;
 
 use clap::Args;
-use isotherm_protocol::document::{Created, Document};
+use isotherm_protocol::document::Created;
 use isotherm_protocol::history::WallTime;
-use serde_json::json;
-use toml::Table;
 
 use super::driver::{Done, Job};
 use super::files::Files;
-use crate::document::{Written, command_line, origin};
+use crate::document::Fitted;
 use crate::error::Error;
-use crate::report::{FitReport, Sigmas, residuals};
 
 /// What a fit writes.
 #[derive(Debug, Clone, Args)]
@@ -35,73 +32,6 @@ pub(super) struct OutputArgs {
     json: bool,
 }
 
-/// A fit on its way into files.
-pub(super) struct Fitted {
-    /// The document without what is to be said of its origin.
-    pub(super) written: Written,
-    /// What is said of the fit.
-    pub(super) report: FitReport,
-    /// What the document says of it beside its coefficients.
-    pub(super) about: About,
-}
-
-/// What the document says of a fit beside its coefficients.
-pub(super) struct About {
-    /// Method.
-    pub(super) method: &'static str,
-    /// Name of its table in `origin.details`.
-    pub(super) key: &'static str,
-    /// That table.
-    pub(super) details: Table,
-    /// Standard errors, as what compares documents reads them.
-    pub(super) sigmas: Sigmas,
-    /// Range of temperature (°C).
-    pub(super) range_deg_c: Option<[f64; 2]>,
-}
-
-impl Fitted {
-    /// What comes of it: its report with what is to be said of the logs, its document with what is to be said of the fit. Where everything
-    /// is refused there is no new document, and the report says so.
-    pub(super) fn done(self, output: &OutputArgs, job: &Job<'_>) -> Result<Done<FitReport>, Error> {
-        let Self { written, report, about } = self;
-        let any_accepted = report.verdicts.iter().any(|verdict| verdict.accepted);
-        output.done(any_accepted, report, job, |report| {
-            about.complete(written.document, &job.work.logs(), report, output.date()?)
-        })
-    }
-}
-
-impl About {
-    /// A document with its origin.
-    fn complete(
-        &self,
-        mut document: Document,
-        logs: &[PathBuf],
-        report: &FitReport,
-        created: Created,
-    ) -> Result<Written, Error> {
-        let mut origin = origin(logs, &command_line())?;
-        origin.method = Some(self.method.to_owned());
-        origin.range_deg_c = self.range_deg_c;
-        origin.residual = residuals(&report.verdicts);
-        let before = document.origin.take();
-        let mut details = before.as_ref().and_then(|before| before.details.clone()).unwrap_or_default();
-        if let Some(before) = before.filter(|before| before.tool.is_some() || before.method.is_some()) {
-            // What the rest of the document rests on.
-            let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
-            let earlier = json!({ "tool": tool, "method": method, "log": before.log });
-            let earlier = toml::Value::try_from(earlier).map_err(|error| Error::document(&error))?;
-            details.insert("before".to_owned(), earlier);
-        }
-        details.insert(self.key.to_owned(), toml::Value::Table(self.details.clone()));
-        self.sigmas.write(&mut details);
-        origin.details = Some(details);
-        document.origin = Some(origin);
-        document.created = Some(created);
-        Written::of(&document)
-    }
-}
-
 impl OutputArgs {
     /// As files.
     pub(super) fn files(&self) -> Files<'_> {
@@ -113,24 +43,19 @@ impl OutputArgs {
         }
     }
 
-    /// What comes of a fit: its report with what is to be said of the logs, and its document, where one is wanted and something was
-    /// accepted.
-    pub(super) fn done(
-        &self,
-        any_accepted: bool,
-        mut report: FitReport,
-        job: &Job<'_>,
-        document: impl FnOnce(&FitReport) -> Result<Written, Error>,
-    ) -> Result<Done<FitReport>, Error> {
+    /// What comes of a fit: its report with what is to be said of the logs, its document with what is to be said of the fit. Where everything
+    /// is refused there is no new document, and the report says so.
+    pub(super) fn done(&self, fitted: Fitted, job: &Job<'_>) -> Result<Done, Error> {
+        let Fitted { written, mut report, about } = fitted;
         report.warnings.extend(job.work.told());
         let Some(out) = &self.out else { return Ok(Done { report, document: None }) };
-        if !any_accepted {
+        if !report.verdicts.iter().any(|verdict| verdict.accepted) {
             let out = job.name(out);
             report.warnings.push(format!("every sensor is refused: nothing is written to {}", out.display()));
             return Ok(Done { report, document: None });
         }
-        let document = Some(document(&report)?);
-        Ok(Done { report, document })
+        let document = about.complete(written.document, &job.work.logs(), &report, self.date()?)?;
+        Ok(Done { report, document: Some(document) })
     }
 
     /// The date that the new document is to state.

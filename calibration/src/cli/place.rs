@@ -5,6 +5,7 @@ use isotherm_correction::earth::Place;
 
 use crate::error::Error;
 use crate::fits::positions::gravity;
+use crate::limits::within;
 
 /// Place and attitude, for the Earth rate.
 #[derive(Debug, Clone, Args)]
@@ -30,19 +31,19 @@ pub(crate) struct PlaceArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GravityArgs {
     /// Gravity at the place (m/s²)
-    #[arg(long, value_name = "M_PER_S2")]
+    #[arg(long, value_name = "M_PER_S2", value_parser = within(9.7, 9.9))]
     gravity: Option<f64>,
     /// Latitude of the place (°), for normal gravity
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, value_parser = within(-90.0, 90.0))]
     latitude: Option<f64>,
     /// Height of the place above the sea (m), for normal gravity
-    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true, value_parser = within(-1000.0, 20_000.0))]
     height: f64,
 }
 
 impl GravityArgs {
     /// Gravity (m/s²), and a warning where nothing is said of it.
-    pub(crate) fn stated(&self) -> Result<(f64, Option<String>), Error> {
+    pub(crate) fn stated(&self) -> (f64, Option<String>) {
         gravity::stated(self.gravity, self.latitude, self.height)
     }
 }

@@ -3,15 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Arg, Args};
-use isotherm_cli::Bar;
 
-use super::driver::{Job, Task, emit};
-use super::limits::above_0;
-use super::output::{About, Fitted, OutputArgs};
+use super::driver::{Job, Task, close};
+use super::output::OutputArgs;
 use super::place::GravityArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
-use crate::document::Written;
+use crate::document::{About, Fitted, Written};
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
 use crate::fits::positions::budget::{ARCSEC_PER_RAD, Budget};
@@ -25,7 +23,8 @@ use crate::fits::positions::report::{Set, report};
 use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
-use crate::runs::Run;
+use crate::limits::{above_0, from_0};
+use crate::runs::{Run, Watch};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
 #[derive(Debug, Args)]
@@ -55,28 +54,28 @@ pub(super) struct PositionsArgs {
     #[command(flatten)]
     gravity: GravityArgs,
     /// σ1: standard deviation of the stand's positioning (″)
-    #[arg(long, value_name = "ARCSEC", default_value_t = 5.0)]
+    #[arg(long, value_name = "ARCSEC", default_value_t = 5.0, value_parser = above_0)]
     positioning: f64,
     /// σ2: standard deviation of its axes' run-out (″)
-    #[arg(long, value_name = "ARCSEC", default_value_t = 2.0)]
+    #[arg(long, value_name = "ARCSEC", default_value_t = 2.0, value_parser = from_0)]
     run_out: f64,
     /// Level error of the stand (″, one sigma)
-    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 60.0)]
+    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 60.0, value_parser = above_0)]
     levelling: f64,
     /// Window of the search for still poses (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
     window: f64,
     /// Largest variance of a still window, relative to the log's quietest fifth
-    #[arg(long, hide_short_help = true, value_name = "FACTOR", default_value_t = 4.0)]
+    #[arg(long, hide_short_help = true, value_name = "FACTOR", default_value_t = 4.0, value_parser = above_0)]
     threshold: f64,
     /// Rate above which the unit turns (°/s)
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 0.2)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 0.2, value_parser = above_0)]
     still_rate: f64,
     /// Time to leave out at the beginning of each pose (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 2.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 2.0, value_parser = from_0)]
     settle: f64,
     /// Shortest pose (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = above_0)]
     least: f64,
     /// Temperature channels that the axes follow by their mean (default: the document's, else the accelerometers')
     #[arg(long, value_name = "CHANNEL")]
@@ -96,7 +95,6 @@ pub(super) struct PositionsArgs {
 impl PositionsArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        self.limits()?;
         let plan = Plan::named(&self.plan)?;
         if self.budget {
             return self.print_budget(&plan);
@@ -107,31 +105,7 @@ impl PositionsArgs {
             beside: self.times.as_deref(),
             ..Task::new("Accelerometers of several units", self.output.files(), logs)
         };
-        task.run(|job| self.fit(job, &settings, about_gravity.as_ref())?.done(&self.output, job))
-    }
-
-    fn limits(&self) -> Result<(), Error> {
-        above_0(
-            [
-                ("--positioning", self.positioning),
-                ("--levelling", self.levelling),
-                ("--window", self.window),
-                ("--threshold", self.threshold),
-                ("--still-rate", self.still_rate),
-                ("--least", self.least),
-                ("--noise", self.planned.noise),
-                ("--seconds", self.planned.seconds),
-                ("--scale", self.planned.scale),
-            ]
-            .map(|(name, value)| (name, Some(value))),
-        )?;
-        let planned = ("--hysteresis", self.planned.hysteresis);
-        for (name, value) in [("--run-out", self.run_out), ("--settle", self.settle), planned] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(Error::Usage(format!("{name} is {value}, must be a number, 0 or above")));
-            }
-        }
-        Ok(())
+        task.run(|job| self.output.done(self.fit(job, &settings, about_gravity.as_ref())?, job))
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
@@ -141,12 +115,11 @@ impl PositionsArgs {
             ..self.planned.clone()
         };
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
-        let json = || budget.to_json(plan, levelling_rad);
-        emit(self.output.files().json, json, || budget.to_text(plan, levelling_rad))
+        close(&self.output.files(), &budget.report(plan, levelling_rad))
     }
 
     fn settings(&self, plan: Plan) -> Result<(Settings, Option<String>), Error> {
-        let (gravity, warning) = self.gravity.stated()?;
+        let (gravity, warning) = self.gravity.stated();
         let settings = Settings {
             plan,
             gravity,
@@ -172,13 +145,13 @@ impl PositionsArgs {
         settings: &Settings,
         about_gravity: Option<&String>,
     ) -> Result<Fitted, Error> {
-        let (work, bar) = (job.work, || job.bar());
+        let (work, watch) = (job.work, &mut job.bar());
         let runs = &work.runs;
         let add = "add [accel] with their channels, nominal scale factors and axes";
         let base = &*work.base_with_accelerometers(add, || {
-            Written::of(&of_run(work.run()?, &self.accelerometer_unit, bar())?)
+            Written::of(&of_run(work.run()?, &self.accelerometer_unit, &mut *watch)?)
         })?;
-        let tracks = tracks(runs, base, bar)?;
+        let tracks = tracks(runs, base, watch)?;
         let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;
         analysis.warnings.extend(about_gravity.cloned());
         let document = complete(&base.document, &analysis, settings.gravity);
@@ -186,8 +159,8 @@ impl PositionsArgs {
         let after = Written::of(&document)?;
         let inside: Vec<(Pose, usize)> =
             analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
-        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], bar)?;
-        let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], bar)?;
+        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], watch)?;
+        let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], watch)?;
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
         let report = report(
@@ -200,9 +173,10 @@ impl PositionsArgs {
         let about = About {
             method: "positions of a stand, weighted least squares with the stand's errors",
             key: "positions",
-            details: details(&analysis, settings, &report)?,
+            details: details(&analysis, settings),
             sigmas: sigmas(&document, &analysis, settings),
             range_deg_c: Some(range(&analysis)),
+            ..About::default()
         };
         let accepted = report.verdicts.iter().all(|verdict| verdict.accepted);
         let written = if accepted { after } else { Written::of(&base.document)? };
@@ -216,18 +190,18 @@ fn outside(
     analysis: &Analysis,
     runs: &[Run],
     [before, after, base]: [&Written; 3],
-    bar: impl Fn() -> Bar + Copy,
+    watch: &mut dyn Watch,
 ) -> Result<Option<Vec<Judgement>>, Error> {
     if runs.is_empty() {
         return Ok(None);
     }
-    let (poses, _) = positions(&tracks(runs, base, bar)?, settings).map_err(Error::Refused)?;
-    Ok(Some(judged(settings, analysis, &poses, runs, [before, after], bar)?))
+    let (poses, _) = positions(&tracks(runs, base, watch)?, settings).map_err(Error::Refused)?;
+    Ok(Some(judged(settings, analysis, &poses, runs, [before, after], watch)?))
 }
 
 /// Runs tick by tick, corrected with a document.
-fn tracks(runs: &[Run], written: &Written, bar: impl Fn() -> Bar + Copy) -> Result<Vec<Track>, Error> {
-    runs.iter().map(|run| Track::of(run, &written.loaded, bar())).collect()
+fn tracks(runs: &[Run], written: &Written, watch: &mut dyn Watch) -> Result<Vec<Track>, Error> {
+    runs.iter().map(|run| Track::of(run, &written.loaded, &mut *watch)).collect()
 }
 
 /// Poses of runs, before and after.
@@ -237,9 +211,9 @@ fn judged(
     poses: &[(Pose, usize)],
     runs: &[Run],
     [before, after]: [&Written; 2],
-    bar: impl Fn() -> Bar + Copy,
+    watch: &mut dyn Watch,
 ) -> Result<Vec<Judgement>, Error> {
-    let (before, after) = (tracks(runs, before, bar)?, tracks(runs, after, bar)?);
+    let (before, after) = (tracks(runs, before, watch)?, tracks(runs, after, watch)?);
     let errors = analysis.fit.stand.map(|(error, _)| error);
     Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
 }

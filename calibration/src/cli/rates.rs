@@ -9,16 +9,16 @@ use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{Document, GyroOutput, Temperature};
 
 use super::driver::{Job, Task};
-use super::limits::within;
-use super::output::{About, Fitted, OutputArgs};
+use super::output::OutputArgs;
 use super::place::PlaceArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
-use crate::document::plain;
+use crate::document::{About, Fitted, plain};
 use crate::error::Error;
 use crate::fits::rates::document::{details, sigmas};
 use crate::fits::rates::fit::{Wanted, make};
 use crate::fits::rates::steps::{Step, listed, read};
+use crate::limits::within;
 use crate::runs::Run;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
@@ -56,7 +56,7 @@ pub(super) struct RatesArgs {
     #[command(flatten)]
     place: PlaceArgs,
     /// Standard deviation of the table's rates (ppm)
-    #[arg(long, hide_short_help = true, value_name = "PPM", default_value_t = 0.0)]
+    #[arg(long, hide_short_help = true, value_name = "PPM", default_value_t = 0.0, value_parser = within(0.0, 1e6))]
     table_ppm: f64,
     /// Add the remaining bias to the document's static bias
     #[arg(long, hide_short_help = true)]
@@ -68,14 +68,13 @@ pub(super) struct RatesArgs {
 impl RatesArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        within([("--table-ppm", Some(self.table_ppm), [0.0, 1e6], "")])?;
         let place = self.place.place()?;
         let logs = Logs::apart(&self.log, &self.judge, &self.base);
         let task = Task {
             beside: self.steps.as_deref(),
             ..Task::new("Rate table, several units", self.output.files(), logs)
         };
-        task.run(|job| self.fit(job, place.as_slice())?.done(&self.output, job))
+        task.run(|job| self.output.done(self.fit(job, place.as_slice())?, job))
     }
 
     fn fit(&self, job: &Job<'_>, place: &[Place]) -> Result<Fitted, Error> {
@@ -100,13 +99,14 @@ impl RatesArgs {
             table_ppm: self.table_ppm,
             with_bias: self.with_bias,
         };
-        let made = make(&wanted, || job.bar())?;
+        let made = make(&wanted, &mut job.bar())?;
         let about = About {
             method: "rate table, weighted least squares",
             key: "rates",
             details: details(&made),
             sigmas: sigmas(&made),
             range_deg_c: made.range_deg_c(),
+            ..About::default()
         };
         Ok(Fitted { report: made.report(), written: made.written, about })
     }

@@ -1,10 +1,10 @@
 //! `isotherm-calibrate show`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use super::driver::emit;
+use super::driver::close;
 use super::files::PageArgs;
 use crate::document::Written;
 use crate::document::show::show;
@@ -28,8 +28,6 @@ impl ShowArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         let files = self.page.files();
         files.check(&[&self.document])?;
-        let shown = show(&Written::read(&self.document)?)?;
-        files.page(Path::to_path_buf, || shown.sheet.to_html())?;
-        emit(files.json, || shown.to_json(), || shown.sheet.to_text())
+        close(&files, &show(&Written::read(&self.document)?)?)
     }
 }

@@ -8,14 +8,12 @@ use clap::Args;
 use isotherm_correction::units::Span;
 
 use super::driver::{Done, Job, Task};
-use super::limits::within;
 use super::output::OutputArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
 use super::units::{Logs, Work};
-use crate::document::{command_line, origin};
 use crate::error::Error;
-use crate::fits::thermal::{Fitted, Method, Settings, Terms, fit};
-use crate::report::FitReport;
+use crate::fits::thermal::{Settings, fit};
+use crate::limits::within;
 pub(super) use stands::StandArgs;
 
 /// Bias and scale factor over temperature from chamber runs of units at rest or on a rate table
@@ -33,19 +31,15 @@ pub(super) use stands::StandArgs;
 pub(super) struct ThermalArgs {
     #[command(flatten)]
     log: LogArgs,
-    /// Method of the fit
-    #[arg(long, value_enum, default_value_t = Method::Joint)]
-    method: Method,
-    /// Choice of terms: cross-validation, or the largest model
-    #[arg(long, value_enum, default_value_t = Terms::Auto)]
-    terms: Terms,
+    #[command(flatten)]
+    settings: Settings,
     #[command(flatten)]
     judge: JudgeArgs,
     /// Start this long after each judging log's beginning (s)
-    #[arg(long, value_name = "SECONDS", requires = "judge")]
+    #[arg(long, value_name = "SECONDS", requires = "judge", value_parser = within(0.0, 1e9))]
     judge_start: Option<f64>,
     /// Length of each judging log to read (s) (default: all)
-    #[arg(long, value_name = "SECONDS", requires = "judge")]
+    #[arg(long, value_name = "SECONDS", requires = "judge", value_parser = within(1.0, 1e9))]
     judge_duration: Option<f64>,
     #[command(flatten)]
     base: BaseArgs,
@@ -56,27 +50,11 @@ pub(super) struct ThermalArgs {
     output: OutputArgs,
     #[command(flatten)]
     stands: StandArgs,
-    /// Length of the windows of the fit (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0)]
-    fit_window: f64,
-    /// Windows of the stated residuals (s) (default: those of the fit, up to ten of them in runs of hours)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS")]
-    window: Option<f64>,
-    /// Smoothing of the temperature (s) (default: by cross-validation)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS")]
-    smoothing: Option<f64>,
 }
 
 impl ThermalArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        within([
-            ("--fit-window", Some(self.fit_window), [1.0, 600.0], "s"),
-            ("--window", self.window, [1.0, 3600.0], "s"),
-            ("--smoothing", self.smoothing, [0.0, 3600.0], "s"),
-            ("--judge-start", self.judge_start, [0.0, 1e9], "s"),
-            ("--judge-duration", self.judge_duration, [1.0, 1e9], "s"),
-        ])?;
         self.each_once()?;
         let judging = Reading {
             start: self.judge_start.map_or(Span::ZERO, Span::from_s),
@@ -91,15 +69,11 @@ impl ThermalArgs {
         task.run(|job| self.fit(job))
     }
 
-    fn fit(&self, job: &Job<'_>) -> Result<Done<FitReport>, Error> {
+    fn fit(&self, job: &Job<'_>) -> Result<Done, Error> {
         let work = job.work;
-        let settings = self.settings(work)?;
-        let origin = origin(&work.logs(), &command_line())?;
         let base = work.base.as_ref().map(|base| &base.document);
-        let bar = job.at_work("fitting");
-        let Fitted { written, report, any_accepted } =
-            fit(base, (&work.runs, &work.judges), &settings, origin, bar)?;
-        self.output.done(any_accepted, report, job, |_| Ok(written))
+        let fitted = fit(base, (&work.runs, &work.judges), &self.settings(work)?, job.at_work("fitting"))?;
+        self.output.done(fitted, job)
     }
 
     /// A log counts once, and judges nothing that was fitted to it.
@@ -134,14 +108,7 @@ impl ThermalArgs {
     }
 
     fn settings(&self, work: &Work) -> Result<Settings, Error> {
-        Ok(Settings {
-            method: self.method,
-            terms: self.terms,
-            stands: self.stands.stands(work.runs.len(), work.judges.len())?,
-            fit_window_s: self.fit_window,
-            window_s: self.window,
-            smoothing_s: self.smoothing,
-            created: Some(self.output.date()?),
-        })
+        let stands = self.stands.stands(work.runs.len(), work.judges.len())?;
+        Ok(Settings { stands, ..self.settings.clone() })
     }
 }

@@ -5,12 +5,11 @@ use isotherm_cli::Bar;
 use isotherm_protocol::document::AccelOutput;
 
 use super::driver::{Job, Task};
-use super::limits::above_0;
-use super::output::{About, Fitted, OutputArgs};
+use super::output::OutputArgs;
 use super::place::GravityArgs;
 use super::runs::{BaseArgs, LogArgs};
 use super::units::Logs;
-use crate::document::Written;
+use crate::document::{About, Fitted, Written};
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
 use crate::fits::positions::still::StillLimits;
@@ -18,6 +17,7 @@ use crate::fits::positions::track::Track;
 use crate::fits::tumble::document::{before, complete};
 use crate::fits::tumble::fit::{Settings, analyse};
 use crate::fits::tumble::report::{Left, details, report, sigmas};
+use crate::limits::above_0;
 use crate::runs::Run;
 
 /// Axes, scale factors and biases of a unit that was put down in many ways by hand: accelerometers from |f| = g, gyros against them
@@ -34,19 +34,19 @@ pub(super) struct TumbleArgs {
     #[command(flatten)]
     gravity: GravityArgs,
     /// Still time at the beginning (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = above_0)]
     still_start: f64,
     /// Window of the search for still poses (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
     window: f64,
     /// Largest variance of a still window, relative to the still start (default: the best of 2 to 10)
-    #[arg(long, hide_short_help = true, value_name = "FACTOR")]
+    #[arg(long, hide_short_help = true, value_name = "FACTOR", value_parser = above_0)]
     threshold: Option<f64>,
     /// Rate above which the unit turns (°/s)
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 1.0, value_parser = above_0)]
     still_rate: f64,
     /// Shortest pose (s), less half a window at either end
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
     least: f64,
     /// Unit of the accelerometers' means without a document: "V" (converter readings too) or "m/s2"
     #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
@@ -58,17 +58,10 @@ pub(super) struct TumbleArgs {
 impl TumbleArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        above_0([
-            ("--still-start", Some(self.still_start)),
-            ("--window", Some(self.window)),
-            ("--threshold", self.threshold),
-            ("--still-rate", Some(self.still_rate)),
-            ("--least", Some(self.least)),
-        ])?;
-        let gravity = self.gravity.stated()?;
+        let gravity = self.gravity.stated();
         let logs = Logs::together(&self.log, &self.base);
         let task = Task::new("Several units tumbled by hand", self.output.files(), logs);
-        task.run(|job| self.fit(job, &gravity)?.done(&self.output, job))
+        task.run(|job| self.output.done(self.fit(job, &gravity)?, job))
     }
 
     fn fit(&self, job: &Job<'_>, (gravity, about_gravity): &(f64, Option<String>)) -> Result<Fitted, Error> {
@@ -109,9 +102,9 @@ impl TumbleArgs {
         let about = About {
             method: "tumble: |f| = g over still poses; gyros against the accelerometers",
             key: "tumble",
-            details: details(&tumble, &settings, &report)?,
+            details: details(&tumble, &settings),
             sigmas: sigmas(&document, &tumble),
-            range_deg_c: None,
+            ..About::default()
         };
         // Gyros are relative to the axes of the accelerometers that were found with them.
         let accepted = report.verdicts.first().is_some_and(|accel| accel.accepted);

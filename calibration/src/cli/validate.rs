@@ -6,12 +6,11 @@ use clap::Args;
 
 use super::driver::{Done, Job, Task};
 use super::files::PageArgs;
-use super::limits::above_0;
 use super::place::PlaceArgs;
 use super::runs::LogArgs;
 use super::units::Logs;
 use crate::error::Error;
-use crate::report::FitReport;
+use crate::limits::above_0;
 use crate::validate::{JudgedLog, Wanted, validate};
 
 /// Judge a calibration document on logs that it was not made from
@@ -28,7 +27,7 @@ pub(super) struct ValidateArgs {
     #[command(flatten)]
     log: LogArgs,
     /// Averaging windows (s) (default: 10, up to 100 in logs of an hour and more)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS")]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", value_parser = above_0)]
     window: Option<f64>,
     #[command(flatten)]
     place: PlaceArgs,
@@ -39,7 +38,6 @@ pub(super) struct ValidateArgs {
 impl ValidateArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        above_0([("--window", self.window)])?;
         let wanted = Wanted { window_s: self.window, place: self.place.known()? };
         let logs = Logs::judging(&self.log, &self.document);
         let task = Task::new("Judgement of several units", self.page.files(), logs);
@@ -48,7 +46,7 @@ impl ValidateArgs {
 }
 
 /// A unit's runs with its document.
-fn judged(job: &Job<'_>, wanted: Wanted) -> Result<Done<FitReport>, Error> {
+fn judged(job: &Job<'_>, wanted: Wanted) -> Result<Done, Error> {
     let work = job.work;
     let base = work.base()?;
     let logs = work.runs.iter().map(|run| JudgedLog::new(run.clone(), &base.document));

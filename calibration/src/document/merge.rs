@@ -15,13 +15,13 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 use isotherm_protocol::document::Document;
-use serde_json::{Value as Json, json};
+use serde_json::{Map, json};
 use toml::Value;
 
 use crate::document::Written;
 use crate::document::show::terms::tree;
 use crate::error::Error;
-use crate::report::Sheet;
+use crate::report::Report;
 use check::{check, same_unit};
 use sections::{Sections, build, group, sections};
 
@@ -73,12 +73,12 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
         return Err(Error::Refused(conflicts));
     }
     let Picked { sections, from, gone, warnings } = picked;
-    let mut tree = build(&tree(&base.document)?, &sections);
-    tree.insert("origin".to_owned(), origin::origin(base, parts, &from)?);
     let words = |found: Vec<isotherm_protocol::document::Problem>| {
         Error::Document(found.iter().map(ToString::to_string).collect())
     };
-    let document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
+    let tree = build(&tree(&base.document)?, &sections);
+    let mut document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
+    document.origin = Some(origin::origin(base, parts, &from)?);
     let taken = from.into_iter().filter(|(key, _)| sections.contains_key(key)).collect();
     Ok(Merged { written: Written::of(&document)?, taken, gone, warnings })
 }
@@ -222,36 +222,24 @@ fn conflict(key: &str, said: &[(String, Option<Value>)], chosen: Option<&Take>) 
 
 impl Merged {
     /// What was done, as text.
-    pub fn sheet(&self, name: &str) -> Sheet {
+    pub fn sheet(&self, name: &str) -> Report {
         let documents: BTreeSet<&String> = self.taken.iter().map(|(_, from)| from).collect();
-        let mut sheet = Sheet {
-            title: format!("Merge of {name}"),
-            headline: format!(
-                "{name}: {} sections of {} documents, no conflict{}.",
-                self.taken.len(),
-                documents.len(),
-                if self.gone.is_empty() { String::new() } else { format!(", {} left out", self.gone.len()) }
-            ),
-            ..Sheet::default()
-        };
-        sheet.notes = self.warnings.iter().map(|warning| format!("warning: {warning}")).collect();
+        let gone =
+            if self.gone.is_empty() { String::new() } else { format!(", {} left out", self.gone.len()) };
+        let words =
+            format!("{} sections of {} documents, no conflict{gone}", self.taken.len(), documents.len());
+        let mut sheet = Report::saying(format!("Merge of {name}"), name, words);
+        sheet.warnings.clone_from(&self.warnings);
         let row = |(key, from): &(String, String)| vec![key.clone(), from.clone()];
         sheet.table("Taken", ["section", "from"], self.taken.iter().map(row));
         let heading = "Left out, because the part does without";
         sheet.table(heading, ["section", "by"], self.gone.iter().map(row));
+        let map =
+            |pairs: &[(String, String)]| pairs.iter().map(|(key, from)| (key.clone(), json!(from))).collect();
+        sheet.figures = Map::from_iter([
+            ("taken".to_owned(), map(&self.taken)),
+            ("left_out".to_owned(), map(&self.gone)),
+        ]);
         sheet
-    }
-
-    /// What was done, as JSON.
-    pub fn to_json(&self, name: &str) -> Json {
-        let map = |pairs: &[(String, String)]| -> serde_json::Map<String, Json> {
-            pairs.iter().map(|(key, from)| (key.clone(), json!(from))).collect()
-        };
-        json!({
-            "verdict": self.sheet(name).headline,
-            "taken": map(&self.taken),
-            "left_out": map(&self.gone),
-            "warnings": self.warnings,
-        })
     }
 }

@@ -1,11 +1,13 @@
 //! The first document of a unit: three gyros, three accelerometers or none, all along the case axes, for a fit to complete.
 
+use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{
     Accel, AccelOutput, AccelSensor, CURRENT_SCHEMA, Channel, Curve, Document, Gyro, GyroOutput, GyroSensor,
     Orientation, Shape, Temperature,
 };
 
 use crate::axes::AXES;
+use crate::runs::series::Series;
 
 /// A document that passes on what a log has: weights and scale factors are one, and each sensor follows the channel of its name.
 pub(crate) fn plain(
@@ -56,4 +58,54 @@ pub(crate) fn follows(channels: &[Channel], kind: &str, index: usize) -> Option<
     let named = channels.iter().find(|channel| channel.name == own);
     let only = channels.first().filter(|_| channels.len() == 1);
     named.or(only).map(|channel| channel.name.clone())
+}
+
+/// Why a log by itself does not tell a document: readings that are counts, other than three sensors, thermometers that do not read °C
+/// within a range. `of_accelerometers` where accelerometers are needed, as they are, counts or not.
+pub(crate) fn faults(series: &Series, of_accelerometers: bool, [low, high]: [f64; 2]) -> Vec<String> {
+    let kinds = [("gyro", &series.gyros, true), ("accelerometer", &series.accels, of_accelerometers)];
+    let mut reasons = Vec::new();
+    for (kind, ticks, needed) in kinds {
+        if ticks.output == Some(OutputKind::Counts) && (kind == "gyro" || !of_accelerometers) {
+            reasons.push(format!(
+                "the {kind} readings are counts: give a document with their scale (--calibration)"
+            ));
+        }
+        match ticks.readings.len() {
+            0 if needed => {
+                reasons.push(format!(
+                    "the log has no {kind} ticks: see [file.gyro] and [file.accel] of its mapping"
+                ));
+            }
+            0 | 3 => {}
+            count => reasons.push(format!(
+                "the log has {count} {kind}s: without a document (--calibration) only three have known axes"
+            )),
+        }
+    }
+    for (name, channel) in &series.temperatures {
+        let good = channel.raw.iter().filter(|raw| (low..=high).contains(*raw)).count();
+        if 2 * good < channel.raw.len() {
+            reasons.push(format!(
+                "temperature channel {name:?} has readings outside {low} to {high} °C: it is not a temperature in °C: name \
+                 the right column in the mapping, or give a document with the channel's conversion (--calibration)"
+            ));
+        }
+    }
+    reasons
+}
+
+/// The temperature channels of a log that read °C, each with its limits: range and spikes.
+pub(crate) fn channels(
+    series: &Series,
+    range: [f64; 2],
+    spike_limit: impl Fn(&[f64]) -> f64,
+) -> Vec<Channel> {
+    let channel = |(name, readings): (&String, &crate::runs::series::Channel)| Channel {
+        name: name.clone(),
+        conversion_deg_c: vec![0.0, 1.0],
+        range_deg_c: range,
+        spike_limit_deg_c: spike_limit(&readings.raw),
+    };
+    series.temperatures.iter().map(channel).collect()
 }

@@ -9,12 +9,12 @@ use isotherm_correction::calibration::Steady;
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::{hull, real};
-use crate::report::{Sheet, alike, short};
+use crate::report::{Report, alike, short};
 use terms::{Term, terms, tree};
 
 /// Temperatures of the tables.
@@ -26,34 +26,19 @@ const RANGE_DIGITS: f64 = 3.0;
 /// Ramps that the sums are shown on (°C/min).
 const RAMPS: [f64; 3] = [0.0, 1.0, -1.0];
 
-/// What is shown of a document.
-#[derive(Debug)]
-pub struct Shown {
-    /// Text and page.
-    pub sheet: Sheet,
-    json: Value,
-}
-
-impl Shown {
-    /// Everything as JSON: the document, and its terms as points.
-    pub fn to_json(&self) -> Value {
-        self.json.clone()
-    }
-}
-
 /// Shows a document.
 ///
 /// # Errors
 /// [`Error::Document`] where it cannot be written as a tree.
-pub fn show(written: &Written) -> Result<Shown, Error> {
+pub fn show(written: &Written) -> Result<Report, Error> {
     let Written { name, document, .. } = written;
     let tree = tree(document)?;
     let terms = terms(&tree);
     let range = range_of(&terms);
-    let mut sheet = Sheet { title: format!("Calibration of unit {}", document.unit), ..Sheet::default() };
-    sheet.headline = about::headline(name, document);
+    let heading = format!("Calibration of unit {}", document.unit);
+    let mut sheet = Report::saying(heading, name, about::words(document));
     sheet.notes = about::notes(document, &terms);
-    sheet.notes.extend(written.loaded.warnings.iter().map(|warning| format!("warning: {warning}")));
+    sheet.warnings.extend(written.loaded.warnings.iter().map(ToString::to_string));
     about::tables(&mut sheet, document);
     let formulas = terms.iter().map(|term| {
         let range = term.range.map_or_else(
@@ -66,13 +51,11 @@ pub fn show(written: &Written) -> Result<Shown, Error> {
     over_temperature(&mut sheet, &terms, range);
     sums(&mut sheet, written, range);
     charts::charts(&mut sheet, written, &terms, range);
-    let json = json!({
-        "verdict": sheet.headline,
-        "document": serde_json::to_value(&tree).map_err(|error| Error::document(&error))?,
-        "warnings": written.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        "terms": terms.iter().map(|term| term_json(term, range)).collect::<Vec<_>>(),
-    });
-    Ok(Shown { sheet, json })
+    sheet.figures = Map::from_iter([
+        ("document".to_owned(), serde_json::to_value(&tree).map_err(|error| Error::document(&error))?),
+        ("terms".to_owned(), terms.iter().map(|term| term_json(term, range)).collect()),
+    ]);
+    Ok(sheet)
 }
 
 /// The term as people call it: "gyro x lag of 300 s".
@@ -98,7 +81,7 @@ pub(crate) fn places([low, high]: [f64; 2], count: usize) -> Vec<f64> {
     (0..count).map(|index| low + step * real(index)).collect()
 }
 
-fn over_temperature(sheet: &mut Sheet, terms: &[Term], range: [f64; 2]) {
+fn over_temperature(sheet: &mut Report, terms: &[Term], range: [f64; 2]) {
     for argument in ["°C", "°C/s", "°C/s²"] {
         let mine = || {
             terms
@@ -146,7 +129,7 @@ pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f6
 }
 
 /// The sums of all terms.
-fn sums(sheet: &mut Sheet, written: &Written, range: [f64; 2]) {
+fn sums(sheet: &mut Report, written: &Written, range: [f64; 2]) {
     let at = places(range, COLUMNS);
     let mut rows = Vec::new();
     let mut row = |name: String, of: &dyn Fn(f64) -> Option<f64>| {

@@ -8,9 +8,6 @@ use isotherm_log::file::{read_small_text, write_whole};
 use isotherm_log::offline::{Loaded, unit_id};
 use isotherm_protocol::document::{Document, Parsed, Problem};
 
-use nalgebra::DMatrix;
-use toml::Value;
-
 use crate::error::Error;
 
 /// Line that lets editors check a document.
@@ -94,16 +91,6 @@ impl Written {
 /// A number as documents state it: without the dust of unit conversions, in twelve digits.
 pub fn tidy(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
-}
-
-/// Numbers as documents state them.
-pub fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> Value {
-    Value::Array(values.into_iter().map(|value| tidy(*value).into()).collect())
-}
-
-/// The rows of a matrix as documents state them.
-pub fn matrix(matrix: &DMatrix<f64>) -> Value {
-    Value::Array(matrix.row_iter().map(numbers).collect())
 }
 
 /// Writes a file; one that is there only where that is allowed.

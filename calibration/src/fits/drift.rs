@@ -14,7 +14,6 @@
 //! | `closing` | its part in the table of several units |
 
 pub mod allan;
-mod closing;
 pub mod columns;
 pub mod document;
 pub mod fit;

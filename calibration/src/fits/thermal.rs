@@ -44,6 +44,7 @@ pub(crate) mod target;
 pub mod thermometer;
 mod told;
 
-pub use fit::{Fitted, fit};
+pub use crate::document::Fitted;
+pub use fit::fit;
 pub use settings::{Method, Settings, Terms};
 pub use stand::{Site, Stand, Turning};

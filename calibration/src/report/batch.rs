@@ -7,177 +7,81 @@ use std::thread;
 use isotherm_pages::{Page, Table};
 use serde_json::{Value, json};
 
-use super::FitReport;
-use super::verdict::Verdict;
-use crate::report::{short, table};
+use super::{Report, Verdict, counted, table};
+use crate::error::Error;
 
-/// What a report gives to a batch: what is said of one unit by itself, and its rows in the table that closes all of them.
-pub trait UnitReport {
-    /// Heads of the columns between the unit and what came of it.
-    const COLUMNS: &'static [&'static str];
-    /// What is said of a sensor that was not refused.
-    const DONE: &'static str;
+/// Several units, each with its report or with why there is none, and the table that closes them.
+#[derive(Debug, Clone, Copy)]
+pub struct Batch<'a>(pub &'a [(String, Result<Report, Error>)]);
 
-    /// Everything as text.
-    fn to_text(&self) -> String;
-    /// Everything as JSON.
-    fn to_json(&self) -> Value;
-    /// Everything as a page.
-    fn to_html(&self) -> String;
-    /// What was refused and why, for the end of a command.
-    fn refusals(&self) -> Vec<String>;
-    /// A row for each sensor.
-    fn rows(&self) -> Vec<BatchRow>;
-}
-
-/// One sensor in the table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BatchRow {
-    /// A cell for each of [`UnitReport::COLUMNS`].
-    pub cells: Vec<String>,
-    /// Whether it was not refused.
-    pub accepted: bool,
-    /// What came of it, in words.
-    pub state: String,
-    /// The same as JSON.
-    pub json: Value,
-}
-
-/// One row per unit and sensor.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BatchTable {
-    columns: &'static [&'static str],
-    done: &'static str,
-    units: Vec<(String, Result<Vec<BatchRow>, String>)>,
-}
-
-impl BatchTable {
-    /// An empty one for reports of a kind.
-    pub fn of<R: UnitReport>() -> Self {
-        Self { columns: R::COLUMNS, done: R::DONE, units: Vec::new() }
+impl Batch<'_> {
+    fn reports(&self) -> impl Iterator<Item = &Report> {
+        self.0.iter().filter_map(|(_, came)| came.as_ref().ok())
     }
 
-    /// Adds a unit with its rows, or with why there are none.
-    pub fn add(&mut self, unit: impl Into<String>, came: Result<Vec<BatchRow>, String>) {
-        self.units.push((unit.into(), came));
-    }
-
-    /// Sensors accepted, sensors refused, units that came to nothing.
+    /// Sensors accepted, sensors refused, units failed.
     pub fn counts(&self) -> [usize; 3] {
-        let rows = || self.units.iter().filter_map(|(_, came)| came.as_ref().ok()).flatten();
-        let accepted = rows().filter(|row| row.accepted).count();
-        let failed = self.units.iter().filter(|(_, came)| came.is_err()).count();
-        [accepted, rows().count() - accepted, failed]
+        let verdicts = || self.reports().flat_map(|report| &report.verdicts);
+        let accepted = verdicts().filter(|verdict| verdict.accepted).count();
+        [accepted, verdicts().count() - accepted, self.0.iter().filter(|(_, came)| came.is_err()).count()]
     }
 
-    /// What came of all of them, in one line.
+    /// The first line.
     pub fn headline(&self) -> String {
         let [accepted, refused, failed] = self.counts();
-        let count = self.units.len();
-        let units = if count == 1 { "unit" } else { "units" };
         let failed = if failed == 0 { String::new() } else { format!(", {failed} of the units failed") };
-        format!("{count} {units}: {accepted} of {} sensors {}{failed}.", accepted + refused, self.done)
+        let fitted = self.reports().all(|report| report.summary.is_none());
+        format!(
+            "{}: {accepted} of {} sensors {}{failed}.",
+            counted(self.0.len(), "unit", "units"),
+            accepted + refused,
+            if fitted { "accepted" } else { "analysed" }
+        )
     }
 
-    /// As a table.
+    /// A row for each sensor of each unit, and one for each unit that failed.
     pub fn rows(&self) -> Table {
-        let head = ["unit"].iter().chain(self.columns).chain(&[""]).copied();
+        let head = self.reports().next().map(|report| report.rows(true).head).unwrap_or_default();
         let mut rows = Vec::new();
-        for (unit, came) in &self.units {
+        for (unit, came) in self.0 {
             match came {
-                Ok(own) => rows.extend(own.iter().map(|row| {
-                    let mut cells = vec![unit.clone()];
-                    cells.extend(row.cells.iter().cloned());
-                    cells.push(row.state.clone());
-                    cells
-                })),
+                Ok(report) => {
+                    let own = report.rows(true).rows.into_iter();
+                    rows.extend(own.map(|row| [vec![unit.clone()], row].concat()));
+                }
                 Err(why) => {
                     let mut row = vec![unit.clone()];
-                    row.resize(self.columns.len() + 1, "–".to_owned());
+                    row.resize(head.len().max(1), "–".to_owned());
                     row.push(format!("failed: {why}"));
                     rows.push(row);
                 }
             }
         }
-        Table::of(head, rows)
+        Table::of(["unit".to_owned()].into_iter().chain(head), rows)
     }
 
-    /// As text, its line first.
+    /// Everything as text.
     pub fn to_text(&self) -> String {
-        let Table { head, rows } = self.rows();
-        format!("{}\n{}\n", self.headline(), table(&head, &rows))
+        format!("{}\n{}\n", self.headline(), table(&self.rows()))
     }
 
-    /// As JSON.
+    /// Everything as JSON.
     pub fn to_json(&self) -> Value {
-        let unit = |(unit, came): &(String, Result<Vec<BatchRow>, String>)| match came {
-            Ok(rows) => {
-                json!({ "unit": unit, "verdicts": rows.iter().map(|row| row.json.clone()).collect::<Vec<_>>() })
+        let unit = |(unit, came): &(String, Result<Report, Error>)| match came {
+            Ok(report) => {
+                json!({ "unit": unit, "verdicts": report.verdicts.iter().map(Verdict::to_json).collect::<Vec<_>>() })
             }
-            Err(why) => json!({ "unit": unit, "failed": why }),
+            Err(why) => json!({ "unit": unit, "failed": why.to_string() }),
         };
-        json!({ "verdict": self.headline(), "units": self.units.iter().map(unit).collect::<Vec<_>>() })
+        json!({ "verdict": self.headline(), "units": self.0.iter().map(unit).collect::<Vec<_>>() })
     }
 
-    /// As a page.
+    /// Everything as a page.
     pub fn to_html(&self, title: &str) -> String {
         let mut page = Page::new(title);
         page.headline(&self.headline());
         page.table(&self.rows());
         page.to_html()
-    }
-}
-
-impl UnitReport for FitReport {
-    const COLUMNS: &'static [&'static str] =
-        &["of", "rms before", "after", "peak to peak before", "after", "measure", "sample"];
-    const DONE: &'static str = "accepted";
-
-    fn to_text(&self) -> String {
-        Self::to_text(self)
-    }
-
-    fn to_json(&self) -> Value {
-        Self::to_json(self)
-    }
-
-    fn to_html(&self) -> String {
-        Self::to_html(self)
-    }
-
-    fn refusals(&self) -> Vec<String> {
-        Self::refusals(self)
-    }
-
-    fn rows(&self) -> Vec<BatchRow> {
-        self.verdicts.iter().map(BatchRow::from).collect()
-    }
-}
-
-impl From<&Verdict> for BatchRow {
-    fn from(verdict: &Verdict) -> Self {
-        let [before, after] = verdict.deciding();
-        let known = before.count > 0 || after.count > 0;
-        let figure = |value: f64| if known { short(value) } else { "–".to_owned() };
-        let state = verdict.state();
-        Self {
-            cells: vec![
-                verdict.of.clone(),
-                figure(before.rms),
-                figure(after.rms),
-                figure(before.peak_to_peak),
-                figure(after.peak_to_peak),
-                verdict.measure.clone(),
-                if verdict.out_of_sample.is_some() { "out" } else { "in" }.to_owned(),
-            ],
-            accepted: verdict.accepted,
-            state: if verdict.reason.is_empty() {
-                state.to_owned()
-            } else {
-                format!("{state}: {}", verdict.reason)
-            },
-            json: verdict.to_json(),
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Figures as text: digits, tables.
 
 use crate::numbers::ends;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::CellAlignment;
 
 /// Most significant digits of a figure among others: more are in `--json`.
 const MOST_DIGITS: f64 = 8.0;
@@ -93,14 +93,21 @@ pub fn within(value: f64, [low, high]: [f64; 2]) -> String {
     }
 }
 
-/// A table as text, numbers to the right.
-pub fn table(head: &[String], rows: &[Vec<String>]) -> String {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(head).add_rows(rows);
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
+/// A table with its columns one below the other, those that hold figures aligned to the right.
+pub fn table(table: &isotherm_pages::Table) -> String {
+    let mut text = isotherm_cli::table(&table.head, &table.rows, ..0);
+    for (index, column) in text.column_iter_mut().enumerate().skip(1) {
+        let figure = |row: &Vec<String>| {
+            row.get(index).is_none_or(|cell| {
+                let begins = cell.chars().next().is_none_or(|c| c.is_ascii_digit() || "-−+(–".contains(c));
+                begins && !cell.contains('·')
+            })
+        };
+        if table.rows.iter().all(figure) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
     }
-    table.to_string()
+    text.to_string()
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use isotherm_protocol::document::Sample;
 use serde_json::{Value, json};
 
 use super::verdict::Verdict;
-use super::{Curve, FitReport};
+use super::{Curve, Report};
 use crate::numbers::Size;
 
-impl FitReport {
+impl Report {
     /// Everything but the curves themselves, of which the sizes are there.
     pub fn to_json(&self) -> Value {
         let curve = |curve: &Curve| {
@@ -21,7 +21,7 @@ impl FitReport {
             })
         };
         let further = |(heading, rows): &(String, Table)| (heading.clone(), of_table(rows));
-        json!({
+        let mut value = json!({
             "title": self.title,
             "unit": self.unit,
             "verdict": self.headline(),
@@ -33,7 +33,11 @@ impl FitReport {
             "validation": self.validation.as_ref().map(of_table),
             "residuals": self.residuals.iter().map(curve).collect::<Vec<_>>(),
             "tables": self.tables.iter().map(further).collect::<serde_json::Map<_, _>>(),
-        })
+        });
+        if let Some(object) = value.as_object_mut() {
+            object.extend(self.figures.clone());
+        }
+        value
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use isotherm_pages::{Axis, Chart, Ink, Mark, Page, Panel, Series, Table};
 use isotherm_protocol::document::Sample;
 
-use super::{Coefficient, Curve, FitReport, Verdict, stated};
+use super::{Coefficient, Curve, Report, Verdict, stated};
 use crate::fits::drift::spectrum::Spectrum;
 use crate::numbers::{ends, once_each, real};
 
@@ -18,10 +18,10 @@ const LEAST_DEG_C: f64 = 1.0;
 /// Height of a panel of coefficients.
 const LOW: u32 = 110;
 
-impl FitReport {
+impl Report {
     /// The report as a page that needs nothing beside it.
     pub fn to_html(&self) -> String {
-        let mut page = Page::new(&format!("{}, unit {}", self.title, self.unit));
+        let mut page = Page::new(&self.heading());
         let verdict = |verdict: &Verdict| (verdict.sentence(), verdict.reason.clone());
         page.headlines(&self.verdicts.iter().map(verdict).collect::<Vec<_>>());
         self.notes.iter().for_each(|note| page.paragraph(note));
@@ -29,7 +29,8 @@ impl FitReport {
             page.heading("Warnings");
             self.warnings.iter().for_each(|warning| page.paragraph(warning));
         }
-        section(&mut page, "Before and after", &self.size_rows());
+        let summary = if self.summary.is_some() { "Summary" } else { "Before and after" };
+        section(&mut page, summary, &self.rows(false));
         self.over_time(&mut page);
         self.over_temperature(&mut page);
         for (heading, chart) in &self.charts {

@@ -6,77 +6,57 @@
 
 use std::collections::BTreeMap;
 
-use crate::numbers::real;
 use isotherm_protocol::document::Document;
+use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 /// Key in `origin.details`.
 const KEY: &str = "sigma";
 
 /// Standard errors by kind ("gyro" or "accel"), sensor and what they are of.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Sigmas(BTreeMap<(String, String, String), Vec<f64>>);
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Sigmas(BTreeMap<String, BTreeMap<String, BTreeMap<String, Vec<f64>>>>);
 
 impl Sigmas {
     /// Those that a document states.
     pub fn of(document: &Document) -> Self {
         let details = document.origin.as_ref().and_then(|origin| origin.details.as_ref());
-        let kinds = details.and_then(|details| details.get(KEY)?.as_table());
-        let mut sigmas = Self::default();
-        for (kind, sensors) in kinds.into_iter().flatten() {
-            for (sensor, terms) in sensors.as_table().into_iter().flatten() {
-                for (term, values) in terms.as_table().into_iter().flatten() {
-                    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(real));
-                    let values = values.as_array().map(|values| values.iter().filter_map(number).collect());
-                    if let Some(values) = values {
-                        sigmas.put(kind, sensor, term, values);
-                    }
-                }
-            }
-        }
-        sigmas
+        details.map(Self::of_details).unwrap_or_default()
+    }
+
+    fn of_details(details: &Table) -> Self {
+        details.get(KEY).and_then(|value| value.clone().try_into().ok()).unwrap_or_default()
     }
 
     /// Enters standard errors; numbers that are not finite become 0, "not known".
     pub fn put(&mut self, kind: &str, sensor: &str, term: &str, values: Vec<f64>) {
         let values = values.into_iter().map(|sigma| if sigma.is_finite() { sigma } else { 0.0 }).collect();
-        self.0.insert((kind.to_owned(), sensor.to_owned(), term.to_owned()), values);
+        let of_kind = self.0.entry(kind.to_owned()).or_default();
+        of_kind.entry(sensor.to_owned()).or_default().insert(term.to_owned(), values);
     }
 
-    /// Standard errors of one term; `None` where they are not known.
+    /// The standard errors of one thing.
     pub fn get(&self, kind: &str, sensor: &str, term: &str) -> Option<&[f64]> {
-        self.0.get(&(kind.to_owned(), sensor.to_owned(), term.to_owned())).map(Vec::as_slice)
+        self.0.get(kind)?.get(sensor)?.get(term).map(Vec::as_slice)
     }
 
-    /// All of them.
+    /// All of them, by kind, sensor and what they are of.
     pub fn iter(&self) -> impl Iterator<Item = ((&str, &str, &str), &[f64])> {
-        let parts = |(kind, sensor, term)| -> (&str, &str, &str) { (kind, sensor, term) };
-        self.0
-            .iter()
-            .map(move |((kind, sensor, term), values)| (parts((kind, sensor, term)), values.as_slice()))
+        self.0.iter().flat_map(|(kind, sensors)| {
+            sensors.iter().flat_map(move |(sensor, terms)| {
+                let of = move |term| (kind.as_str(), sensor.as_str(), term);
+                terms.iter().map(move |(term, values)| (of(term.as_str()), values.as_slice()))
+            })
+        })
     }
 
-    /// Writes them into the details of a document's origin, beside what is there; without any, nothing changes.
+    /// Adds them to the details of a document's origin, over those of the same that are there.
     pub fn write(&self, details: &mut Table) {
-        if self.0.is_empty() {
-            return;
-        }
-        let all = details.entry(KEY).or_insert_with(|| Value::Table(Table::new()));
-        for ((kind, sensor, term), values) in &self.0 {
-            let mut table = &mut *all;
-            for key in [kind, sensor] {
-                if !table.is_table() {
-                    *table = Value::Table(Table::new());
-                }
-                let Some(inner) = table.as_table_mut() else { return };
-                table = inner.entry(key.clone()).or_insert_with(|| Value::Table(Table::new()));
-            }
-            if !table.is_table() {
-                *table = Value::Table(Table::new());
-            }
-            if let Some(inner) = table.as_table_mut() {
-                inner.insert(term.clone(), Value::Array(values.iter().copied().map(Value::Float).collect()));
-            }
+        let mut all = Self::of_details(details);
+        self.iter().for_each(|((kind, sensor, term), values)| all.put(kind, sensor, term, values.to_vec()));
+        if let (false, Ok(value)) = (self.0.is_empty(), Value::try_from(all)) {
+            details.insert(KEY.to_owned(), value);
         }
     }
 }

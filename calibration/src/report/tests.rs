@@ -4,6 +4,7 @@ use isotherm_protocol::document::{Document, Sample};
 
 use super::*;
 use crate::document::Written;
+use crate::error::Error;
 use crate::fixture::simulated;
 use crate::numbers::Size;
 use crate::runs::table::Rows;
@@ -40,7 +41,7 @@ fn a_document_states_the_sizes_of_the_verdicts() {
 
 #[test]
 fn a_report_says_the_same_in_every_form() {
-    let mut report = FitReport::new("Thermal calibration, method joint", "FOG-0001");
+    let mut report = Report::new("Thermal calibration, method joint", "FOG-0001");
     report.verdicts = vec![verdict(), Verdict::new("gyro y", "°/h", [size(1.0), size(2.0)]).refused("worse")];
     report.warnings.push("only one plateau < 3 °C wide".into());
     report.coefficients = vec![
@@ -98,7 +99,7 @@ fn a_report_says_the_same_in_every_form() {
 
 #[test]
 fn a_terminal_shows_a_dozen_lines() {
-    let mut report = FitReport::new("Thermal calibration, method joint", "FOG-0001");
+    let mut report = Report::new("Thermal calibration, method joint", "FOG-0001");
     report.verdicts = vec![verdict(); 6];
     report.warnings = (0..9).map(|k| format!("number {k}")).collect();
     let text = report.to_text();
@@ -141,9 +142,10 @@ fn a_batch_keeps_its_order_and_ends_with_one_table() {
     let items: Vec<u64> = (0..50).collect();
     let squares = in_parallel(&items, |_| (), |item| item * item);
     assert_eq!(squares, items.iter().map(|item| item * item).collect::<Vec<_>>());
-    let mut batch = BatchTable::of::<FitReport>();
-    batch.add("A", Ok([verdict(), verdict().refused("worse")].iter().map(BatchRow::from).collect()));
-    batch.add("B", Err("no raw ticks".into()));
+    let mut report = Report::new("Thermal calibration", "A");
+    report.verdicts = vec![verdict(), verdict().refused("worse")];
+    let units = [("A".to_owned(), Ok(report)), ("B".to_owned(), Err(Error::refused("no raw ticks")))];
+    let batch = Batch(&units);
     assert_eq!(batch.counts(), [1, 1, 1]);
     let text = batch.to_text();
     let first = "2 units: 1 of 2 sensors accepted, 1 of the units failed.";

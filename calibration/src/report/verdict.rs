@@ -56,6 +56,8 @@ pub struct Verdict {
     pub accepted: bool,
     /// Why not, or what is to be known; may be empty where accepted.
     pub reason: String,
+    /// What its sentence says where it has no sizes.
+    pub said: String,
 }
 
 impl Verdict {
@@ -69,7 +71,13 @@ impl Verdict {
             out_of_sample: None,
             accepted: true,
             reason: String::new(),
+            said: String::new(),
         }
+    }
+
+    /// Something that is said instead of sizes.
+    pub fn said(of: impl Into<String>, words: impl Into<String>) -> Self {
+        Self { said: words.into(), ..Self::new(of, "", <[Size; 2]>::default()) }
     }
 
     /// Of the values before and after, in and out of sample: refused where what is left in the deciding sample has grown by more
@@ -176,7 +184,11 @@ impl Verdict {
         let [before, after] = self.deciding();
         let state = self.state();
         if before.count == 0 && after.count == 0 {
-            return format!("{}: {state}", self.of);
+            return match (self.said.as_str(), self.accepted) {
+                ("", _) => format!("{}: {state}", self.of),
+                (said, true) => format!("{}: {said}", self.of),
+                (said, false) => format!("{}: {said}; {state}", self.of),
+            };
         }
         let sample = if self.out_of_sample.is_some() { "out of sample" } else { "in sample" };
         let of = |size: &Size| short(self.figure.of(size));
@@ -239,11 +251,17 @@ pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
 }
 
 /// All sizes as a table; `counted` is what they are over.
-pub(super) fn rows(verdicts: &[Verdict], counted: &str) -> Table {
+pub(super) fn rows(verdicts: &[Verdict], counted: &str, only_deciding: bool) -> Table {
     let head = ["", "rms", "", "times smaller", "peak to peak", "", counted, ""];
     let mut rows = Vec::new();
     for verdict in verdicts {
-        for (sample, [before, after]) in verdict.samples() {
+        let samples = verdict.samples().collect::<Vec<_>>();
+        if samples.is_empty() {
+            let none = vec!["–".to_owned(); head.len() - 2];
+            rows.push([vec![verdict.of.clone()], none, vec![verdict.state().to_owned()]].concat());
+        }
+        let first = if only_deciding { samples.len().saturating_sub(1) } else { 0 };
+        for (sample, [before, after]) in samples.into_iter().skip(first) {
             let sample = if sample == Sample::In { "in sample" } else { "out of sample" };
             let factor = if after.rms > 0.0 { short(before.rms / after.rms) } else { "–".to_owned() };
             rows.push(vec![

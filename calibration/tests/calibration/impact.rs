@@ -167,8 +167,8 @@ fn the_command_sails_stated_drifts_and_documents() {
     }
     for (arguments, code, words) in [
         (vec!["impact"], 2, "give a drift"),
-        (vec!["impact", "--trend", "nan"], 2, "--trend is NaN"),
-        (vec!["impact", "--trend", "1", "--latitude", "90"], 2, "--latitude is 90, must be from -85 to 85"),
+        (vec!["impact", "--trend", "nan"], 2, "must be a number from -100 to 100"),
+        (vec!["impact", "--trend", "1", "--latitude", "90"], 2, "must be a number from -85 to 85"),
     ] {
         let output = calibrate(&arguments);
         assert_eq!(output.status.code(), Some(code), "{arguments:?}");

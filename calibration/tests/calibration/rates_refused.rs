@@ -27,7 +27,7 @@ fn steps_that_are_not_those_of_the_log_write_nothing() {
     let all = "36,-36,108,-108";
     // Another axis than the table's: the gyro that hardly reads, and the one that does.
     let axis = refused(&["--axis", "y", "--rates", all]);
-    assert!(axis.contains("about y, gyro y shows ") && axis.contains(" and gyro x 108"), "{axis}");
+    assert!(axis.contains("about y, gyro y shows ") && axis.contains(" and gyro x shows 108"), "{axis}");
     assert!(axis.contains("the unit turned about x, 90° off the stated axis, 30° are allowed"), "{axis}");
     let reversed = refused(&["--axis", "x", "--rates", "-36,36,-108,108"]);
     assert!(reversed.contains("the unit turned about -x, 180° off the stated axis"), "{reversed}");

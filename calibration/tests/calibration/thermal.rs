@@ -19,13 +19,13 @@ mod service;
 mod sparse;
 
 use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, fit};
-use isotherm_calibration::report::FitReport;
+use isotherm_calibration::report::Report;
 use isotherm_calibration::runs::Run;
 use isotherm_correction::earth::Place;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Document, Origin};
+use isotherm_protocol::document::Document;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
 use isotherm_simulator::{Scenario, Simulation};
 
@@ -66,11 +66,11 @@ fn settings(method: Method) -> Settings {
 fn fitted(method: Method, [train, judge]: &[Run; 2]) -> Fitted {
     let base = base();
     let runs = (std::slice::from_ref(train), std::slice::from_ref(judge));
-    fit(Some(&base), runs, &settings(method), Origin::default(), ()).unwrap()
+    fit(Some(&base), runs, &settings(method), ()).unwrap()
 }
 
 /// Times by which rms and peak to peak fall out of sample, by gyro.
-fn factors(report: &FitReport) -> Vec<[f64; 2]> {
+fn factors(report: &Report) -> Vec<[f64; 2]> {
     let gyros = report.verdicts.iter().filter(|verdict| verdict.of.starts_with("gyro"));
     gyros
         .map(|verdict| {
@@ -86,7 +86,7 @@ fn preset() -> [Run; 2] {
 }
 
 /// Times by which rms and peak to peak fall out of sample, of all gyros together.
-fn together(report: &FitReport) -> [f64; 2] {
+fn together(report: &Report) -> [f64; 2] {
     let gyros = || report.verdicts.iter().filter(|verdict| verdict.of.starts_with("gyro"));
     let size = |of: fn(&isotherm_calibration::numbers::Size) -> f64, which: usize| {
         gyros().map(|verdict| of(&verdict.out_of_sample.unwrap()[which]).powi(2)).sum::<f64>().sqrt()

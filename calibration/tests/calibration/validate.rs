@@ -186,7 +186,7 @@ fn what_cannot_be_judged_is_refused_in_words() {
     });
     record(Path::new(&path("moving.mcap")), &moving);
     refused(&["validate", &good, &path("moving.mcap")], 1, "the unit was not at rest");
-    refused(&["validate", &good, &path("moving.mcap"), "--window", "0"], 2, "--window is 0");
+    refused(&["validate", &good, &path("moving.mcap"), "--window", "0"], 2, "'0' for '--window");
     refused(
         &["validate", &good, &path("moving.mcap"), "--latitude", "95", "--heading", "0"],
         2,

@@ -11,7 +11,7 @@ use crate::fits::impact::estimate::TICK_S;
 use crate::fits::impact::logged;
 use crate::fits::impact::models::Choice;
 use crate::fits::impact::monte_carlo::{Voyages, sail_all};
-use crate::fits::impact::report::{Report, Row};
+use crate::fits::impact::report::{Row, Sailed};
 use crate::fits::impact::scenario::{Drift, Voyage};
 use crate::numbers::real;
 use crate::runs::cut::Cut;
@@ -21,7 +21,7 @@ const SEEDS: u32 = 50;
 
 impl ImpactArgs {
     /// A drift without noise: what comes out is what the drift adds to all other errors.
-    pub(super) fn sail_stated(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+    pub(super) fn sail_stated(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Sailed, Error> {
         let (trend, constant) = (self.trend.unwrap_or(0.0), self.constant.unwrap_or(0.0));
         let rate = |tick: usize| {
             let hours = (real(tick) + 0.5) * TICK_S / HOUR_S;
@@ -51,10 +51,10 @@ impl ImpactArgs {
              its filter follows that drift through the velocity log; the latitude is not stated."
                 .to_owned(),
         ];
-        Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes, choices: Vec::new() })
+        Ok(Sailed { voyage: *voyage, source, seeds: 0, rows, notes, choices: Vec::new() })
     }
 
-    pub(super) fn sail_seeds(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Report, Error> {
+    pub(super) fn sail_seeds(&self, voyage: &Voyage, parts: &[DriftParts; 3]) -> Result<Sailed, Error> {
         let count = self.seeds.unwrap_or(SEEDS);
         let seeds: Vec<u64> = (0..count).map(|index| self.seed.wrapping_add(u64::from(index))).collect();
         let slope = AngularRate::from_deg_per_h(self.trend.unwrap_or(0.0)).as_rad_per_s() / HOUR_S;
@@ -89,7 +89,7 @@ impl ImpactArgs {
                     .to_owned(),
             );
         }
-        Ok(Report {
+        Ok(Sailed {
             voyage: *voyage,
             source,
             seeds: seeds.len(),
@@ -104,7 +104,7 @@ impl ImpactArgs {
         voyage: &mut Voyage,
         parts: &[DriftParts; 3],
         cut: &Cut,
-    ) -> Result<Report, Error> {
+    ) -> Result<Sailed, Error> {
         let mut columns = self.columns(&self.log, cut)?;
         let words: Vec<String> = cut.words().map(str::to_owned).into_iter().collect();
         let (drift, mut notes) = logged::drift(&mut columns, voyage, &self.otherwise(parts))
@@ -125,7 +125,7 @@ impl ImpactArgs {
         let rows = Row::of_cares("as logged", voyage, &drift, parts)?;
         let source = format!("The log of unit {}", columns.unit);
         let choices = Choice::of(&drift, voyage);
-        Ok(Report { voyage: *voyage, source, seeds: 0, rows, notes, choices })
+        Ok(Sailed { voyage: *voyage, source, seeds: 0, rows, notes, choices })
     }
 
     /// What can be done where the log is shorter than the calibration.

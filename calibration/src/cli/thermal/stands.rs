@@ -3,9 +3,9 @@
 use clap::Args;
 
 use crate::error::Error;
-use crate::fits::positions::gravity;
 use crate::fits::rates::steps::axis;
 use crate::fits::thermal::{Site, Stand, Turning};
+use crate::limits::within;
 
 /// Rates of a table that can be used (°/s).
 const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
@@ -26,7 +26,7 @@ pub(in crate::cli) struct StandArgs {
     #[arg(long, value_name = "DEG", requires_all = ["roll", "latitude"], allow_negative_numbers = true)]
     pitch: Vec<f64>,
     /// Gravity at the place (m/s²) (default: normal gravity of the latitude)
-    #[arg(long, value_name = "M_PER_S2", requires = "roll")]
+    #[arg(long, value_name = "M_PER_S2", requires = "roll", value_parser = within(9.7, 9.9))]
     gravity: Option<f64>,
     /// Axis of the rate table in case axes (x, -y, … or 0,0.6,0.8); once for all logs, or once for each
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rate")]
@@ -69,11 +69,7 @@ impl StandArgs {
             return Ok(Site::Unknown);
         };
         let tilt = of_run(&self.pitch, run).zip(of_run(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
-        let gravity = match self.gravity {
-            Some(_) => Some(gravity::stated(self.gravity, None, 0.0)?.0),
-            None => None,
-        };
-        Site::at(latitude, heading, tilt, gravity).map_err(|errors| {
+        Site::at(latitude, heading, tilt, self.gravity).map_err(|errors| {
             Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })
     }

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::{Value, json};
+use serde_json::{Map, json};
 
 use super::{BEYOND, Changes, changes};
 use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::once_each;
-use crate::report::{Sheet, short};
+use crate::report::{Report, short};
 
 /// The changes from each document to the next, and from the first to the last.
 #[derive(Debug, Clone)]
@@ -39,18 +39,14 @@ impl Series {
     }
 
     /// Everything.
-    pub fn sheet(&self) -> Sheet {
+    pub fn sheet(&self) -> Report {
         let names: Vec<&str> = self.steps.iter().map(|step| step.names[0].as_str()).collect();
         let last = &self.whole.names[1];
-        let mut sheet = Sheet {
-            title: format!("{} → {last}", names.join(" → ")),
-            headline: self.whole.headline(),
-            ..Sheet::default()
-        };
+        let mut sheet = self.whole.saying(format!("{} → {last}", names.join(" → ")));
         let units: BTreeSet<&String> = self.columns().flat_map(|step| &step.units).collect();
         if units.len() > 1 {
             let units: Vec<&str> = units.into_iter().map(String::as_str).collect();
-            sheet.notes.push(format!("warning: the documents are for units {}", units.join(", ")));
+            sheet.warnings.push(format!("the documents are for units {}", units.join(", ")));
         }
         sheet.notes.push(format!(
             "Each column is the later document less the earlier one, at {} °C; the last is the total.",
@@ -86,13 +82,11 @@ impl Series {
             row(&format!("{of}, {unit}"), self.columns().map(changed))
         });
         sheet.table("Changes of biases and scale factors", head(""), values);
+        sheet.figures = Map::from_iter([
+            ("steps".to_owned(), json!(self.steps)),
+            ("whole".to_owned(), json!(self.whole)),
+        ]);
         sheet
-    }
-
-    /// Everything as JSON.
-    pub fn to_json(&self) -> Value {
-        let steps: Vec<Value> = self.steps.iter().map(Changes::to_json).collect();
-        json!({ "verdict": self.whole.headline(), "steps": steps, "whole": self.whole.to_json() })
     }
 }
 
@@ -127,11 +121,11 @@ mod tests {
             (turned(&series.steps[0]) - 60.0).abs() < 0.1 && (turned(&series.steps[1]) - 60.0).abs() < 0.1
         );
         assert!(turned(&series.whole) < 1e-9);
-        let text = series.sheet().to_text();
+        let text = series.sheet().whole_text();
         let row = text.lines().find(|line| line.contains("accelerometer z")).unwrap();
         assert_eq!(row.matches('*').count(), 2, "{text}");
         assert!(text.contains("a → b") && text.contains("b → c") && text.contains("a → c"), "{text}");
-        assert_eq!(series.to_json()["steps"].as_array().unwrap().len(), 2);
+        assert_eq!(series.sheet().to_json()["steps"].as_array().unwrap().len(), 2);
         assert!(Series::of(&[], None).is_err());
     }
 }

@@ -1,11 +1,11 @@
 //! Changes in words, tables and charts.
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
-use crate::report::{Sheet, short};
+use crate::report::{Report, short};
 
 /// Entries of an origin that are shown one by one.
 const MOST_ABOUT: usize = 12;
@@ -20,8 +20,23 @@ impl Changes {
     /// The first line.
     pub fn headline(&self) -> String {
         let [before, after] = &self.names;
+        format!("{before} → {after}: {}.", self.words())
+    }
+
+    /// A report with the first line.
+    pub(super) fn saying(&self, title: String) -> Report {
+        let [before, after] = &self.names;
+        Report::saying(title, format!("{before} → {after}"), self.words())
+    }
+
+    /// Everything as JSON.
+    pub(super) fn figures(&self) -> Map<String, Value> {
+        json!(self).as_object().cloned().unwrap_or_default()
+    }
+
+    fn words(&self) -> String {
         if self.entries.is_empty() {
-            return format!("{before} and {after} are the same.");
+            return "they are the same".to_owned();
         }
         let largest = self.axes.iter().max_by(|a, b| a.turned_arcsec.total_cmp(&b.turned_arcsec));
         let axes = match largest {
@@ -47,17 +62,16 @@ impl Changes {
                 parts.push(format!("{what} changes by up to {} {kind} ({of})", short(most)));
             }
         }
-        format!("{before} → {after}: {}.", parts.join("; "))
+        parts.join("; ")
     }
 
     /// Everything.
-    pub fn sheet(&self) -> Sheet {
+    pub fn sheet(&self) -> Report {
         let [before, after] = &self.names;
-        let mut sheet =
-            Sheet { title: format!("{before} → {after}"), headline: self.headline(), ..Sheet::default() };
+        let mut sheet = self.saying(format!("{before} → {after}"));
         let [old, new] = &self.units;
         if old != new {
-            sheet.notes.push(format!("warning: {before} is for unit {old}, {after} for unit {new}"));
+            sheet.warnings.push(format!("{before} is for unit {old}, {after} for unit {new}"));
         }
         let range = self.temperature_deg_c.first().zip(self.temperature_deg_c.last());
         if let Some((low, high)) = range {
@@ -79,10 +93,11 @@ impl Changes {
         self.values_table(&mut sheet);
         self.entries_table(&mut sheet);
         self.charts(&mut sheet);
+        sheet.figures = self.figures();
         sheet
     }
 
-    fn axes_table(&self, sheet: &mut Sheet) {
+    fn axes_table(&self, sheet: &mut Report) {
         let row = |axis: &AxisChange| {
             let cosine = |(change, sigma): (f64, f64)| {
                 if sigma > 0.0 { format!("{change:+.1} ± {sigma:.1}") } else { format!("{change:+.1}") }
@@ -111,7 +126,7 @@ impl Changes {
         sheet.table("Input axes", head, self.axes.iter().map(row));
     }
 
-    fn values_table(&self, sheet: &mut Sheet) {
+    fn values_table(&self, sheet: &mut Report) {
         let count = self.temperature_deg_c.len();
         let at: Vec<usize> = (0..5).map(|k| k * count.saturating_sub(1) / 4).collect();
         let mut head = vec![String::new()];
@@ -130,7 +145,7 @@ impl Changes {
         sheet.table("Changes of biases and scale factors", head, self.values.iter().map(row));
     }
 
-    fn entries_table(&self, sheet: &mut Sheet) {
+    fn entries_table(&self, sheet: &mut Report) {
         let about = |key: &str| ["origin", "note", "created"].iter().any(|about| key.starts_with(about));
         let or_dash = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
         let row = |entry: &isotherm_protocol::control::DocumentChange| {
@@ -152,7 +167,7 @@ impl Changes {
         }
     }
 
-    fn charts(&self, sheet: &mut Sheet) {
+    fn charts(&self, sheet: &mut Report) {
         let panels = self.values.iter().filter(|value| value.change.iter().any(|change| *change != 0.0));
         let panels = panels.map(|value| {
             let points = self.temperature_deg_c.iter().copied().zip(value.change.iter().copied());
@@ -160,15 +175,6 @@ impl Changes {
         });
         let (caption, x) = ("Change of each bias and scale factor.", Axis::of("temperature", "°C"));
         sheet.chart("Over temperature", Chart::of(caption, x, panels.collect()));
-    }
-
-    /// Everything as JSON.
-    pub fn to_json(&self) -> Value {
-        let mut value = json!(self);
-        if let Some(object) = value.as_object_mut() {
-            object.insert("verdict".to_owned(), json!(self.headline()));
-        }
-        value
     }
 }
 

@@ -41,7 +41,7 @@ fn an_axis_that_was_knocked_is_told_beside_its_uncertainty() {
         assert!((axis.sigma_arcsec[1] - 5.0).abs() < 1e-9);
         assert!((axis.turned_sigma_arcsec.unwrap() - 5.0).abs() < 0.05);
         assert!((axis.significance.unwrap() - by.abs() / 5.0).abs() < 0.05);
-        let text = changes.sheet().to_text();
+        let text = changes.sheet().whole_text();
         assert!(text.contains(word), "{text}");
         assert_eq!(changes.turned().len(), usize::from(by > 0.0));
         assert_eq!(
@@ -90,7 +90,7 @@ fn biases_and_scale_factors_change_over_temperature() {
     assert!((of("accelerometer z scale factor").at_reference - 100.0).abs() < 0.1);
     assert!(changes.values.iter().all(|value| value.of != "gyro x bias"), "{:?}", changes.values);
     assert!(changes.entries.iter().any(|entry| entry.key.starts_with("gyro.sensor[1].static_bias")));
-    assert_eq!(changes.to_json()["verdict"], changes.headline());
+    assert_eq!(changes.sheet().to_json()["verdict"], changes.headline());
     assert!(changes.sheet().to_html().contains("gyro y bias"));
 }
 

@@ -2,79 +2,58 @@
 
 use std::collections::BTreeSet;
 
-use isotherm_protocol::document::{AccelOutput, GyroOutput};
+use isotherm_protocol::document::{AccelOutput, Document, GyroOutput};
 
 use super::Take;
 use super::sections::is_about;
 use crate::document::Written;
 use crate::error::Error;
 
-/// Refuses documents that are not of one unit, or of other sensors.
+/// Reasons why documents are not of one unit with the same sensors.
+///
+/// # Errors
+/// [`Error::Refused`].
 pub(super) fn same_unit(base: &Written, parts: &[Written]) -> Result<(), Error> {
-    let shape = |named: &Written| {
-        let document = &named.document;
-        let gyros: Vec<String> = document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect();
-        let accels = document.accel.as_ref().map(|accel| {
-            let names = accel.sensor.iter().map(|sensor| sensor.name.clone()).collect::<Vec<_>>();
-            (names, accel_words(accel.output))
-        });
-        (document.unit.clone(), gyros, gyro_words(document.gyro.output), accels)
-    };
-    let (unit, gyros, output, accels) = shape(base);
     let mut reasons = Vec::new();
     for part in parts {
-        let (other, part_gyros, part_output, part_accels) = shape(part);
-        for (key, here, there) in [
-            ("unit", unit.clone(), other),
-            ("gyro.sensor", gyros.join(", "), part_gyros.join(", ")),
-            ("gyro.output", output.clone(), part_output),
-        ] {
-            if here != there {
-                reasons.push(differing(key, &here, &base.name, &there, &part.name));
-            }
-        }
-        if let (Some((names, output)), Some((part_names, part_output))) = (&accels, &part_accels) {
-            if names != part_names {
-                reasons.push(differing(
-                    "accel.sensor",
-                    &names.join(", "),
-                    &base.name,
-                    &part_names.join(", "),
-                    &part.name,
+        for ((key, here), (_, there)) in stated(&base.document).into_iter().zip(stated(&part.document)) {
+            if let (Some(here), Some(there)) = (here, there)
+                && here != there
+            {
+                reasons.push(format!(
+                    "{key} is {here} in {} and {there} in {}: only documents of one unit with the same sensors can be \
+                     merged",
+                    base.name, part.name
                 ));
-            }
-            if output != part_output {
-                reasons.push(differing("accel.output", output, &base.name, part_output, &part.name));
             }
         }
     }
     if reasons.is_empty() { Ok(()) } else { Err(Error::Refused(reasons)) }
 }
 
-/// What a gyro's readings stand for.
-fn gyro_words(output: GyroOutput) -> String {
-    match output {
+/// What documents of one unit have in common.
+fn stated(document: &Document) -> [(&'static str, Option<String>); 5] {
+    let accel = document.accel.as_ref();
+    let gyro_output = match document.gyro.output {
         GyroOutput::Counts => "counts",
         GyroOutput::Mean => "mean rate",
-    }
-    .to_owned()
-}
-
-/// What an accelerometer's readings stand for.
-fn accel_words(output: AccelOutput) -> String {
-    match output {
+    };
+    let accel_output = accel.map(|accel| match accel.output {
         AccelOutput::Counts => "counts",
         AccelOutput::Volts => "volts (V)",
         AccelOutput::MetresPerSecondSquared => "specific force (m/s²)",
-    }
-    .to_owned()
+    });
+    [
+        ("unit", Some(document.unit.clone())),
+        ("gyro.sensor", Some(names(document.gyro.sensor.iter().map(|sensor| &sensor.name)))),
+        ("gyro.output", Some(gyro_output.to_owned())),
+        ("accel.sensor", accel.map(|accel| names(accel.sensor.iter().map(|sensor| &sensor.name)))),
+        ("accel.output", accel_output.map(str::to_owned)),
+    ]
 }
 
-fn differing(key: &str, here: &str, base: &str, there: &str, part: &str) -> String {
-    format!(
-        "{key} is {here} in {base} and {there} in {part}: only documents of one unit with the same sensors can be \
-         merged"
-    )
+fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    names.map(String::as_str).collect::<Vec<_>>().join(", ")
 }
 
 /// Refuses choices that choose nothing, and documents of the same name.

@@ -1,8 +1,8 @@
 //! Where a merged document's numbers come from: every part's own origin, and what was taken of it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{Log, Origin};
 use toml::{Table, Value};
 
 use crate::document::show::terms::tree;
@@ -19,58 +19,37 @@ pub(super) fn origin(
     base: &Written,
     parts: &[Written],
     from: &BTreeMap<String, String>,
-) -> Result<Value, Error> {
+) -> Result<Origin, Error> {
     let documents: Vec<&Written> = [base].into_iter().chain(parts).collect();
-    let (mut kept, mut logs, mut seen) = (Table::new(), Vec::new(), BTreeSet::new());
+    let (mut kept, mut log) = (Table::new(), Vec::<Log>::new());
     for document in &documents {
-        let mut own = tree(&document.document)?;
-        let mut about =
-            own.remove("origin").and_then(|origin| origin.as_table().cloned()).unwrap_or_default();
-        for log in about.get("log").and_then(Value::as_array).into_iter().flatten() {
-            let digest = log.get("sha256").and_then(Value::as_str).unwrap_or_default();
-            if seen.insert(digest.to_owned()) {
-                logs.push(log.clone());
-            }
-        }
-        for key in ["created", "note"] {
-            if let Some(value) = own.remove(key) {
-                about.insert(key.to_owned(), value);
-            }
-        }
-        let sections: Vec<Value> = from
-            .iter()
-            .filter(|(_, name)| **name == document.name)
-            .map(|(key, _)| Value::String(key.clone()))
-            .collect();
-        about.insert("taken".to_owned(), Value::Array(sections));
+        let own = tree(&document.document)?;
+        let mut about = own.get("origin").and_then(Value::as_table).cloned().unwrap_or_default();
+        let dated = ["created", "note"].into_iter();
+        about.extend(dated.filter_map(|key| Some((key.to_owned(), own.get(key)?.clone()))));
+        let taken = from.iter().filter(|(_, name)| **name == document.name);
+        about.insert("taken".to_owned(), Value::Array(taken.map(|(key, _)| key.as_str().into()).collect()));
         kept.insert(document.name.clone(), Value::Table(about));
+        for one in document.document.origin.iter().flat_map(|origin| &origin.log) {
+            if log.iter().all(|other| other.sha256 != one.sha256) {
+                log.push(one.clone());
+            }
+        }
     }
-    let mut details = Table::new();
-    details.insert("parts".to_owned(), Value::Table(kept));
+    log.truncate(MOST_LOGS);
+    let mut details = Table::from_iter([("parts".to_owned(), Value::Table(kept))]);
     sigmas(&documents, from).write(&mut details);
-    let mut origin = Table::new();
-    origin.insert("tool".to_owned(), Value::String(TOOL.to_owned()));
-    origin.insert("command".to_owned(), Value::String(command_line()));
-    origin.insert("method".to_owned(), Value::String("merge".to_owned()));
-    if let Some(range) = widest(&documents, |document| document.origin.as_ref()?.range_deg_c) {
-        origin.insert("range_deg_c".to_owned(), range);
-    }
-    if let Some(range) = widest(&documents, |document| document.origin.as_ref()?.rate_range_deg_c_per_s) {
-        origin.insert("rate_range_deg_c_per_s".to_owned(), range);
-    }
-    logs.truncate(MOST_LOGS);
-    if !logs.is_empty() {
-        origin.insert("log".to_owned(), Value::Array(logs));
-    }
-    origin.insert("details".to_owned(), Value::Table(details));
-    Ok(Value::Table(origin))
-}
-
-/// The range that all documents cover together.
-fn widest(documents: &[&Written], of: fn(&Document) -> Option<[f64; 2]>) -> Option<Value> {
-    let ranges = documents.iter().filter_map(|document| of(&document.document));
-    let [low, high] = hull(ranges)?;
-    Some(Value::Array(vec![Value::Float(low), Value::Float(high)]))
+    let origins = || documents.iter().filter_map(|document| document.document.origin.as_ref());
+    Ok(Origin {
+        tool: Some(TOOL.to_owned()),
+        command: Some(command_line()),
+        method: Some("merge".to_owned()),
+        range_deg_c: hull(origins().filter_map(|origin| origin.range_deg_c)),
+        rate_range_deg_c_per_s: hull(origins().filter_map(|origin| origin.rate_range_deg_c_per_s)),
+        log,
+        details: Some(details),
+        ..Origin::default()
+    })
 }
 
 /// Standard errors of what was taken, each from where it was taken.

@@ -126,7 +126,7 @@ fn a_term_that_takes_the_place_of_another_takes_it_away_and_a_missing_one_is_kep
     let merged = merge(&base, &[without], &[]).unwrap();
     assert!(merged.written.document.gyro.sensor[0].terms.has(Feature::ThermalRate));
     assert!(merged.warnings[0].contains("lacks gyro.sensor.x.thermal_rate"), "{:?}", merged.warnings);
-    let text = merged.sheet("new.toml").to_text();
+    let text = merged.sheet("new.toml").whole_text();
     assert!(text.contains("warning: positions.toml lacks"), "{text}");
 }
 

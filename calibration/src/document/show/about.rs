@@ -5,13 +5,13 @@ use isotherm_protocol::document::{Document, Orientation};
 use super::parts;
 use super::terms::Term;
 use crate::document::accelerometers;
-use crate::report::{Sheet, short};
+use crate::report::{Report, short};
 
 /// Seconds of arc in a radian.
 pub(crate) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 
 /// Unit, sensors, and how good it is by its own account.
-pub(super) fn headline(name: &str, document: &Document) -> String {
+pub(super) fn words(document: &Document) -> String {
     let names = |names: Vec<&str>| names.join(", ");
     let gyros = document.gyro.sensor.iter().map(|sensor| sensor.name.as_str()).collect();
     let accels: Vec<&str> = accelerometers(document).iter().map(|sensor| sensor.name.as_str()).collect();
@@ -21,7 +21,7 @@ pub(super) fn headline(name: &str, document: &Document) -> String {
         format!("accelerometers {}", names(accels))
     };
     let created = document.created.map(|created| format!(", of {created}")).unwrap_or_default();
-    format!("{name}: calibration of unit {}{created}; gyros {}; {accels}.", document.unit, names(gyros))
+    format!("calibration of unit {}{created}; gyros {}; {accels}", document.unit, names(gyros))
 }
 
 /// Sentences.
@@ -64,7 +64,7 @@ pub(super) fn notes(document: &Document, terms: &[Term]) -> Vec<String> {
 }
 
 /// Sensors, axes, channels, drift, residuals.
-pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
+pub(super) fn tables(sheet: &mut Report, document: &Document) {
     let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
     let channels = document.temperature.channel.iter().map(|channel| {
         let [low, high] = channel.range_deg_c;

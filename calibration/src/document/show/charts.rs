@@ -8,7 +8,7 @@ use super::terms::Term;
 use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
 use crate::document::{Written, accelerometers};
 use crate::numbers::{Size, once_each};
-use crate::report::Sheet;
+use crate::report::Report;
 
 /// Points of a curve.
 const POINTS: usize = 201;
@@ -16,7 +16,7 @@ const POINTS: usize = 201;
 pub(crate) const HEIGHT: u32 = 150;
 
 /// Adds them all.
-pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range: [f64; 2]) {
+pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], range: [f64; 2]) {
     let sums = sums(written, range);
     let caption =
         format!("All terms together, lags settled{}, all channels at one temperature.", lasing_mode(written));
@@ -53,7 +53,7 @@ pub(super) fn charts(sheet: &mut Sheet, written: &Written, terms: &[Term], range
     );
 }
 
-fn add(sheet: &mut Sheet, heading: &str, caption: &str, unit: &str, panels: Vec<Panel>) {
+fn add(sheet: &mut Report, heading: &str, caption: &str, unit: &str, panels: Vec<Panel>) {
     let label = match unit {
         "°C" => "temperature",
         "°C/s" => "rate of temperature",

@@ -3,7 +3,7 @@
 use isotherm_protocol::document::{Document, Measure, Residual, Sample};
 use toml::{Table, Value};
 
-use crate::report::{Sheet, short};
+use crate::report::{Report, short};
 
 /// Most entries of a list that are named.
 const NAMED: usize = 4;
@@ -29,7 +29,7 @@ fn parts<'a>(details: Option<&'a Table>, above: &str) -> Vec<Part<'a>> {
 }
 
 /// Which parts there are, what was taken from each, and how good each is by its own account.
-pub(super) fn tables(sheet: &mut Sheet, document: &Document) {
+pub(super) fn tables(sheet: &mut Report, document: &Document) {
     let details = document.origin.as_ref().and_then(|origin| origin.details.as_ref());
     let parts = parts(details, "");
     let row = |part: &Part<'_>| {

@@ -2,7 +2,6 @@
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 use isotherm_protocol::document::{AccelSensor, Document, Sample};
-use toml::{Table, Value};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
@@ -13,9 +12,7 @@ use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
 use crate::numbers::{dot, hull};
-use crate::report::{
-    Coefficient, Curve, Figure, FitReport, Judged, Rest, Sigmas, fixed, judge, per_deg_c, short,
-};
+use crate::report::{Curve, Figure, Judged, Report, Rest, Sigmas, fixed, judge, per_deg_c, short};
 use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
@@ -49,7 +46,7 @@ pub struct Made {
     /// The ratio of each accelerometer, or why there is none.
     pub found: Vec<Result<Ratio, AccelKind>>,
     /// The report.
-    pub report: FitReport,
+    pub report: Report,
 }
 
 /// Fits the ratio of the board of each accelerometer.
@@ -114,7 +111,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
         }
     }
     let mut report =
-        FitReport::new("Ratio of the accelerometers' board over its temperature", &wanted.base.unit);
+        Report::new("Ratio of the accelerometers' board over its temperature", &wanted.base.unit);
     report.residuals = curves;
     report.verdicts = verdicts.into_iter().map(|verdict| verdict.stated_as(Figure::Rms)).collect();
     report.warnings = troubled;
@@ -190,7 +187,7 @@ fn judged(
 
 /// Puts into the report what was found of each accelerometer.
 fn tell(
-    report: &mut FitReport,
+    report: &mut Report,
     (wanted, sensors, mains): (&Wanted<'_>, &[AccelSensor], &[usize]),
     found: &[Result<Ratio, AccelKind>],
 ) {
@@ -211,7 +208,7 @@ fn tell(
                 for (power, (x, sigma)) in ratio.x.iter().zip(&ratio.sigmas).enumerate() {
                     let unit = per_deg_c("ppm", power + 1);
                     let what = format!("accelerometer {name} board ratio, power {}", power + 1);
-                    report.coefficients.push(Coefficient::new(what, unit, -1e6 * x, Some(1e6 * sigma)));
+                    report.coefficient(what, unit, -1e6 * x, 1e6 * sigma);
                 }
                 let [low, high] = ratio.range_deg_c;
                 report.notes.push(format!(
@@ -259,18 +256,6 @@ impl Made {
             sigmas.put("accel", &sensor.name, "board_ratio_error", ppm.collect());
         }
         sigmas
-    }
-
-    /// What goes into `origin.details`.
-    pub fn details(&self) -> Table {
-        let of = |(sensor, ratio): (&AccelSensor, &Ratio)| {
-            let mut table = Table::new();
-            table.insert("name".into(), sensor.name.clone().into());
-            table.insert("reference_deg_c".into(), ratio.reference_deg_c.into());
-            table.insert("beside_own_temperature".into(), ratio.beside_own.into());
-            Value::Table(table)
-        };
-        Table::from_iter([("accel".to_owned(), Value::Array(self.each().map(of).collect()))])
     }
 
     /// Lowest and highest temperature of the boards (°C).

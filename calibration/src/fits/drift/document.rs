@@ -4,6 +4,7 @@ use isotherm_protocol::document::{Document, Drift};
 
 use super::fit::Analysis;
 use super::markov::Fit;
+use super::report::Found;
 use crate::axes::AXES;
 use crate::error::Error;
 use crate::fits::drift::allan::{Coefficient, Term};
@@ -98,15 +99,6 @@ impl Parameters {
             ));
             CONSTANT_SIGMAS * analysis.slow_deviation
         });
-        // A time below the range is only told: what is so quick is noise for an estimator that sees minutes.
-        if sigma > 0.0 && time_h < TIME_RANGE_H[0] {
-            notes.push(format!(
-                "the correlation time of {} h is below the least of {} h in a document, which replaces it: log for \
-                 longer",
-                short(time_h),
-                TIME_RANGE_H[0]
-            ));
-        }
         let inside = [
             ("sigma_deg_per_h", sigma, SIGMA_RANGE, "°/h"),
             ("initial_sigma_deg_per_h", initial, INITIAL_RANGE, "°/h"),
@@ -116,27 +108,27 @@ impl Parameters {
             // False for what is no number too.
             if !(low..=high).contains(&value) {
                 return Err(format!(
-                    "gyro {}: {key} is {} {measure}, a document allows {low} to {high}: the log is not one of a gyro at rest (did the \
+                    "{key} is {} {measure}, a document allows {low} to {high}: the log is not one of a gyro at rest (did the \
                      unit turn, are there spikes, is the unit of measure right?); no drift is stated for it",
-                    analysis.name,
                     short(value)
                 ));
             }
         }
-        let within = |value: f64, [low, high]: [f64; 2]| digits(value.clamp(low, high));
         let [shortest, longest] = TIME_RANGE_H;
-        if trend_sigma > 0.0 && !(shortest..=longest).contains(&trend_time_h) {
-            notes.push(format!(
-                "the trend's correlation time is {} h, a document allows {shortest} to {longest} h: the nearer limit \
-                 replaces it",
-                short(trend_time_h)
-            ));
-        }
+        let mut time = |what: &str, time_h: f64, counts: bool| {
+            if counts && !(shortest..=longest).contains(&time_h) {
+                notes.push(format!(
+                    "the {what} is {} h, a document allows {shortest} to {longest} h: the nearer limit replaces it",
+                    short(time_h)
+                ));
+            }
+            digits(time_h.clamp(shortest, longest))
+        };
         let drift = Drift {
             sigma_deg_per_h: digits(sigma),
-            correlation_time_h: within(time_h, TIME_RANGE_H),
+            correlation_time_h: time("correlation time", time_h, sigma > 0.0),
             trend_sigma_deg_per_h2: digits(trend_sigma),
-            trend_correlation_time_h: within(trend_time_h, TIME_RANGE_H),
+            trend_correlation_time_h: time("trend's correlation time", trend_time_h, trend_sigma > 0.0),
             initial_sigma_deg_per_h: digits(initial),
             angle_random_walk_deg_per_sqrt_h: digits(walk),
         };
@@ -212,11 +204,7 @@ fn digits(value: f64) -> f64 {
 ///
 /// # Errors
 /// [`Error::Refused`] where an input axis lies along no case axis, or there is another number of sensors.
-pub fn put(
-    document: &mut Document,
-    parameters: &[(String, Parameters)],
-    keep_initial: bool,
-) -> Result<(), Error> {
+pub fn put(document: &mut Document, parameters: &Found, keep_initial: bool) -> Result<(), Error> {
     let rows = &document.gyro.orientation.rows;
     let mut reasons = Vec::new();
     for (index, sensor) in document.gyro.sensor.iter_mut().enumerate() {
@@ -230,7 +218,7 @@ pub fn put(
             ));
             continue;
         };
-        if let Some((_, found)) = parameters.iter().find(|(name, _)| name == axis) {
+        if let Some((_, found)) = parameters.stated().find(|(name, _)| *name == axis) {
             let mut drift = found.drift.clone();
             if let Some(before) = sensor.drift.as_ref().filter(|_| keep_initial) {
                 drift.initial_sigma_deg_per_h = before.initial_sigma_deg_per_h;

@@ -1,102 +1,35 @@
 //! The HTML report of a log's noise and drift.
 
-use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
 use super::fit::Analysis;
 use super::markov::{Fit, Noise};
-use super::report::Report;
-use crate::report::short;
+use super::report::Found;
 
 /// Most points of a spectrum in the page.
 const SPECTRUM_POINTS: usize = 4096;
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 260;
 
-/// The report as a page.
-pub fn page(report: &Report) -> String {
-    let mut page = Page::new(&format!("Noise and drift of unit {}", report.unit));
-    let sentences: Vec<_> =
-        report.sentences().into_iter().map(|sentence| (sentence, String::new())).collect();
-    page.headlines(&sentences);
-    page.paragraph(&format!(
-        "{} ticks of {} s, {:.2} h{}.",
-        report.ticks,
-        short(report.tick_s),
-        report.length_h,
-        if report.corrected { ", corrected and along the case axes" } else { ", raw readings" }
-    ));
-    report.notes.iter().chain(&report.refused).for_each(|note| page.paragraph(note));
-    page.heading("Allan deviation");
-    page.chart(&allan(report));
-    page.table(&report.noise_rows());
-    page.paragraph(
-        "Coefficients are fitted to the overlapping variances with their covariance; intervals hold 95 %. A \
-         coefficient that the log does not show is given as an upper limit.",
-    );
-    report.noise_words().iter().for_each(|words| page.paragraph(words));
-    page.heading("Drift");
-    page.chart(&slow(report));
-    page.table(&report.drift_rows());
-    page.paragraph(
-        "σ and correlation time are most likely together with trend, white noise and daily lines. The plain \
-         autocorrelation falls too early, because mean and trend were fitted to the drift itself.",
-    );
-    if let Some(chart) = autocorrelation(report) {
-        page.chart(&chart);
-    }
-    let extrapolated = report.extrapolation_rows();
-    if !extrapolated.rows.is_empty() {
-        page.heading("How far a trend can be trusted");
-        page.paragraph(
-            "A straight line is fitted to the beginning, the length of a calibration, and extrapolated over the \
-             rest. In 002 it missed by up to 30 %: therefore the estimator treats the trend's rate as a Markov \
-             process.",
-        );
-        page.chart(&extrapolation(report));
-        page.table(&extrapolated);
-    }
-    page.heading("Spectrum");
-    page.chart(&spectrum(report));
-    report.line_words().iter().for_each(|words| page.paragraph(words));
-    page.table(&report.allan_rows());
-    if !report.parameters.is_empty() {
-        page.heading("Parameters of the estimator");
-        let fields = [
-            "sigma_deg_per_h",
-            "correlation_time_h",
-            "trend_sigma_deg_per_h2",
-            "trend_correlation_time_h",
-            "initial_sigma_deg_per_h",
-            "angle_random_walk_deg_per_sqrt_h",
-        ];
-        let rows = report.parameters.iter().map(|(name, parameters)| {
-            let d = &parameters.drift;
-            let values = [
-                d.sigma_deg_per_h,
-                d.correlation_time_h,
-                d.trend_sigma_deg_per_h2,
-                d.trend_correlation_time_h,
-                d.initial_sigma_deg_per_h,
-                d.angle_random_walk_deg_per_sqrt_h,
-            ];
-            std::iter::once(format!("gyro {name}")).chain(values.map(|value| value.to_string())).collect()
-        });
-        page.table(&Table::of(std::iter::once("").chain(fields), rows));
-        for (name, parameters) in &report.parameters {
-            for note in &parameters.notes {
-                page.paragraph(&format!("gyro {name}: {note}."));
-            }
-        }
-    }
-    page.to_html()
+/// All charts, each with its heading.
+pub(super) fn charts(found: &Found) -> Vec<(String, Chart)> {
+    let all = [
+        ("Allan deviation", allan(found)),
+        ("Drift", slow(found)),
+        ("Autocorrelation", autocorrelation(found)),
+        ("How far a trend can be trusted", extrapolation(found)),
+        ("Spectrum", spectrum(found)),
+    ];
+    let shown = all.into_iter().filter(|(_, chart)| !chart.panels.is_empty());
+    shown.map(|(heading, chart)| (heading.to_owned(), chart)).collect()
 }
 
 /// Curves of a sensor.
-fn panel(report: &Report, sensor: &Analysis, unit: &str, curves: Vec<Series>) -> Panel {
-    Panel::of(format!("{} {}", report.kind.sensor(), sensor.name), unit, HEIGHT, curves)
+fn panel(found: &Found, sensor: &Analysis, unit: &str, curves: Vec<Series>) -> Panel {
+    Panel::of(format!("{} {}", found.kind.sensor(), sensor.name), unit, HEIGHT, curves)
 }
 
-fn allan(report: &Report) -> Chart {
+fn allan(found: &Found) -> Chart {
     let of = |sensor: &Analysis| {
         let curve = |estimator: usize| {
             sensor
@@ -123,13 +56,13 @@ fn allan(report: &Report) -> Chart {
                 .map(|row| (row.tau_s, noise.variances(row.tau_s).iter().sum::<f64>().sqrt()));
             curves.push(Series::line("fit", Ink::Fourth, fit));
         }
-        panel(report, sensor, report.kind.measure(), curves).logarithmic()
+        panel(found, sensor, found.kind.measure(), curves).logarithmic()
     };
-    let caption = "Allan deviation against averaging time, with the fit of N, B, K, R and Q.";
-    Chart::of(caption, Axis::of("averaging time", "s").logarithmic(), report.sensors.iter().map(of).collect())
+    let caption = "Allan deviation against averaging time, with N, B, K, R and Q fitted to the overlapping variances and their covariance.";
+    Chart::of(caption, Axis::of("averaging time", "s").logarithmic(), found.sensors.iter().map(of).collect())
 }
 
-fn slow(report: &Report) -> Chart {
+fn slow(found: &Found) -> Chart {
     let of = |sensor: &Analysis| {
         let slow = &sensor.slow;
         let points = slow.time_h.iter().copied().zip(slow.mean.iter().copied());
@@ -144,13 +77,17 @@ fn slow(report: &Report) -> Chart {
                 curves.push(Series::line(name, ink, points));
             }
         }
-        panel(report, sensor, report.kind.measure(), curves)
+        panel(found, sensor, found.kind.measure(), curves)
     };
     let x = Axis::of("time since the log's beginning", "h");
-    Chart::of("Slow part of the readings, with its trend.", x, report.sensors.iter().map(of).collect())
+    Chart::of(
+        "Slow part of the readings, with its trend; σ and correlation time are most likely together with trend, white noise and daily lines.",
+        x,
+        found.sensors.iter().map(of).collect(),
+    )
 }
 
-fn autocorrelation(report: &Report) -> Option<Chart> {
+fn autocorrelation(found: &Found) -> Chart {
     let of = |sensor: &Analysis| {
         let auto = sensor.autocorrelation.as_ref()?;
         let points = auto.lag_h.iter().copied().zip(auto.correlation.iter().copied());
@@ -161,36 +98,35 @@ fn autocorrelation(report: &Report) -> Option<Chart> {
             let model = auto.lag_h.iter().map(|lag| (*lag, libm::exp(-lag / time_h)));
             curves.push(Series::line("Markov part", Ink::Second, model));
         }
-        Some(panel(report, sensor, "", curves))
+        Some(panel(found, sensor, "", curves))
     };
-    let panels: Vec<Panel> = report.sensors.iter().filter_map(of).collect();
-    let caption = "Autocorrelation of the slow part less its trend.";
-    (!panels.is_empty()).then(|| Chart::of(caption, Axis::of("lag", "h"), panels))
+    let caption = "Autocorrelation of the slow part less its trend. It falls too early, because mean and trend were fitted to the drift itself.";
+    Chart::of(caption, Axis::of("lag", "h"), found.sensors.iter().filter_map(of).collect())
 }
 
-fn extrapolation(report: &Report) -> Chart {
+fn extrapolation(found: &Found) -> Chart {
     let of = |sensor: &Analysis| {
-        let found = sensor.extrapolation.as_ref()?;
+        let of = sensor.extrapolation.as_ref()?;
         let slow = &sensor.slow;
         let first = slow.time_h.first().copied().unwrap_or(0.0) - 0.5 * slow.width_h;
-        let line = |time: f64| found.start + found.slope_per_h * (time - first);
+        let line = |time: f64| of.start + of.slope_per_h * (time - first);
         let points = slow.time_h.iter().copied().zip(slow.mean.iter().copied());
-        let fitted = slow.time_h.iter().filter(|time| **time - first <= found.fit_h);
-        let rest = slow.time_h.iter().filter(|time| **time - first > found.fit_h);
+        let fitted = slow.time_h.iter().filter(|time| **time - first <= of.fit_h);
+        let rest = slow.time_h.iter().filter(|time| **time - first > of.fit_h);
         let curves = vec![
             Series::line("slow part", Ink::Raw, points),
             Series::line("fitted", Ink::Second, fitted.map(|time| (*time, line(*time)))),
             Series::line("extrapolated", Ink::Alert, rest.map(|time| (*time, line(*time)))),
         ];
-        Some(panel(report, sensor, report.kind.measure(), curves))
+        Some(panel(found, sensor, found.kind.measure(), curves))
     };
-    let caption = "A straight line through the beginning, extrapolated over the rest.";
+    let caption = "A straight line through the beginning, the length of a calibration, extrapolated over the rest. In 002 it missed by up to 30 %: therefore the estimator treats the trend's rate as a Markov process.";
     let x = Axis::of("time since the log's beginning", "h");
-    Chart::of(caption, x, report.sensors.iter().filter_map(of).collect())
+    Chart::of(caption, x, found.sensors.iter().filter_map(of).collect())
 }
 
-fn spectrum(report: &Report) -> Chart {
-    let unit = format!("{}/√Hz", report.kind.measure());
+fn spectrum(found: &Found) -> Chart {
+    let unit = format!("{}/√Hz", found.kind.measure());
     let of = |sensor: &Analysis| {
         let spectrum = sensor.spectrum.as_ref()?;
         let stride = spectrum.density.len().div_ceil(SPECTRUM_POINTS).max(1);
@@ -209,10 +145,10 @@ fn spectrum(report: &Report) -> Chart {
             sensor.lines.iter().map(|line| (line.frequency_hz, spectrum_at(sensor, line.frequency_hz)));
         let curves =
             vec![Series::line("density", Ink::Raw, points), Series::dots("lines", Ink::Alert, lines)];
-        Some(panel(report, sensor, &unit, curves).logarithmic())
+        Some(panel(found, sensor, &unit, curves).logarithmic())
     };
     let x = Axis::of("frequency", "Hz").logarithmic();
-    let panels = report.sensors.iter().filter_map(of).collect();
+    let panels = found.sensors.iter().filter_map(of).collect();
     Chart::of("Square root of the power spectral density.", x, panels)
 }
 

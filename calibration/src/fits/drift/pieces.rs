@@ -47,7 +47,7 @@ pub struct Grid {
     /// Sensors that can be analysed.
     pub sensors: Vec<Sensor>,
     /// Why others cannot, with what to do.
-    pub refused: Vec<String>,
+    pub refused: Vec<(String, String)>,
     /// What is to be said of gaps and times.
     pub notes: Vec<String>,
 }
@@ -98,26 +98,22 @@ impl Grid {
         let mut grid = Self { tick_s, ticks: places, sensors: Vec::new(), refused: Vec::new(), notes };
         for (name, column) in names.into_iter().zip(values) {
             let called = format!("{} {name}", kind.sensor());
-            match check(&called, &column) {
-                Err(why) => grid.refused.push(why),
-                Ok(bad) => {
-                    if bad > 0 {
-                        grid.notes.push(format!(
-                            "{called}: {} as missing.",
-                            counted(
-                                bad,
-                                "reading is not a number and counts",
-                                "readings are not numbers and count"
-                            )
-                        ));
-                    }
-                    grid.sensors.push(Sensor { name, pieces: cut(column, &gaps, bridge) });
-                }
+            if let Some(fault) = Fault::of(&column) {
+                grid.refused.push((name, fault.words("sensor", 1)));
+                continue;
             }
+            let bad = faults::missing(&column);
+            if bad > 0 {
+                let count =
+                    counted(bad, "reading is not a number and counts", "readings are not numbers and count");
+                grid.notes.push(format!("{called}: {count} as missing."));
+            }
+            grid.sensors.push(Sensor { name, pieces: cut(column, &gaps, bridge) });
         }
         if grid.sensors.is_empty() {
             let told = grid.notes.into_iter().filter(|note| note.starts_with("warning"));
-            return Err(Error::Refused(grid.refused.into_iter().chain(told).collect()));
+            let refused = grid.refused.iter().map(|(name, why)| format!("{} {name}: {why}", kind.sensor()));
+            return Err(Error::Refused(refused.chain(told).collect()));
         }
         Ok(grid)
     }
@@ -208,12 +204,6 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
     notes
 }
 
-/// How many readings of a column are not numbers, or why it cannot be analysed.
-pub(crate) fn check(called: &str, column: &[f64]) -> Result<usize, String> {
-    let fault = Fault::of(column).map(|fault| format!("{called}: {}", fault.words("sensor", 1)));
-    fault.map_or_else(|| Ok(faults::missing(column)), Err)
-}
-
 /// Cuts a column; readings that are not numbers count as missing.
 fn cut(column: Vec<f64>, gaps: &[Gap], bridge: bool) -> Vec<Piece> {
     if gaps.is_empty() && column.iter().all(|reading| reading.is_finite()) {
@@ -299,7 +289,7 @@ mod tests {
         some_bad[500] = f64::NAN;
         let grid = Grid::of(columns(times.clone(), vec![wave(1000), vec![7.0; 1000], some_bad])).unwrap();
         assert_eq!((grid.sensors.len(), grid.sensors[1].pieces.len()), (2, 1), "one bad reading is bridged");
-        assert!(grid.refused[0].contains("gyro 1: every reading is 7"), "{:?}", grid.refused);
+        assert!(grid.refused[0].1.contains("every reading is 7"), "{:?}", grid.refused);
         assert!(
             grid.notes.iter().any(|note| note.contains("1 reading is not a number and counts as missing"))
         );

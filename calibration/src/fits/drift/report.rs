@@ -1,98 +1,161 @@
-//! What is said of a log's noise and drift: verdict, tables, JSON.
+//! What is said of a log's noise and drift.
 
 use std::fmt::Write;
 
 use isotherm_pages::Table;
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::columns::Kind;
-use super::columns::stated_in;
+use super::columns::{Kind, stated_in};
 use super::document::{Parameters, Trend, trend};
 use super::fit::{Analysis, Deviation, Deviations};
+use super::page;
+use super::pieces::Grid;
 use crate::fits::drift::allan::{Coefficient, Term};
-use crate::report::{dozen, short, table, within};
+use crate::report::{Report, Verdict, short, within};
 
-/// What is said of the log as a whole.
-#[derive(Debug, Clone, Serialize)]
-pub struct Report {
-    /// Serial of the unit.
-    pub unit: String,
+/// What was found in a log.
+#[derive(Debug, Clone)]
+pub struct Found {
     /// What the readings measure.
-    #[serde(skip)]
     pub kind: Kind,
-    /// Whether they are corrected, along the case axes.
-    pub corrected: bool,
-    /// Length of a tick (s).
-    pub tick_s: f64,
-    /// Ticks from beginning to end.
-    pub ticks: usize,
     /// Length (h).
     pub length_h: f64,
-    /// What is to be said.
-    pub notes: Vec<String>,
-    /// Sensors that were refused, and why.
-    pub refused: Vec<String>,
     /// The sensors.
-    #[serde(skip)]
     pub sensors: Vec<Analysis>,
-    /// What the estimator is to expect, by sensor; empty for accelerometers.
-    #[serde(skip)]
-    pub parameters: Vec<(String, Parameters)>,
+    /// What the estimator is to expect, by sensor, or why a document cannot say it; empty for accelerometers.
+    pub parameters: Vec<(String, Result<Parameters, String>)>,
 }
 
-impl Report {
-    /// All sentences in one line: what was found, in words.
-    pub fn verdict(&self) -> String {
-        format!("{}.", self.sentences().join("; "))
+impl Found {
+    /// What the estimator is to expect, where a document can say it.
+    pub fn stated(&self) -> impl Iterator<Item = (&String, &Parameters)> {
+        self.parameters.iter().filter_map(|(name, found)| Some((name, found.as_ref().ok()?)))
     }
 
-    /// The first lines: what was found, one sentence for each sensor.
-    pub fn sentences(&self) -> Vec<String> {
-        let (measure, sensor) = (self.kind.measure(), self.kind.sensor());
-        let of = |analysis: &Analysis| {
-            let walk = analysis.stated_noise().map(|noise| noise.of_term(Term::AngleRandomWalk));
-            let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
-            let mut words = match walk {
-                None if analysis.noise.is_some() => "more than the five noise terms".to_owned(),
-                Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
-                Some(Coefficient::NotObservable { below }) => {
-                    format!("N below {} {unit}", short(below * factor))
-                }
-                None => "too short for noise coefficients".to_owned(),
-            };
-            match analysis.slow_drift() {
-                Some((_, time)) if time.value > self.length_h => {
-                    let _ = write!(
-                        words,
-                        ", a drift slower than this log of {} h can show",
-                        short(self.length_h)
-                    );
-                }
-                Some((sigma, time)) => {
-                    let _ = write!(
-                        words,
-                        ", drift σ {} {measure} over {} h",
-                        short(sigma.value),
-                        short(time.value)
-                    );
-                }
-                None => words.push_str(", no slow drift above the noise"),
-            }
-            match trend(analysis) {
-                Trend::Seen { slope, .. } => {
-                    let _ = write!(words, ", trend {} {}", short(slope), self.kind.over_hours(1));
-                }
-                Trend::NotSeen { .. } => words.push_str(", no trend"),
-            }
-            format!("{sensor} {}: {words}", analysis.name)
+    /// All that is said of it.
+    pub fn report(&self, unit: &str, corrected: bool, grid: Grid) -> Report {
+        let mut report = Report::new("Noise and drift", unit);
+        let called = |name: &str| format!("{} {name}", self.kind.sensor());
+        report.verdicts = self.sensors.iter().map(|sensor| self.verdict(sensor)).collect();
+        report
+            .verdicts
+            .extend(grid.refused.iter().map(|(name, why)| Verdict::said(called(name), "").refused(why)));
+        report.figures = Map::from_iter([
+            ("corrected".to_owned(), json!(corrected)),
+            ("tick_s".to_owned(), json!(grid.tick_s)),
+            ("ticks".to_owned(), json!(grid.ticks)),
+            ("length_h".to_owned(), json!(self.length_h)),
+            ("measure".to_owned(), json!(if self.kind == Kind::Rate { "deg/h" } else { "m/s2" })),
+            ("sensors".to_owned(), self.sensors.iter().map(|sensor| self.sensor_json(sensor)).collect()),
+        ]);
+        report.tell(grid.notes);
+        report.notes.push(format!(
+            "{} ticks of {} s, {:.2} h{}.",
+            grid.ticks,
+            short(grid.tick_s),
+            self.length_h,
+            if corrected { ", corrected and along the case axes" } else { ", raw readings" }
+        ));
+        report.warnings.extend(self.noise_words());
+        let notes = self
+            .stated()
+            .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}.")));
+        report.tell(notes.collect::<Vec<_>>());
+        report.tell(self.line_words());
+        report.summary = Some(self.summary());
+        report.charts = page::charts(self);
+        for (heading, rows) in [
+            ("Noise coefficients, with intervals that hold 95 %", self.noise_rows()),
+            ("Drift", self.drift_rows()),
+            ("How far a trend can be trusted", self.extrapolation_rows()),
+            ("Allan deviations", self.allan_rows()),
+            ("Parameters of the estimator", self.parameter_rows()),
+        ] {
+            report.table(heading, rows.head, rows.rows);
+        }
+        report
+    }
+
+    /// What was found of a sensor, in one sentence.
+    fn verdict(&self, sensor: &Analysis) -> Verdict {
+        let walk = sensor.stated_noise().map(|noise| noise.of_term(Term::AngleRandomWalk));
+        let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
+        let mut words = match walk {
+            None if sensor.noise.is_some() => "more than the five noise terms".to_owned(),
+            Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
+            Some(Coefficient::NotObservable { below }) => format!("N below {} {unit}", short(below * factor)),
+            None => "too short for noise coefficients".to_owned(),
         };
-        let refused = (!self.refused.is_empty()).then(|| format!("{} refused", self.refused.len()));
-        self.sensors.iter().map(of).chain(refused).collect()
+        let _ = match sensor.slow_drift() {
+            Some((_, time)) if time.value > self.length_h => {
+                write!(words, ", a drift slower than this log of {} h can show", short(self.length_h))
+            }
+            Some((sigma, time)) => {
+                let measure = self.kind.measure();
+                write!(words, ", drift σ {} {measure} over {} h", short(sigma.value), short(time.value))
+            }
+            None => write!(words, ", no slow drift above the noise"),
+        };
+        let _ = match trend(sensor) {
+            Trend::Seen { slope, .. } => {
+                write!(words, ", trend {} {}", short(slope), self.kind.over_hours(1))
+            }
+            Trend::NotSeen { .. } => write!(words, ", no trend"),
+        };
+        let verdict = Verdict::said(format!("{} {}", self.kind.sensor(), sensor.name), words);
+        match self.parameters.iter().find(|(name, _)| *name == sensor.name) {
+            Some((_, Err(why))) => verdict.refused(why),
+            _ => verdict,
+        }
+    }
+
+    /// A row for each sensor.
+    fn summary(&self) -> Table {
+        let stated = Term::ALL.map(|term| format!("{}, {}", term.symbol(), stated_in(term, self.kind).1));
+        let slow = [format!("σ, {}", self.kind.measure()), "correlation time, h".to_owned()];
+        let trends = format!("trend, {}", self.kind.over_hours(1));
+        let head = [String::new()].into_iter().chain(stated).chain(slow).chain([trends]);
+        let row = |sensor: &Analysis| {
+            let noise = Term::ALL.map(|term| {
+                let factor = stated_in(term, self.kind).0;
+                match sensor.stated_noise().map(|noise| noise.of_term(term)) {
+                    Some(Coefficient::Observed { value, .. }) => short(value * factor),
+                    Some(Coefficient::NotObservable { below }) if below.is_finite() => {
+                        format!("< {}", short(below * factor))
+                    }
+                    _ => "–".to_owned(),
+                }
+            });
+            let part = sensor.slow_drift().filter(|(_, time)| time.value <= self.length_h);
+            let slope = match trend(sensor) {
+                Trend::Seen { slope, .. } => Some(slope),
+                Trend::NotSeen { .. } => None,
+            };
+            let or_none = |value: Option<f64>| value.map_or_else(|| "none seen".to_owned(), short);
+            let slow =
+                [part.map(|(sigma, _)| sigma.value), part.map(|(_, time)| time.value), slope].map(or_none);
+            let of = format!("{} {}", self.kind.sensor(), sensor.name);
+            [of].into_iter().chain(noise).chain(slow).collect()
+        };
+        Table::of(head, self.sensors.iter().map(row))
+    }
+
+    /// What a document is to state, as it states it.
+    fn parameter_rows(&self) -> Table {
+        let rows: Vec<(&String, Map<String, Value>)> = self
+            .stated()
+            .filter_map(|(name, found)| Some((name, json!(found.drift).as_object()?.clone())))
+            .collect();
+        let fields: Vec<String> =
+            rows.first().map(|(_, fields)| fields.keys().cloned().collect()).unwrap_or_default();
+        let row = |(name, fields): (&String, Map<String, Value>)| {
+            [format!("gyro {name}")].into_iter().chain(fields.values().map(ToString::to_string)).collect()
+        };
+        Table::of([String::new()].into_iter().chain(fields), rows.into_iter().map(row))
     }
 
     /// Allan deviations, one row per averaging time.
-    pub fn allan_rows(&self) -> Table {
+    fn allan_rows(&self) -> Table {
         let mut head = vec!["τ, s".to_owned()];
         for sensor in &self.sensors {
             for estimator in ["plain", "overlapping", "modified"] {
@@ -113,13 +176,12 @@ impl Report {
         Table::of(head, (0..longest).map(row))
     }
 
-    /// Heads of a table with a column for each sensor; the first one names the rows.
     fn sensor_heads(&self) -> impl Iterator<Item = &str> {
         std::iter::once("").chain(self.sensors.iter().map(|sensor| sensor.name.as_str()))
     }
 
     /// The noise coefficients, one row per coefficient.
-    pub fn noise_rows(&self) -> Table {
+    fn noise_rows(&self) -> Table {
         let row = |term: Term| {
             let (factor, unit) = stated_in(term, self.kind);
             let cells = self.sensors.iter().map(|sensor| {
@@ -140,7 +202,7 @@ impl Report {
     }
 
     /// The slow part, one row per figure.
-    pub fn drift_rows(&self) -> Table {
+    fn drift_rows(&self) -> Table {
         let measure = self.kind.measure();
 
         let mut rows: Vec<Vec<String>> = Vec::new();
@@ -169,7 +231,7 @@ impl Report {
     }
 
     /// "Fit 21 h, extrapolate the rest", one row per sensor.
-    pub fn extrapolation_rows(&self) -> Table {
+    fn extrapolation_rows(&self) -> Table {
         let measure = self.kind.measure();
         let head = [
             "",
@@ -201,7 +263,7 @@ impl Report {
     }
 
     /// Sensors whose Allan deviation the five terms do not describe, or not within its statistics.
-    pub fn noise_words(&self) -> Vec<String> {
+    fn noise_words(&self) -> Vec<String> {
         let badly = self.sensors.iter().filter_map(|sensor| {
             let noise = sensor.noise.as_ref().filter(|noise| noise.model_error > 0.0)?;
             let error = format!("{:.0} %", 100.0 * noise.model_error);
@@ -224,7 +286,7 @@ impl Report {
     }
 
     /// What is to be said of lines, by sensor.
-    pub fn line_words(&self) -> Vec<String> {
+    fn line_words(&self) -> Vec<String> {
         let (measure, kind) = (self.kind.measure(), self.kind.sensor());
         let mut words = Vec::new();
         for sensor in &self.sensors {
@@ -261,53 +323,13 @@ impl Report {
         words
     }
 
-    /// What a terminal shows: what was found, the noise coefficients, and what is to be looked at.
-    pub fn to_text(&self) -> String {
-        let mut found: Vec<String> =
-            self.sentences().into_iter().map(|sentence| format!("{sentence}.")).collect();
-        let Table { head, mut rows } = self.noise_rows();
-        // What no sensor shows is on the page, with its limits.
-        rows.retain(|row| row.iter().skip(1).any(|cell| !cell.starts_with("not ")));
-        if !rows.is_empty() {
-            found.extend(table(&head, &rows).lines().map(str::to_owned));
-        }
-        let parameters = self.parameters.iter();
-        let notes = parameters
-            .flat_map(|(name, found)| found.notes.iter().map(move |note| format!("gyro {name}: {note}.")));
-        let all = self.notes.iter().cloned().chain(self.noise_words()).chain(notes).chain(self.line_words());
-        let (mut told, others): (Vec<String>, Vec<String>) =
-            all.partition(|words| words.starts_with("warning: "));
-        told.extend(others);
-        let rest = format!(
-            "Unit {}, {:.2} h in ticks of {} s{}: deviations, drift, lines and what the estimator is to expect",
-            self.unit,
-            self.length_h,
-            short(self.tick_s),
-            if self.corrected { ", corrected, along the case axes" } else { "" }
-        );
-        dozen(&found, &told, &rest)
-    }
-
-    /// Everything as JSON.
-    pub fn to_json(&self) -> Value {
-        let mut value = json!(self);
-        let sensors: Vec<Value> = self.sensors.iter().map(|sensor| self.sensor_json(sensor)).collect();
-        if let Some(object) = value.as_object_mut() {
-            object.insert("verdict".to_owned(), json!(self.verdict()));
-            object
-                .insert("measure".to_owned(), json!(if self.kind == Kind::Rate { "deg/h" } else { "m/s2" }));
-            object.insert("sensors".to_owned(), json!(sensors));
-        }
-        value
-    }
-
     fn sensor_json(&self, sensor: &Analysis) -> Value {
         let deviations = |row: &Deviations| {
             let [plain, overlapping, modified] = row.of;
             json!({ "tau_s": row.tau_s, "plain": plain, "overlapping": overlapping, "modified": modified })
         };
         let allan: Vec<Value> = sensor.allan.iter().map(deviations).collect();
-        let mut noise = serde_json::Map::new();
+        let mut noise = Map::new();
         for term in Term::ALL {
             let (factor, unit) = stated_in(term, self.kind);
             let value = match sensor.stated_noise().map(|noise| noise.of_term(term)) {
@@ -330,7 +352,7 @@ impl Report {
 
         let power =
             |value: Option<(f64, f64)>| value.map(|(value, error)| json!({ "value": value, "sigma": error }));
-        let parameters = self.parameters.iter().find(|(name, _)| *name == sensor.name);
+        let parameters = self.stated().find(|(name, _)| **name == sensor.name);
         json!({
             "name": sensor.name,
             "mean": sensor.mean,

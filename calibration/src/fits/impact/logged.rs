@@ -4,9 +4,10 @@ use super::estimate::TICK_S;
 use super::scenario::{Drift, Voyage};
 use crate::error::Error;
 use crate::fits::drift::columns::Columns;
-use crate::fits::drift::pieces::{Spacing, check, checks};
+use crate::fits::drift::pieces::{Spacing, checks};
 use crate::fits::drift::{DEG_PER_H_IN_RAD_PER_S, HOUR_S};
 use crate::numbers::{real, seconds};
+use crate::runs::faults::Fault;
 
 /// Hours of calibration whose mean is held.
 const HELD_H: f64 = 1.0;
@@ -54,8 +55,10 @@ pub fn drift(
     notes.extend(checks::at_rest(columns, &spacing)?);
     notes.extend(checks::missing(&spacing, columns.end_ns.len()));
     let looked = columns.names.iter().zip(&columns.values);
-    let bad: Vec<String> =
-        looked.filter_map(|(name, column)| check(&format!("gyro {name}"), column).err()).collect();
+    let fault = |(name, column): (&String, &Vec<f64>)| {
+        Some(format!("gyro {name}: {}", Fault::of(column)?.words("sensor", 1)))
+    };
+    let bad: Vec<String> = looked.filter_map(fault).collect();
     if !bad.is_empty() {
         return Err(Error::Refused(bad));
     }

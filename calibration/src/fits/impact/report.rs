@@ -1,11 +1,9 @@
-//! What is said of a drift's impact: verdict, table, JSON, page.
-
-use std::fmt::Write;
+//! What is said of a drift's impact.
 
 use isotherm_correction::drift::DriftParts;
-use isotherm_pages::{Axis, Chart, Ink, Page, Panel, Series, Table};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::ins::Errors;
 use super::models::{Choice, TABLE_3, table_3, table_3_gains};
@@ -14,7 +12,7 @@ use super::scenario::{CARES, Care, Course, Drift, Figures, Voyage};
 use crate::axes::AXES;
 use crate::error::Error;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
-use crate::report::{short, table};
+use crate::report::{Report, Verdict, short};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
@@ -32,9 +30,9 @@ pub struct Row {
     pub spread: Option<Spread>,
 }
 
-/// What is said.
+/// What was sailed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Report {
+pub struct Sailed {
     /// Where and how long.
     pub voyage: Voyage,
     /// Which drift, in words.
@@ -69,14 +67,60 @@ impl Row {
     fn judged(&self) -> Figures {
         self.spread.as_ref().map_or_else(|| self.course.figures(), |spread| spread.median)
     }
+
+    fn to_json(&self) -> Value {
+        let points = self.course.points.iter().map(|(hours, errors)| {
+            let [north, east] = errors.position_m;
+            [*hours, errors.heading_arcmin(), north, east, errors.radial_m()]
+        });
+        let mut value = json!({ "case": self.case, "care": self.course.care.words(), "points": points.collect::<Vec<_>>() });
+        match &self.spread {
+            None => value["figures"] = json!(self.course.figures()),
+            Some(spread) => {
+                value["median"] = json!(spread.median);
+                value["within_95_percent"] = json!(spread.within_95_percent);
+            }
+        }
+        value
+    }
 }
 
-impl Report {
+impl Sailed {
+    /// All that is said of it.
+    pub fn report(&self) -> Report {
+        let mut report = Report::new("What a drift means for navigation", "");
+        report.verdicts.push(self.verdict());
+        report.notes.push(self.circumstances());
+        report.tell(self.notes.iter().cloned());
+        report.notes.extend(self.said_of_models());
+        if self.seeds > 0 {
+            report.notes.push("The curves are those of the first seed.".to_owned());
+        }
+        report.summary = Some(self.rows());
+        let mut cases: Vec<&str> = self.rows.iter().map(|row| row.case.as_str()).collect();
+        cases.dedup();
+        report.charts = cases.into_iter().map(|case| (case.to_owned(), self.chart(case))).collect();
+        report.tables.push(("Position errors of real gyros in 002, table 3".to_owned(), table_3()));
+        report.figures = Map::from_iter([
+            ("source".to_owned(), json!(self.source)),
+            ("voyage".to_owned(), json!(self.voyage)),
+            ("seeds".to_owned(), json!(self.seeds)),
+            (
+                "columns_of_points".to_owned(),
+                json!(["hours", "heading_arcmin", "north_m", "east_m", "radial_m"]),
+            ),
+            ("rows".to_owned(), self.rows.iter().map(Row::to_json).collect()),
+            ("models".to_owned(), json!(self.choices)),
+            ("table_3".to_owned(), json!(TABLE_3)),
+        ]);
+        report
+    }
+
     /// The first line, in words: the case that carries the position farthest.
-    pub fn verdict(&self) -> String {
+    fn verdict(&self) -> Verdict {
         let radial = |row: &&Row| row.judged().radial_largest_m;
         let Some(worst) = self.rows.iter().max_by(|a, b| radial(a).total_cmp(&radial(b))) else {
-            return String::new();
+            return Verdict::said("no drift", "nothing to show");
         };
         let of = |care: Care| {
             let row = self.rows.iter().find(|row| row.case == worst.case && row.course.care == care);
@@ -85,48 +129,40 @@ impl Report {
         let [held, without, with, alone] = CARES.map(of);
         let middle = if self.seeds > 0 { "in the middle of all seeds " } else { "" };
         let gain = without.radial_largest_m / with.radial_largest_m.max(f64::MIN_POSITIVE);
-        let judgement = if without.radial_largest_m <= 0.0 && with.radial_largest_m <= 0.0 {
-            "the trend state makes no difference".to_owned()
-        } else if gain >= 1.05 {
+        let judgement = if gain >= 1.05 {
             format!("the trend state cuts the error {gain:.1}×")
-        } else if gain > 1.0 / 1.05 {
+        } else if gain > 1.0 / 1.05 || without.radial_largest_m <= 0.0 && with.radial_largest_m <= 0.0 {
             "the trend state makes no difference".to_owned()
         } else {
+            let more = 1.0 / gain;
             format!(
-                "the trend state increases the error {:.1}×: its trend_sigma is too large for this gyro",
-                1.0 / gain
+                "the trend state increases the error {more:.1}×: its trend_sigma is too large for this gyro"
             )
         };
         let judgement = format!("{judgement}; {} with the trend alone", distance(alone.radial_largest_m));
         let hours = short(self.voyage.hours);
+        let [position, of_without, of_with] = [held, without, with].map(|of| distance(of.radial_largest_m));
+        let heading = short(held.heading_largest_arcmin);
         // Seeded drifts are held at what they are, without noise: no procedure comes that far.
-        if self.seeds > 0
-            && held.radial_largest_m < EXACT * without.radial_largest_m.min(with.radial_largest_m)
-        {
-            return format!(
-                "{}: over {hours} h {middle}{} of position with the estimator without trend state, {} with it: \
-                 {judgement}. A drift known exactly at departure and held would leave {} of position and {}′ of \
-                 heading; the rest is what noise hides from the estimator.",
-                worst.case,
-                distance(without.radial_largest_m),
-                distance(with.radial_largest_m),
-                distance(held.radial_largest_m),
-                short(held.heading_largest_arcmin),
-            );
-        }
-        format!(
-            "{}: over {hours} h {middle}{} of position and {}′ of heading if the drift is held at its last value; {} \
-             with the estimator without trend state, {} with it: {judgement}.",
-            worst.case,
-            distance(held.radial_largest_m),
-            short(held.heading_largest_arcmin),
-            distance(without.radial_largest_m),
-            distance(with.radial_largest_m),
-        )
+        let is_bound = self.seeds > 0
+            && held.radial_largest_m < EXACT * without.radial_largest_m.min(with.radial_largest_m);
+        let words = if is_bound {
+            format!(
+                "over {hours} h {middle}{of_without} of position with the estimator without trend state, {of_with} with \
+                 it: {judgement}. A drift known exactly at departure and held would leave {position} of position and \
+                 {heading}′ of heading; the rest is what noise hides from the estimator."
+            )
+        } else {
+            format!(
+                "over {hours} h {middle}{position} of position and {heading}′ of heading if the drift is held at its \
+                 last value; {of_without} with the estimator without trend state, {of_with} with it: {judgement}."
+            )
+        };
+        Verdict::said(&worst.case, words)
     }
 
     /// Head and rows of the table.
-    pub fn rows(&self) -> Table {
+    fn rows(&self) -> Table {
         let mut head =
             vec!["drift", "care", "position at end, m", "largest, m", "heading at end, ′", "largest, ′"];
         if self.seeds > 0 {
@@ -148,16 +184,6 @@ impl Report {
         Table::of(head, rows)
     }
 
-    /// Everything as text.
-    pub fn to_text(&self) -> String {
-        let Table { head, rows } = self.rows();
-        let mut text = format!("{}\n\n{}\n\n{}\n", self.verdict(), self.circumstances(), table(&head, &rows));
-        for note in self.notes.iter().chain(&self.said_of_models()) {
-            let _ = writeln!(text, "\n{note}");
-        }
-        text
-    }
-
     /// Which model the log bears out, and what 002 has of the two.
     fn said_of_models(&self) -> Vec<String> {
         let [least, median, most] = table_3_gains();
@@ -169,62 +195,6 @@ impl Report {
         );
         let chosen = self.choices.iter().map(Choice::words);
         chosen.chain([paper]).collect()
-    }
-
-    /// Everything as JSON; the curves too.
-    pub fn to_json(&self) -> Value {
-        let rows: Vec<Value> = self
-            .rows
-            .iter()
-            .map(|row| {
-                let mut value = json!({ "case": row.case, "care": row.course.care.words() });
-                match &row.spread {
-                    None => value["figures"] = json!(row.course.figures()),
-                    Some(spread) => {
-                        value["median"] = json!(spread.median);
-                        value["within_95_percent"] = json!(spread.within_95_percent);
-                    }
-                }
-                let points = row.course.points.iter().map(|(hours, errors)| {
-                    let [north, east] = errors.position_m;
-                    [*hours, errors.heading_arcmin(), north, east, errors.radial_m()]
-                });
-                value["points"] = json!(points.collect::<Vec<_>>());
-                value
-            })
-            .collect();
-        json!({
-            "verdict": self.verdict(),
-            "source": self.source,
-            "voyage": self.voyage,
-            "seeds": self.seeds,
-            "columns_of_points": ["hours", "heading_arcmin", "north_m", "east_m", "radial_m"],
-            "rows": rows,
-            "notes": self.notes,
-            "models": self.choices,
-            "table_3": TABLE_3,
-        })
-    }
-
-    /// The page.
-    pub fn to_html(&self) -> String {
-        let mut page = Page::new("What a drift means for navigation");
-        page.headline(&self.verdict());
-        page.paragraph(&self.circumstances());
-        page.table(&self.rows());
-        self.notes.iter().chain(&self.said_of_models()).for_each(|note| page.paragraph(note));
-        let mut cases: Vec<&str> = self.rows.iter().map(|row| row.case.as_str()).collect();
-        cases.dedup();
-        for case in cases {
-            page.heading(case);
-            if self.seeds > 0 {
-                page.paragraph("The curves are those of the first seed.");
-            }
-            page.chart(&self.chart(case));
-        }
-        page.heading("Position errors of real gyros in 002, table 3");
-        page.table(&table_3());
-        page.to_html()
     }
 
     fn chart(&self, case: &str) -> Chart {

@@ -1,10 +1,13 @@
 //! One voyage: calibration with all rates known, then hours on its own.
 
+use clap::{ArgAction, Args};
 use isotherm_correction::drift::DriftParts;
+use isotherm_correction::units::AngularRate;
 
 use super::estimate::{Aiding, TICK_S, residual, trend_alone, without_trend};
-use super::ins::{Errors, Ins};
+use super::ins::{Errors, GREATEST_LATITUDE_DEG, Ins, TURN_RATIO};
 use crate::error::Error;
+use crate::limits::within;
 
 /// Ticks in one step of the error equations, and its length (s).
 const STEP_TICKS: usize = 6;
@@ -12,21 +15,35 @@ const STEP_S: f64 = 60.0;
 /// Steps between two points of a curve.
 const POINT_STEPS: usize = 10;
 
+/// Most hours of either part.
+const MOST_HOURS: f64 = 1000.0;
+
 /// Where and how long.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Args, serde::Serialize)]
 pub struct Voyage {
-    /// Latitude (°).
+    /// Latitude (°)
+    #[arg(long = "latitude", value_name = "DEG", default_value_t = 60.0, allow_hyphen_values = true, value_parser = within(-GREATEST_LATITUDE_DEG, GREATEST_LATITUDE_DEG))]
     pub latitude_deg: f64,
-    /// Rate of the platform over the Earth's.
+    /// Rate of the platform about the vertical (multiples of the Earth's)
+    #[arg(long, hide_short_help = true, value_name = "RATIO", default_value_t = TURN_RATIO, allow_hyphen_values = true, value_parser = within(-1000.0, 1000.0))]
     pub turn_ratio: f64,
-    /// Hours of calibration.
+    /// Length of the calibration before it (h)
+    #[arg(long = "calibration-hours", value_name = "HOURS", default_value_t = 21.0, value_parser = within(0.5, MOST_HOURS))]
     pub calibration_h: f64,
-    /// Length of the voyage without position (h).
+    /// Length of the voyage without position (h)
+    #[arg(long, value_name = "HOURS", default_value_t = 48.0, value_parser = within(0.5, MOST_HOURS))]
     pub hours: f64,
-    /// Whether the level gyros stay observable through the velocity log.
+    /// No velocity log: level gyros are not observed during the voyage
+    #[arg(long = "no-log-aid", hide_short_help = true, action = ArgAction::SetFalse)]
     pub log_aids_level: bool,
-    /// Standard error of a reference of a minute (rad/s).
+    /// Standard error of the reference rate per minute (°/h)
+    #[arg(long = "reference-sigma", hide_short_help = true, value_name = "DEG_PER_H", default_value = "0.001", value_parser = rate)]
     pub reference_sigma_rad_per_s: f64,
+}
+
+/// Reads a rate in °/h as rad/s.
+fn rate(text: &str) -> Result<f64, String> {
+    within(0.0, 1000.0)(text).map(|rate| AngularRate::from_deg_per_h(rate).as_rad_per_s())
 }
 
 /// A drift of the gyros x, y, z, tick by tick (rad/s).

@@ -125,12 +125,12 @@ fn documents(bare: &Document, group: [usize; 3], reference: f64) -> Result<Vec<L
 ///
 /// # Errors
 /// As [`Run::correct_together`].
-pub fn gather<W: Watch>(
+pub fn gather(
     runs: &[Run],
     bare: &Document,
     group: [usize; 3],
     cut: Cut,
-    mut watch: impl FnMut() -> W,
+    watch: &mut dyn Watch,
 ) -> Result<Gathered, Error> {
     let loaded = documents(bare, group, cut.reference_deg_c)?;
     let mut gathered = Gathered::default();
@@ -140,7 +140,7 @@ pub fn gather<W: Watch>(
         let run = run.of_gyros(group);
         let mut jackknife =
             Jackknife::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
-        let troubles = run.correct_together(&loaded, watch(), |raw, ticks, unit| {
+        let troubles = run.correct_together(&loaded, &mut *watch, |raw, ticks, unit| {
             let Some(bare) = ticks.first() else { return };
             gathered.ticks[0] += 1;
             gathered.ticks[1] += bare.missed;

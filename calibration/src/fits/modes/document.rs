@@ -3,11 +3,11 @@
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
 use isotherm_protocol::document::{Curve, Document, GyroSensor, ModeReversal, Servo, ServoKind, Shape, Unit};
-use toml::{Table, Value};
+use serde_json::{Value, json};
 
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
-use crate::document::{matrix, numbers, tidy};
+use crate::document::{by_name, rows, tidy};
 use crate::numbers::unit;
 use crate::report::{Sigmas, gyros as gyros_in_words};
 
@@ -189,57 +189,14 @@ pub fn sigmas(made: &Made) -> Sigmas {
     sigmas
 }
 
-/// What goes into `origin.details`: standard errors, covariance, noise, switch parameters.
-pub fn details(made: &Made) -> Table {
-    let mut table = Table::new();
-    table.insert("transition_ticks".into(), Value::Integer(made.transition_ticks.into()));
-    table.insert("reversal_period_s".into(), tidy(made.switches.period_s()).into());
-    table.insert("window_s".into(), tidy(made.window_s).into());
-    let gyros = made.gyros.iter().zip(&made.servos).zip(&made.before.document.gyro.sensor);
-    let gyros = gyros.map(|((fit, servo), sensor)| Value::Table(of_gyro(&sensor.name, fit, servo)));
-    table.insert("gyro".into(), Value::Array(gyros.collect()));
-    table
-}
-
-fn of_gyro(name: &str, fit: &Result<GyroFit, String>, servo: &Result<ServoFit, String>) -> Table {
-    let mut table = Table::new();
-    table.insert("name".into(), name.into());
-    match fit {
-        Err(reason) => {
-            table.insert("refused".into(), reason.as_str().into());
-        }
-        Ok(fit) => {
-            let names = fit.coefficients.iter().map(|one| format!("{}.{}", one.term.key(), one.power).into());
-            table.insert("coefficient".into(), Value::Array(names.collect()));
-            let sigmas = fit.coefficients.iter().map(|one| &one.sigma);
-            table.insert("sigma_deg_per_h".into(), numbers(sigmas));
-            table.insert("covariance".into(), matrix(&fit.covariance));
-            table.insert(
-                "angle_random_walk_deg_per_sqrt_h".into(),
-                tidy(fit.noise.white.sqrt() / 60.0).into(),
-            );
-            if let Some([variance, time_s]) = fit.noise.markov {
-                table.insert("markov_sigma_deg_per_h".into(), tidy(variance.sqrt()).into());
-                table.insert("markov_correlation_time_h".into(), tidy(time_s / 3600.0).into());
-            }
-            table.insert("means".into(), Value::Integer(i64::try_from(fit.cells).unwrap_or(i64::MAX)));
-        }
-    }
-    match servo {
-        Err(reason) => {
-            table.insert("servo_refused".into(), reason.as_str().into());
-        }
-        Ok(servo) => {
-            let mut own = Table::new();
-            own.insert("time_constant_sigma_s".into(), tidy(servo.transient.sigma_s).into());
-            own.insert("frequency_loss_rms_hz".into(), tidy(servo.transient.loss_hz).into());
-            let sigmas = servo.rest.coefficients.iter().map(|[_, sigma]| sigma);
-            own.insert("rest_frequency_sigma_hz".into(), numbers(sigmas));
-            if let Some(delay_s) = servo.rest.delay_s {
-                own.insert("temperature_delay_s".into(), tidy(delay_s).into());
-            }
-            table.insert("servo".into(), Value::Table(own));
-        }
-    }
-    table
+/// What the document says of the fit beside its coefficients.
+pub fn details(made: &Made) -> Value {
+    let gyros = made.gyros.iter().zip(&made.before.document.gyro.sensor);
+    let known = gyros.filter_map(|(fit, sensor)| Some((sensor.name.as_str(), fit.as_ref().ok()?)));
+    json!({
+        "transition_ticks": made.transition_ticks,
+        "reversal_period_s": tidy(made.switches.period_s()),
+        "window_s": tidy(made.window_s),
+        "covariance": by_name(known.map(|(name, fit)| (name, rows(&fit.covariance)))),
+    })
 }

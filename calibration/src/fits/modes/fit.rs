@@ -17,7 +17,7 @@ use crate::axes::{main_axis, output_name};
 use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::{median, real};
-use crate::report::{Curve as Residual, FitReport, Rest, judge};
+use crate::report::{Curve as Residual, Rest, judge};
 use crate::runs::table::{Rows, Takes};
 use crate::runs::{Run, Watch};
 
@@ -90,8 +90,8 @@ pub struct Made {
 ///
 /// # Errors
 /// [`Error::Refused`] with every reason why the log does not allow it; [`Error::Log`], [`Error::Document`].
-pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
-    let switches = Switches::of(wanted.runs, &mut watch)?;
+pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
+    let switches = Switches::of(wanted.runs, watch)?;
     let reasons = checks::before(&switches, wanted.base, wanted.transition_ticks);
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
@@ -117,15 +117,15 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
     let mut servos: Vec<Option<Result<ServoFit, String>>> = vec![None; switches.sensors];
     let mut earth_case = None;
     for group in groups(switches.sensors) {
-        let gathered = gather(wanted.runs, &bare, group, cut, &mut watch)?;
+        let gathered = gather(wanted.runs, &bare, group, cut, watch)?;
         let earth = earth_rate(wanted, &gathered)?;
         earth_case = earth;
-        let doubts = check(wanted, &gathered, (&bare, group), earth, &mut watch)?;
+        let doubts = check(wanted, &gathered, (&bare, group), earth, watch)?;
         // Gaps, gravity and temperatures are the same for every group of gyros.
         if group[0] == 0 {
             gaps(&gathered, &mut warnings);
             warnings.extend(doubts);
-            warnings.extend(temperatures::freezing(wanted.runs, &bare, &mut watch)?);
+            warnings.extend(temperatures::freezing(wanted.runs, &bare, watch)?);
             let deg_c: Vec<f64> =
                 gathered.cells.iter().map(|cell| cell.powers[0][0] + reference_deg_c).collect();
             warnings.extend(units::other_dither(&switches, wanted.base, median(&deg_c)));
@@ -190,18 +190,18 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         residuals: Vec::new(),
         warnings,
     };
-    made.settle(wanted, &constants, earth_case, &mut watch)?;
+    made.settle(wanted, &constants, earth_case, watch)?;
     Ok(made)
 }
 
 impl Made {
     /// Writes and judges; gyros whose terms make an axis worse keep the old ones, and all is judged once more.
-    fn settle<W: Watch>(
+    fn settle(
         &mut self,
         wanted: &Wanted<'_>,
         constants: &[Option<f64>],
         earth: Option<[f64; 3]>,
-        watch: &mut impl FnMut() -> W,
+        watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         let document = document::fitted(&self.before.document, self, constants);
         self.written = Written::of(&document)?;
@@ -232,11 +232,11 @@ impl Made {
         Ok(())
     }
 
-    fn judged<W: Watch>(
+    fn judged(
         &self,
         wanted: &Wanted<'_>,
         earth: Option<[f64; 3]>,
-        watch: &mut impl FnMut() -> W,
+        watch: &mut dyn Watch,
     ) -> Result<Vec<Residual>, Error> {
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
         let about = (&self.written.document, &Rest { rate_deg_per_h, ..Rest::default() });
@@ -246,14 +246,9 @@ impl Made {
         let runs = runs.chain(wanted.judge.iter().map(|run| (run, Sample::Out)));
         let mut residuals = Vec::new();
         for (run, sample) in runs {
-            let curves = judge(run, sample, documents, about, rows, watch())?.curves;
+            let curves = judge(run, sample, documents, about, rows, &mut *watch)?.curves;
             residuals.extend(curves.into_iter().filter(|curve| curve.of.starts_with("gyro")));
         }
         Ok(residuals)
-    }
-
-    /// The report.
-    pub fn report(&self) -> FitReport {
-        super::report::report(self)
     }
 }

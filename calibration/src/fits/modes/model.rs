@@ -1,5 +1,7 @@
 //! The fit of one gyro: which orders, which coefficients, how sure.
 
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use isotherm_correction::units::AngularRate;
 use nalgebra::DMatrix;
 
@@ -44,13 +46,16 @@ impl Term {
 }
 
 /// Orders as they were asked for; those that were not are chosen by cross-validation.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Args)]
 pub struct Asked {
-    /// Of the static bias.
+    /// Order of the static polynomial, 0…3 (default: by cross-validation)
+    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = RangedU64ValueParser::<usize>::new().range(0..=3))]
     pub static_order: Option<usize>,
-    /// Of the magnetic bias.
+    /// Order of the magnetic polynomial, 0…3 (default: by cross-validation)
+    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = RangedU64ValueParser::<usize>::new().range(0..=3))]
     pub magnetic_order: Option<usize>,
-    /// Of the slow meander.
+    /// Order of the slow meander, 0 or 1 (default: by cross-validation)
+    #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = RangedU64ValueParser::<usize>::new().range(0..=1))]
     pub meander_order: Option<usize>,
 }
 

@@ -2,9 +2,8 @@
 
 use super::cells::MAX_POWER;
 use super::model::{Asked, MEANDER_ORDER, Term};
-use crate::lsq::blocks::Blocks;
-use crate::lsq::correlated::{Data, Noise};
-use crate::lsq::linear::{SINGULAR, Weak};
+use crate::lsq::correlated::{Data, Noise, White};
+use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::numbers::ends;
 
 /// Share of the range that cooling and heating must each cover to be folds.
@@ -151,10 +150,9 @@ pub fn choose(
         return Ok((only, Vec::new()));
     }
     let white = data.whitened(noise);
-    let blocks = Blocks::of(&white.columns, &white.value, &folds.of);
     let mut scores: Vec<Score> = models()
         .filter_map(|model| {
-            Some(Score { model, chi_square: score(&blocks, &model.columns())?, count: data.len() })
+            Some(Score { model, chi_square: score(&white, &folds.of, &model.columns())?, count: data.len() })
         })
         .collect();
     scores.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
@@ -170,11 +168,18 @@ pub fn choose(
     Ok((chosen.unwrap_or(full), scores))
 }
 
-/// Squared errors with which each fold is predicted from the others.
-fn score(blocks: &Blocks, columns: &[usize]) -> Option<f64> {
-    let of = |fold: usize| {
-        let found = blocks.without(fold, columns, Weak::Refuse(SINGULAR))?;
-        Some(blocks.left_in(fold, columns, &found.coefficients))
+/// What columns leave of each fold when they are fitted to the others, over all folds.
+fn score(white: &White, folds: &[usize], columns: &[usize]) -> Option<f64> {
+    let design = white.columns.select_columns(columns);
+    let left_in = |fold: usize| {
+        let (own, others): (Vec<usize>, Vec<usize>) = (0..folds.len()).partition(|row| folds[*row] == fold);
+        let values = white.value.select_rows(&others);
+        let found = linear::solve(&design.select_rows(&others), &values, Weak::Refuse(SINGULAR)).ok()?;
+        let left = white.value.select_rows(&own) - design.select_rows(&own) * found.coefficients;
+        Some(left.norm_squared())
     };
-    (0..blocks.len()).filter(|fold| blocks.rows(*fold) > 0).map(of).sum()
+    let mut all = folds.to_vec();
+    all.sort_unstable();
+    all.dedup();
+    all.into_iter().map(left_in).sum()
 }

@@ -71,12 +71,12 @@ pub(super) fn earth_of(document: &Document, sensor: usize, cell: &Cell, earth: O
 ///
 /// # Errors
 /// Every reason why nothing can be made of it.
-pub(super) fn check<W: Watch>(
+pub(super) fn check(
     wanted: &Wanted<'_>,
     gathered: &Gathered,
     (bare, group): (&Document, [usize; 3]),
     earth: Option<[f64; 3]>,
-    watch: &mut impl FnMut() -> W,
+    watch: &mut dyn Watch,
 ) -> Result<Vec<String>, Error> {
     let names = group.map(|sensor| bare.gyro.sensor[sensor].name.as_str());
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));

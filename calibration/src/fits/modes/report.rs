@@ -6,55 +6,61 @@ use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, Term};
 use crate::axes::{main_axis, output_name};
 use crate::numbers::real;
-use crate::report::{Coefficient, Curve, Figure, FitReport, counted, fixed, per_deg_c, short, together};
+use crate::report::{Curve, Figure, Report, counted, fixed, per_deg_c, short, together};
 
 /// Models of the cross-validation that the report lists for each gyro.
 const MODELS: usize = 5;
 
-/// The report.
-pub(super) fn report(made: &Made) -> FitReport {
-    let unit = made.written.document.unit.clone();
-    let mut report =
-        FitReport::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
-    let verdicts = Curve::verdicts(&made.residuals).into_iter();
-    report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
-    report.residuals.clone_from(&made.residuals);
-    report.warnings.clone_from(&made.warnings);
-    notes(made, &mut report);
-    let mut validation = Vec::new();
-    let mut told: Vec<(&str, String)> = Vec::new();
-    for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
-        match made.gyros.get(index) {
-            Some(Ok(fit)) => {
-                gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
-                if fit.left_out > 0 {
-                    let are = counted(fit.left_out, "mean is", "means are");
-                    told.push((&sensor.name, format!("{are} far off and left out")));
+impl Made {
+    /// The report.
+    pub fn report(&self) -> Report {
+        let made = self;
+        let unit = made.written.document.unit.clone();
+        let mut report =
+            Report::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
+        let verdicts = Curve::verdicts(&made.residuals).into_iter();
+        report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
+        report.residuals.clone_from(&made.residuals);
+        report.warnings.clone_from(&made.warnings);
+        notes(made, &mut report);
+        let mut validation = Vec::new();
+        let mut told: Vec<(&str, String)> = Vec::new();
+        for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
+            match made.gyros.get(index) {
+                Some(Ok(fit)) => {
+                    gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
+                    if fit.left_out > 0 {
+                        let are = counted(fit.left_out, "mean is", "means are");
+                        told.push((&sensor.name, format!("{are} far off and left out")));
+                    }
+                    told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
                 }
-                told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
+                Some(Err(reason)) => refuse(made, index, reason, &mut report),
+                None => {}
             }
-            Some(Err(reason)) => refuse(made, index, reason, &mut report),
-            None => {}
-        }
-        match made.servos.get(index) {
-            Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
-            Some(Err(reason)) => {
-                let old =
-                    if sensor.servo.is_some() { "the document's servo stays" } else { "no servo is written" };
-                told.push((&sensor.name, format!("{reason}; {old}")));
+            match made.servos.get(index) {
+                Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
+                Some(Err(reason)) => {
+                    let old = if sensor.servo.is_some() {
+                        "the document's servo stays"
+                    } else {
+                        "no servo is written"
+                    };
+                    told.push((&sensor.name, format!("{reason}; {old}")));
+                }
+                None => {}
             }
-            None => {}
         }
+        report.warnings.extend(together(&told));
+        if !validation.is_empty() {
+            let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
+            report.validation = Some(Table::of(head, validation));
+        }
+        report
     }
-    report.warnings.extend(together(&told));
-    if !validation.is_empty() {
-        let head = ["gyro", "static order", "magnetic order", "slow-meander order", "χ² per mean", ""];
-        report.validation = Some(Table::of(head, validation));
-    }
-    report
 }
 
-fn notes(made: &Made, report: &mut FitReport) {
+fn notes(made: &Made, report: &mut Report) {
     let switches = &made.switches;
     report.notes.push(format!(
         "{} ticks of {} s, {} mode switches, every {} s; a switch loses {} {}.",
@@ -80,7 +86,7 @@ fn notes(made: &Made, report: &mut FitReport) {
 fn gyro(
     name: &str,
     fit: &GyroFit,
-    (keeps_constants, report): (bool, &mut FitReport),
+    (keeps_constants, report): (bool, &mut Report),
     validation: &mut Vec<Vec<String>>,
 ) {
     for one in &fit.coefficients {
@@ -88,7 +94,7 @@ fn gyro(
         let kept = keeps_constants && one.term == Term::Static && one.power == 0;
         let what = if kept { ", with the Earth's rate: not written" } else { "" };
         let name = format!("gyro {name} {}, power {}{what}", one.term.key().replace('_', " "), one.power);
-        report.coefficients.push(Coefficient::new(name, unit, one.value, Some(one.sigma)));
+        report.coefficient(name, unit, one.value, one.sigma);
     }
     let markov = fit.noise.markov.map_or_else(String::new, |[variance, time_s]| {
         format!(", drift of {} °/h over {} s", short(variance.sqrt()), short(time_s))
@@ -116,18 +122,13 @@ fn gyro(
     }
 }
 
-fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
+fn transient(name: &str, servo: &ServoFit, report: &mut Report) {
     let own = &servo.transient;
-    report.coefficients.push(Coefficient::new(
-        format!("gyro {name} servo time constant"),
-        "s",
-        own.time_constant_s,
-        Some(own.sigma_s),
-    ));
+    report.coefficient(format!("gyro {name} servo time constant"), "s", own.time_constant_s, own.sigma_s);
     for (power, [value, sigma]) in servo.rest.coefficients.iter().enumerate() {
         let unit = per_deg_c("Hz", power);
         let name = format!("gyro {name} dither rest frequency, power {power}");
-        report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
+        report.coefficient(name, unit, *value, *sigma);
     }
     let delay = servo.rest.delay_s.map_or_else(String::new, |delay_s| {
         format!("; the filtered temperature lags the dither's by {} s", short(delay_s))
@@ -140,7 +141,7 @@ fn transient(name: &str, servo: &ServoFit, report: &mut FitReport) {
 }
 
 /// A gyro that keeps its old terms.
-fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut FitReport) {
+fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut Report) {
     let row = made.written.document.gyro.orientation.rows.get(sensor).copied().unwrap_or_default();
     let axis = output_name(true, main_axis(&row));
     for verdict in report.verdicts.iter_mut().filter(|verdict| verdict.of == axis) {

@@ -73,7 +73,7 @@ impl Switches {
     ///
     /// # Errors
     /// As [`Run::gyro_ticks`].
-    pub fn of<W: Watch>(runs: &[Run], mut watch: impl FnMut() -> W) -> Result<Self, Error> {
+    pub fn of(runs: &[Run], watch: &mut dyn Watch) -> Result<Self, Error> {
         let mut found = Self { whole: true, ..Self::default() };
         let mut length_s = 0.0;
         let mut first: Option<Vec<f64>> = None;
@@ -82,7 +82,7 @@ impl Switches {
             let mut eye = Eye::default();
             found.seen.iter_mut().for_each(Seen::begin);
             let mut begin = None;
-            run.gyro_ticks(watch(), |output, tick| {
+            run.gyro_ticks(&mut *watch, |output, tick| {
                 found.output.get_or_insert(output);
                 found.whole &= tick
                     .readings

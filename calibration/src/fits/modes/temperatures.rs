@@ -15,14 +15,10 @@ use crate::runs::{Run, Watch};
 ///
 /// # Errors
 /// As [`Run::series`].
-pub(super) fn read<W: Watch>(
-    runs: &[Run],
-    document: &Document,
-    watch: &mut impl FnMut() -> W,
-) -> Result<String, Error> {
+pub(super) fn read(runs: &[Run], document: &Document, watch: &mut dyn Watch) -> Result<String, Error> {
     let mut raw: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for run in runs {
-        for (name, channel) in run.series(watch())?.temperatures {
+        for (name, channel) in run.series(&mut *watch)?.temperatures {
             raw.entry(name).or_default().extend(channel.raw);
         }
     }
@@ -81,14 +77,14 @@ fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>)
 ///
 /// # Errors
 /// As [`Run::series`].
-pub(super) fn freezing<W: Watch>(
+pub(super) fn freezing(
     runs: &[Run],
     document: &Document,
-    watch: &mut impl FnMut() -> W,
+    watch: &mut dyn Watch,
 ) -> Result<Vec<String>, Error> {
     let mut told: Vec<(&str, String)> = Vec::new();
     for run in runs {
-        let series = run.series(watch())?;
+        let series = run.series(&mut *watch)?;
         for channel in &document.temperature.channel {
             let Some(Channel { time_ns, raw }) = series.temperatures.get(&channel.name) else { continue };
             let Some(words) = frozen("", time_ns, raw) else { continue };

@@ -1,10 +1,10 @@
 //! A document of a unit that has none yet: everything as the log has it, for a fit to complete.
 
-use isotherm_protocol::document::{AccelOutput, Channel, Document, Filter, GyroOutput, Temperature};
+use isotherm_protocol::document::{AccelOutput, Document, Filter, GyroOutput, Temperature};
 
-use isotherm_correction::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
+use isotherm_correction::sample::OutputKind;
 
-use crate::document::plain;
+use crate::document::{channels, faults, plain};
 use crate::error::Error;
 use crate::runs::series::Series;
 use crate::runs::{Run, Watch};
@@ -18,52 +18,11 @@ const RANGE_DEG_C: [f64; 2] = [-70.0, 130.0];
 /// # Errors
 /// [`Error::Refused`] where the log needs a document: counts of gyros, skewed sensors, channels that do not read °C.
 pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Error> {
-    let mut reasons = Vec::new();
-    if series.gyros.output != Some(OutputKind::Mean) {
-        reasons.push(
-            "the log's gyro readings are counts: give a document with increment weights (--calibration)"
-                .to_owned(),
-        );
-    }
-    for (kind, count) in
-        [("gyros", series.gyros.readings.len()), ("accelerometers", series.accels.readings.len())]
-    {
-        if count == 0 {
-            reasons.push(format!("the log has no {kind}: see [file.gyro] and [file.accel] of its mapping"));
-        } else if count != MIN_SENSORS {
-            reasons.push(format!(
-                "the log has {count} {kind}, from {MIN_SENSORS} to {MAX_SENSORS} are possible, but only three have \
-                 known axes: give the nominal axes with --calibration"
-            ));
-        }
-    }
-    let (mut channels, mut other) = (Vec::new(), Vec::new());
-    for (name, channel) in &series.temperatures {
-        let good: Vec<f64> = channel.raw.iter().copied().filter(|raw| raw.is_finite()).collect();
-        let in_range = good.iter().filter(|raw| (RANGE_DEG_C[0]..=RANGE_DEG_C[1]).contains(*raw)).count();
-        if in_range * 2 < good.len() || good.is_empty() {
-            other.push(format!("{name:?}"));
-        }
-        channels.push(Channel {
-            name: name.clone(),
-            conversion_deg_c: vec![0.0, 1.0],
-            range_deg_c: RANGE_DEG_C,
-            spike_limit_deg_c: 5.0,
-        });
-    }
-    if !other.is_empty() {
-        reasons.push(format!(
-            "temperature {} {} not read °C (most readings are outside {} to {} °C, or not numbers): give the \
-             conversion with --calibration",
-            if other.len() == 1 { "channel" } else { "channels" },
-            if other.len() == 1 { format!("{} does", other[0]) } else { format!("{} do", other.join(", ")) },
-            RANGE_DEG_C[0],
-            RANGE_DEG_C[1]
-        ));
-    }
+    let reasons = faults(series, true, RANGE_DEG_C);
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
+    let channels = channels(series, RANGE_DEG_C, |_| 5.0);
     let filter = Filter {
         grid_step_s: 1.0,
         smoothing_s: 5.0,

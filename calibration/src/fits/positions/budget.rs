@@ -2,14 +2,16 @@
 
 use clap::Args;
 use isotherm_pages::Table;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::doubts::unseen;
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::solve::{Positions, Weights, guesses};
+use crate::document::by_name;
+use crate::limits::{above_0, from_0};
 use crate::numbers::{norm, real};
-use crate::report::{counted, short, table};
+use crate::report::{Report, counted, short};
 
 /// ″ in one radian.
 pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
@@ -24,13 +26,13 @@ pub struct Budget {
     #[arg(skip)]
     pub run_out_arcsec: f64,
     /// Planned: white noise of an accelerometer (V²·s)
-    #[arg(long, hide_short_help = true, value_name = "Q", default_value_t = 3e-9, requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "Q", default_value_t = 3e-9, requires = "budget", value_parser = above_0)]
     pub noise: f64,
     /// Planned: time in each position (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 30.0, requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 30.0, requires = "budget", value_parser = above_0)]
     pub seconds: f64,
     /// Planned: output of an accelerometer at 1 g (V)
-    #[arg(long, hide_short_help = true, value_name = "V", default_value_t = 1.0, requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "V", default_value_t = 1.0, requires = "budget", value_parser = above_0)]
     pub scale: f64,
     /// Planned: thermal expansion of housing and sensor (1e-6/°C)
     #[arg(long, hide_short_help = true, value_name = "PPM", num_args = 2, default_values_t = [22.9, 15.0], requires = "budget")]
@@ -45,7 +47,7 @@ pub struct Budget {
     #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget")]
     pub axis_rate: f64,
     /// Planned: hysteresis of an axis over thermal cycles (″); quartz 5 to 15, silicon 15 to 60, or as measured
-    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 5.0, requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 5.0, requires = "budget", value_parser = from_0)]
     pub hysteresis: f64,
 }
 
@@ -121,13 +123,13 @@ impl Budget {
         Some([mean, mean.hypot(self.thermal_arcsec())])
     }
 
-    /// The first line: what this plan comes to.
-    fn headline(&self, plan: &Plan, levelling_rad: f64) -> String {
+    /// What this plan comes to.
+    fn words(&self, plan: &Plan, levelling_rad: f64) -> String {
         let count = counted(plan.positions.len(), "position", "positions");
         if let Some([known, later]) = self.known_by(plan, levelling_rad) {
             return format!(
-                "An axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with \
-                 hysteresis, housing and measured temperature."
+                "an axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with hysteresis, \
+                 housing and measured temperature"
             );
         }
         let all: Vec<usize> = (0..plan.positions.len()).collect();
@@ -137,33 +139,47 @@ impl Budget {
         } else {
             format!("none has {}", lacking.join(", "))
         };
-        format!("The plan's {count} will not determine C: {lacking}. Show each case axis up and down.")
+        format!("the plan's {count} will not determine C: {lacking}. Show each case axis up and down")
     }
 
-    /// As text.
-    pub fn to_text(&self, plan: &Plan, levelling_rad: f64) -> String {
-        let Table { head, rows } = self.rows();
-        let typical = TYPICAL_ARCSEC_PER_DEG_C
-            .map(|(name, rate)| format!("{:.1}″ for {name} ({rate} ″/°C)", self.temperature_arcsec(rate)));
-        let of_plan = self.of_plan(plan, levelling_rad).map_or_else(String::new, |[mean, largest]| {
-            let level = if plan.tells_level() {
-                String::new()
-            } else {
-                format!(", with a level known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD)
-            };
-            format!(
-                "The weighted least-squares fit of the plan uses every position for every element{level}: it will state {mean:.1}″ on \
-                 average, {largest:.1}″ at most.\n"
-            )
+    /// All that is said of it.
+    pub fn report(&self, plan: &Plan, levelling_rad: f64) -> Report {
+        let words = self.words(plan, levelling_rad);
+        let mut report = Report::saying("Error budget of positions", "budget", words);
+        let formula = "By the formula of 004, which adds its errors independent of the plan";
+        report.notes.push(format!("{formula}: {:.1}″.", self.total_arcsec()));
+        let typical =
+            TYPICAL_ARCSEC_PER_DEG_C.map(|(name, rate)| (name, rate, self.temperature_arcsec(rate)));
+        let words = typical.map(|(name, rate, error)| format!("{error:.1}″ for {name} ({rate} ″/°C)"));
+        report.notes.push(format!("Error by the measured temperature: {}.", words.join(", ")));
+        let of_plan = self.of_plan(plan, levelling_rad);
+        if let Some([mean, largest]) = of_plan {
+            let level =
+                format!(", with a level known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD);
+            report.notes.push(format!(
+                "The weighted least-squares fit of the plan uses every position for every element{}: it will state \
+                 {mean:.1}″ on average, {largest:.1}″ at most.",
+                if plan.tells_level() { "" } else { level.as_str() }
+            ));
+        }
+        report.tables.push(("By the formula".to_owned(), self.rows()));
+        let figures = json!({
+            "noise_arcsec": self.noise_arcsec(),
+            "stand_arcsec": self.stand_arcsec(),
+            "housing_arcsec": self.housing_arcsec(),
+            "temperature_arcsec": self.temperature_arcsec(self.axis_rate),
+            "temperature_typical_arcsec": by_name(typical.map(|(name, _, error)| (name, json!(error)))),
+            "hysteresis_arcsec": self.hysteresis,
+            "thermal_arcsec": self.thermal_arcsec(),
+            "total_arcsec": self.total_arcsec(),
+            "positions": plan.positions.len(),
+            "determined": of_plan.is_some(),
+            "known_arcsec": self.known_by(plan, levelling_rad).map(|[_, later]| later),
+            "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
+            "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
         });
-        format!(
-            "{}\n\nBy the formula of 004, which adds its errors independent of the plan: {:.1}″.\n\n{}\n\nError by the measured \
-             temperature: {}.\n{of_plan}",
-            self.headline(plan, levelling_rad),
-            self.total_arcsec(),
-            table(&head, &rows),
-            typical.join(", ")
-        )
+        report.figures = figures.as_object().cloned().unwrap_or_default();
+        report
     }
 
     /// The budget as a table.
@@ -199,30 +215,6 @@ impl Budget {
             row("total".into(), "with stand and noise".into(), self.total_arcsec()),
         ];
         Table::of(["", "", "″"], rows)
-    }
-
-    /// As JSON.
-    pub fn to_json(&self, plan: &Plan, levelling_rad: f64) -> Value {
-        let typical: serde_json::Map<String, Value> = TYPICAL_ARCSEC_PER_DEG_C
-            .iter()
-            .map(|(name, rate)| ((*name).to_owned(), json!(self.temperature_arcsec(*rate))))
-            .collect();
-        let of_plan = self.of_plan(plan, levelling_rad);
-        json!({
-            "noise_arcsec": self.noise_arcsec(),
-            "stand_arcsec": self.stand_arcsec(),
-            "housing_arcsec": self.housing_arcsec(),
-            "temperature_arcsec": self.temperature_arcsec(self.axis_rate),
-            "temperature_typical_arcsec": typical,
-            "hysteresis_arcsec": self.hysteresis,
-            "thermal_arcsec": self.thermal_arcsec(),
-            "total_arcsec": self.total_arcsec(),
-            "positions": plan.positions.len(),
-            "determined": of_plan.is_some(),
-            "known_arcsec": self.known_by(plan, levelling_rad).map(|[_, later]| later),
-            "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
-            "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
-        })
     }
 }
 
@@ -267,7 +259,7 @@ mod tests {
             let of = Budget { axis_rate, hysteresis, ..budget.clone() };
             assert!((of.thermal_arcsec() - total).abs() < 0.5, "{}", of.thermal_arcsec());
         }
-        let text = budget.to_text(&Plan::twelve(), 3e-4);
+        let text = budget.report(&Plan::twelve(), 3e-4).whole_text();
         for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "16.4″"] {
             assert!(text.contains(words), "{words} is not in\n{text}");
         }
@@ -276,12 +268,11 @@ mod tests {
     #[test]
     fn the_first_line_is_of_the_plan() {
         let budget = example();
-        let first =
-            |plan: &Plan| budget.to_text(plan, 60.0 / ARCSEC_PER_RAD).lines().next().unwrap().to_owned();
+        let first = |plan: &Plan| budget.report(plan, 60.0 / ARCSEC_PER_RAD).headline();
         let twelve = first(&Plan::twelve());
         assert!(
             twelve.starts_with(
-                "An axis will be known to 2.9″ (one sigma) by the plan's 12 positions, to 12.1″"
+                "budget: an axis will be known to 2.9″ (one sigma) by the plan's 12 positions, to 12.1″"
             ),
             "{twelve}"
         );
@@ -290,7 +281,7 @@ mod tests {
         assert!(known > 20.0 && later > known && later < known + 5.0, "{known} {later}");
         assert!(
             six.starts_with(&format!(
-                "An axis will be known to {known:.1}″ (one sigma) by the plan's 6 positions"
+                "budget: an axis will be known to {known:.1}″ (one sigma) by the plan's 6 positions"
             )),
             "{six}"
         );
@@ -298,7 +289,7 @@ mod tests {
         flat.positions.retain(|position| !position.name.starts_with('Z'));
         let flat = first(&flat);
         assert!(
-            flat.starts_with("The plan's 8 positions will not determine C: none has z up, z down."),
+            flat.starts_with("budget: the plan's 8 positions will not determine C: none has z up, z down."),
             "{flat}"
         );
     }

@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::fit::{Analysis, Settings};
 use super::model::{Degrees, Sensor, Taken};
 use super::plan::Plan;
-use super::sense::{self, Beside};
+use super::sense::{Beside, elsewhere};
 use super::solve::Fit;
 use super::temperature::Temperatures;
 use super::{budget, measure, model};
@@ -108,32 +108,8 @@ pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mu
         )
     };
     let beside: Vec<Beside> = fit.sensors.iter().zip(rows).map(of).collect();
-    let turned = sense::turned(&beside);
-    if turned.is_empty() {
-        return;
-    }
-    let who = several("accelerometer", &turned, beside.len());
-    let one = turned.len() == 1;
-    let moved = sense::places(&beside).map(|(order, same_way)| (sense::out_of_place(order), same_way));
-    let what = match moved {
-        Some((moved, _)) if moved.is_empty() => format!(
-            "{who} {} found with the other sign: {} missing in the mapping",
-            if one { "is" } else { "are" },
-            if one { "is its sign" } else { "are their signs" }
-        ),
-        Some((moved, [true, true, true])) if moved.len() == 2 => {
-            format!("{who} look swapped: are their columns of the mapping")
-        }
-        _ => format!(
-            "{who} {} far from where the document at hand has {}: are columns of the mapping swapped, is a sign the other one",
-            if one { "is" } else { "are" },
-            if one { "it" } else { "them" }
-        ),
-    };
-    warnings.push(format!(
-        "{what}, or is the unit mounted differently from the plan? {}",
-        sense::found_along("accelerometer", &beside, &turned)
-    ));
+    let mounted = "Or is the unit mounted differently from the plan?";
+    warnings.extend(elsewhere("accelerometer", &beside).map(|words| format!("{words}. {mounted}")));
 }
 
 /// Scale factors that are not those of the unit of measure that the document states; `own` are the temperatures that each

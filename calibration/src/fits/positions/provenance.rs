@@ -1,17 +1,15 @@
 //! Where the numbers of the document come from, and what "before" means.
 
 use isotherm_protocol::document::{Document, Shape};
-use serde_json::json;
-use toml::Table;
+use serde_json::{Value, json};
 
 use super::budget::ARCSEC_PER_RAD;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::model::SMALL;
-use crate::document::tidy;
-use crate::error::Error;
+use crate::document::{rows, tidy};
 use crate::numbers::real;
-use crate::report::{FitReport, Sigmas};
+use crate::report::Sigmas;
 
 /// The document that "before" stands for: the one that was given, or else one scale factor for all accelerometers, no bias, axes
 /// along the case.
@@ -39,18 +37,9 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
 }
 
 /// What the document says of the fit beside its coefficients.
-///
-/// # Errors
-/// [`Error::Document`] where it cannot be written, which would be a mistake here.
-pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> Result<Table, Error> {
-    let bent = analysis.quadratic.as_ref().is_some_and(|found| found.3 < 1e-3);
-
+pub fn details(analysis: &Analysis, settings: &Settings) -> Value {
     let fit = &analysis.fit;
-    let covariance = fit.axes_covariance(&settings.plan, 0) * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
-    let covariance: Vec<Vec<f64>> = covariance
-        .row_iter()
-        .map(|row| row.iter().map(|c| tidy(c * analysis.widened * analysis.widened)).collect())
-        .collect();
+    let widened = ARCSEC_PER_RAD * analysis.widened;
     let mut about = json!({
         "gravity_m_per_s2": settings.gravity,
         "positions": analysis.poses.len(),
@@ -61,27 +50,19 @@ pub fn details(analysis: &Analysis, settings: &Settings, report: &FitReport) -> 
         "chi_square": fit.solution.chi_square,
         "degrees_of_freedom": fit.solution.degrees,
         "standard_errors_widened_by": analysis.widened,
-        "quadratic_axes": bent,
-        "verdict": report.headline(),
-        "warnings": report.warnings,
-        "coefficients": report.coefficients_by_name(),
         // Two angles per accelerometer across its axis, at the reference.
-        "axes_covariance_arcsec2": covariance,
-        "relative_scale_sigma": scale_sigmas(analysis),
+        "axes_covariance_arcsec2": rows(&(fit.axes_covariance(&settings.plan, 0) * (widened * widened))),
     });
-    if let (false, Some(about)) = (analysis.returns.is_empty(), about.as_object_mut()) {
-        about.insert("hysteresis".to_owned(), hysteresis(analysis).into());
+    if !analysis.returns.is_empty() {
+        about["hysteresis"] = analysis.returns.iter().map(hysteresis).collect();
     }
-    Table::try_from(about).map_err(|error| Error::document(&error))
+    about
 }
 
-/// Turns of the axes (″) over thermal cycles, with their standard errors.
-fn hysteresis(analysis: &Analysis) -> Vec<serde_json::Value> {
-    let of = |back: &Return| {
-        let [turn, sigma] = [0, 1].map(|i| back.turns.iter().map(|turn| tidy(turn[i])).collect::<Vec<f64>>());
-        json!({ "temperature_deg_c": tidy(back.deg_c), "turn_arcsec": turn, "sigma_arcsec": sigma, "accident": tidy(back.accident) })
-    };
-    analysis.returns.iter().map(of).collect()
+/// Turns of the axes (″) over a thermal cycle, with their standard errors.
+fn hysteresis(back: &Return) -> Value {
+    let [turn, sigma] = [0, 1].map(|i| back.turns.iter().map(|turn| tidy(turn[i])).collect::<Vec<f64>>());
+    json!({ "temperature_deg_c": tidy(back.deg_c), "turn_arcsec": turn, "sigma_arcsec": sigma, "accident": tidy(back.accident) })
 }
 
 /// Standard errors of scale factors, biases and axes, for what compares documents.
@@ -108,12 +89,4 @@ pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> 
         sigmas.put("accel", &sensor.name, "axis_arcsec", arcsec.to_vec());
     }
     sigmas
-}
-
-/// Standard errors of the scale factors (relative).
-fn scale_sigmas(analysis: &Analysis) -> Vec<f64> {
-    let solution = &analysis.fit.solution;
-    let sensors = analysis.fit.guess.len();
-    let of_sensor = analysis.fit.degrees.of_sensor();
-    (0..sensors).map(|sensor| solution.sigma(sensor * of_sensor) * SMALL * analysis.widened).collect()
 }

@@ -13,9 +13,7 @@ use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
 use crate::document::accelerometers;
-use crate::report::{
-    Coefficient, Curve, Figure, FitReport, Verdict, counted, fixed, output_unit, per_deg_c, short, six,
-};
+use crate::report::{Curve, Figure, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six};
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]
@@ -33,9 +31,9 @@ pub fn report(
     settings: &Settings,
     inside: Set<'_>,
     outside: Option<Set<'_>>,
-) -> FitReport {
+) -> Report {
     let mut report =
-        FitReport::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
+        Report::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
     report.residuals = curves(inside.judged, inside.runs, Sample::In);
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
@@ -51,7 +49,7 @@ pub fn report(
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(document, analysis, settings);
     let names = names(document, analysis.fit.guess.len());
-    report.coefficients = coefficients(document, analysis, settings, &names);
+    coefficients(&mut report, document, (analysis, settings), &names);
     report.charts.push(("What is left".to_owned(), left_chart(settings, inside.judged)));
     report.tables.push(("Positions".to_owned(), position_rows(settings, inside)));
     if analysis.levels_deg_c.len() > 1 {
@@ -151,20 +149,19 @@ fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<S
 }
 
 fn coefficients(
+    report: &mut Report,
     document: &Document,
-    analysis: &Analysis,
-    settings: &Settings,
+    (analysis, settings): (&Analysis, &Settings),
     names: &[String],
-) -> Vec<Coefficient> {
+) {
     let fit = &analysis.fit;
     let output = output_unit(document);
     let by_power = |power: usize| analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
-    let mut all = Vec::new();
     let of_sensor = fit.degrees.of_sensor();
     let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
         let sigma = |offset: usize, scale: f64| {
-            Some(fit.solution.sigma(index * of_sensor + offset) * SMALL * scale * analysis.widened)
+            fit.solution.sigma(index * of_sensor + offset) * SMALL * scale * analysis.widened
         };
         let guess = fit.guess[index].scale;
         for (power, k) in sensor.scale.iter().enumerate() {
@@ -172,13 +169,13 @@ fn coefficients(
             let value = k * factor / settings.gravity;
             let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
             let sigma = sigma(power, guess / settings.gravity * factor);
-            all.push(Coefficient::new(format!("accelerometer {name} K{power}"), unit, value, sigma));
+            report.coefficient(format!("accelerometer {name} K{power}"), unit, value, sigma);
         }
         for (power, bias) in sensor.bias.iter().enumerate() {
             let factor = by_power(power);
             let unit = per_deg_c(output, power);
             let sigma = sigma(s + power, guess * factor);
-            all.push(Coefficient::new(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma));
+            report.coefficient(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma);
         }
     }
     let mut axes = |fit: &Fit, from: usize, what: &str| {
@@ -187,12 +184,9 @@ fn coefficients(
                 let factor = by_power(power) * ARCSEC_PER_RAD;
                 let sigma = fit.axis_sigma(&settings.plan, index, power);
                 for i in across(sensor.axis[0]) {
-                    all.push(Coefficient::new(
-                        format!("accelerometer {name} C{power}{what} along {}", AXES[i]),
-                        per_deg_c("″", power),
-                        row[i] * factor,
-                        Some(sigma[i] * factor * analysis.widened),
-                    ));
+                    let name = format!("accelerometer {name} C{power}{what} along {}", AXES[i]);
+                    let sigma = sigma[i] * factor * analysis.widened;
+                    report.coefficient(name, per_deg_c("″", power), row[i] * factor, sigma);
                 }
             }
         }
@@ -203,9 +197,8 @@ fn coefficients(
     }
     for (index, (value, sigma)) in fit.stand.iter().enumerate() {
         let (value, sigma) = (value * ARCSEC_PER_RAD, sigma * ARCSEC_PER_RAD * analysis.widened);
-        all.push(Coefficient::new(format!("stand δ{}", index + 1), "″", value, Some(sigma)));
+        report.coefficient(format!("stand δ{}", index + 1), "″", value, sigma);
     }
-    all
 }
 
 fn position_rows(settings: &Settings, set: Set<'_>) -> Table {

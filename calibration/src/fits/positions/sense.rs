@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::doubts::LARGEST_TURN_DEG;
-use crate::axes::sensor_name;
+use crate::axes::{sensor_name, several};
 use crate::report::{fixed, short};
 
 /// One sensor beside what the document at hand states of it.
@@ -26,8 +26,30 @@ impl Beside {
     }
 }
 
+/// Where sensors lie elsewhere than the document at hand has them: what is wrong with columns or signs by the fewest mistakes, and where they
+/// were found.
+pub(crate) fn elsewhere(kind: &str, sensors: &[Beside]) -> Option<String> {
+    let turned: Vec<usize> =
+        (0..sensors.len()).filter(|index| sensors[*index].turned_deg() > LARGEST_TURN_DEG).collect();
+    let who = several(kind, &turned, sensors.len());
+    let one = ["is", "its sign", "it"];
+    let [are, signs, them] = if turned.len() == 1 { one } else { ["are", "their signs", "them"] };
+    let found = places(sensors).map(|(order, same_way)| (out_of_place(order).len(), same_way));
+    let what = match found {
+        Some((0, _)) => {
+            format!("{who} {are} found with the other sign: {are} {signs} missing in the mapping?")
+        }
+        Some((2, [true, true, true])) => format!("{who} look swapped: check the columns in the mapping."),
+        _ => format!(
+            "{who} {are} far from where the document at hand has {them}: are columns of the mapping swapped, or is a sign \
+             the other one?"
+        ),
+    };
+    (!turned.is_empty()).then(|| format!("{what} {}", found_along(kind, sensors, &turned)))
+}
+
 /// Where positive outputs of some sensors point, in words.
-pub(crate) fn found_along(kind: &str, sensors: &[Beside], which: &[usize]) -> String {
+fn found_along(kind: &str, sensors: &[Beside], which: &[usize]) -> String {
     let along = |index: &usize| {
         let [x, y, z]: [f64; 3] = sensors[*index].senses[0].into();
         let [x, y, z] = [x, y, z].map(|c| fixed(c, 2));
@@ -59,9 +81,4 @@ pub(crate) fn places(sensors: &[Beside]) -> Option<([usize; 3], [bool; 3])> {
 /// Axes that are not in their places.
 pub(crate) fn out_of_place(order: [usize; 3]) -> Vec<usize> {
     (0..3).filter(|axis| order[*axis] != *axis).collect()
-}
-
-/// Sensors that point elsewhere than stated.
-pub(crate) fn turned(sensors: &[Beside]) -> Vec<usize> {
-    (0..sensors.len()).filter(|index| sensors[*index].turned_deg() > LARGEST_TURN_DEG).collect()
 }

@@ -49,21 +49,17 @@ pub struct Binned {
     pub troubles: Troubles,
 }
 
-/// Bins a run. `watch` is asked for each reading of it.
+/// Bins a run.
 ///
 /// # Errors
 /// As [`Run::correct`].
-pub fn binned<W: Watch>(
-    run: &Run,
-    document: &Document,
-    mut watch: impl FnMut() -> W,
-) -> Result<Binned, Error> {
+pub fn binned(run: &Run, document: &Document, watch: &mut dyn Watch) -> Result<Binned, Error> {
     let sensors = document.gyro.sensor.len();
     let mut whole = Binned::default();
     let starts = (0..sensors).step_by(3).map(|start| start.min(sensors.saturating_sub(3)));
     for start in starts {
         let group = [start, start + 1, start + 2];
-        let part = of_group(run, document, group, watch())?;
+        let part = of_group(run, document, group, &mut *watch)?;
         if whole.bins.is_empty() {
             whole = part;
             whole.bins.iter_mut().for_each(|bin| bin.rate.resize(sensors, f64::NAN));

@@ -3,12 +3,11 @@
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
 use isotherm_protocol::document::{Curve, Document, Shape};
-use toml::{Table, Value};
+use serde_json::{Value, json};
 
 use super::fit::Made;
 use super::model::GyroRates;
-use super::over_temperature::Level;
-use crate::document::{matrix, numbers, tidy};
+use crate::document::{by_name, rows, tidy};
 use crate::finding::Kind;
 use crate::numbers::unit;
 use crate::report::Sigmas;
@@ -69,65 +68,20 @@ pub fn sigmas(made: &Made) -> Sigmas {
     sigmas
 }
 
-/// What goes into `origin.details`: standard errors, and what a document has no place for.
-pub fn details(made: &Made) -> Table {
-    let mut table = Table::new();
-    if let Some(deg_c) = made.temperature_deg_c() {
-        table.insert("temperature_deg_c".into(), tidy(deg_c).into());
-    }
-    let rates = made.steps.iter().map(|step| step.matched.step.rate_deg_per_s.into());
-    table.insert("rate_deg_per_s".into(), Value::Array(rates.collect()));
-    let gyros = made.gyros.iter().zip(&made.written.document.gyro.sensor).zip(&made.walk);
-    let gyros = gyros.map(|((found, sensor), walk)| Value::Table(of_gyro(&sensor.name, found, *walk)));
-    table.insert("gyro".into(), Value::Array(gyros.collect()));
-    if let Some(over) = &made.over_temperature {
-        table.insert("over_temperature".into(), Value::Array(over.levels.iter().map(of_level).collect()));
-    }
-    table
-}
-
-/// The axes at one temperature, with their standard errors.
-fn of_level(level: &Level) -> Value {
-    let rows = |of: &dyn Fn(&GyroRates) -> [f64; 3]| {
-        Value::Array(level.gyros.iter().map(|found| numbers(&of(found))).collect())
+/// What the document says of the fit beside its coefficients.
+pub fn details(made: &Made) -> Value {
+    let gyros = || {
+        let gyros = made.gyros.iter().zip(&made.written.document.gyro.sensor);
+        gyros.filter_map(|(found, sensor)| Some((sensor.name.as_str(), found.as_ref().ok()?)))
     };
-    let mut table = Table::new();
-    table.insert("temperature_deg_c".into(), tidy(level.deg_c).into());
-    table.insert("axis".into(), rows(&|found| found.axis.unwrap_or_default()));
-    let arcsec = |found: &GyroRates| found.axis_sigma.map(|sigma| Angle::from_rad(sigma).as_arcsec());
-    table.insert("sigma_arcsec".into(), rows(&arcsec));
-    Value::Table(table)
-}
-
-fn of_gyro(name: &str, found: &Result<GyroRates, Kind>, walk: f64) -> Table {
-    let mut table = Table::new();
-    table.insert("name".into(), name.into());
-    match found {
-        Err(reason) => {
-            table.insert("refused".into(), reason.to_string().into());
-        }
-        Ok(found) => {
-            table.insert(
-                "scale_factor_sigma_ppm".into(),
-                tidy(1e6 * found.gain[1] / found.gain[0].abs()).into(),
-            );
-            if let Some([value, sigma]) = found.asymmetry {
-                table.insert("asymmetry_ppm".into(), tidy(1e6 * value).into());
-                table.insert("asymmetry_sigma_ppm".into(), tidy(1e6 * sigma).into());
-            }
-            table.insert("bias_deg_per_h".into(), tidy(found.bias[0]).into());
-            table.insert("bias_sigma_deg_per_h".into(), tidy(found.bias[1]).into());
-            if found.axis.is_some() {
-                let sigmas = found.axis_sigma.map(|sigma| Angle::from_rad(sigma).as_arcsec());
-                table.insert("axis_sigma_arcsec".into(), numbers(&sigmas));
-            }
-            table.insert("nonlinearity_deg_per_h".into(), numbers(&found.left));
-            if found.chi_square.is_finite() {
-                table.insert("chi_square_per_freedom".into(), tidy(found.chi_square).into());
-            }
-            table.insert("angle_random_walk_deg_per_sqrt_h".into(), tidy(walk).into());
-            table.insert("covariance".into(), matrix(&found.covariance));
-        }
+    let left = |found: &GyroRates| found.left.iter().map(|left| tidy(*left)).collect();
+    let mut details = json!({
+        "rate_deg_per_s": made.steps.iter().map(|step| step.matched.step.rate_deg_per_s).collect::<Vec<_>>(),
+        "nonlinearity_deg_per_h": by_name(gyros().map(|(name, found)| (name, left(found)))),
+        "covariance": by_name(gyros().map(|(name, found)| (name, rows(&found.covariance)))),
+    });
+    if let Some(deg_c) = made.temperature_deg_c() {
+        details["temperature_deg_c"] = tidy(deg_c).into();
     }
-    table
+    details
 }

@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
 use crate::numbers::{Size, hull, median};
-use crate::report::{Figure, FitReport, Verdict, of_logs};
+use crate::report::{Figure, Verdict, of_logs};
 use crate::runs::{Run, Watch};
 
 /// Rounds in which the Earth's turning and the fit settle.
@@ -88,9 +88,9 @@ pub struct Made {
 ///
 /// # Errors
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
-pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Result<Made, Error> {
+pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     let mut warnings: Vec<Finding> = one_way(wanted.steps).map(Finding::from).into_iter().collect();
-    let mut runs = read_all(wanted, &mut watch, &mut warnings)?;
+    let mut runs = read_all(wanted, watch, &mut warnings)?;
     let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
     let mut walk = vec![0.0; sensors];
@@ -169,14 +169,14 @@ pub fn make<W: Watch>(wanted: &Wanted<'_>, mut watch: impl FnMut() -> W) -> Resu
         over_temperature,
         warnings,
     };
-    made.settle(wanted, axes_deg_c, &doubted, &mut watch)?;
+    made.settle(wanted, axes_deg_c, &doubted, watch)?;
     Ok(made)
 }
 
 /// Reads the runs and, behind them, the judging ones.
-fn read_all<W: Watch>(
+fn read_all(
     wanted: &Wanted<'_>,
-    watch: &mut impl FnMut() -> W,
+    watch: &mut dyn Watch,
     warnings: &mut Vec<Finding>,
 ) -> Result<Vec<Turned>, Error> {
     let (mut runs, mut reasons) = (Vec::new(), Vec::new());
@@ -217,12 +217,12 @@ fn measured(runs: &[Turned], rates: &[Vec<[f64; 3]>]) -> Vec<Measured> {
 impl Made {
     /// Writes and judges; gyros that make an axis worse keep weight and axis, and all is judged once more. Axes of gyros that
     /// came to nothing are refused.
-    fn settle<W: Watch>(
+    fn settle(
         &mut self,
         wanted: &Wanted<'_>,
         axes_deg_c: Option<f64>,
         doubted: &[(usize, Kind)],
-        watch: &mut impl FnMut() -> W,
+        watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         self.judge(wanted, 0, watch)?;
         self.write(wanted, axes_deg_c, watch)?;
@@ -251,11 +251,11 @@ impl Made {
     }
 
     /// Writes what is left of the fits, and judges it.
-    fn write<W: Watch>(
+    fn write(
         &mut self,
         wanted: &Wanted<'_>,
         axes_deg_c: Option<f64>,
-        watch: &mut impl FnMut() -> W,
+        watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         // What was fitted at the reference needs no slopes to come there.
         let axes_deg_c = axes_deg_c.filter(|_| self.over_temperature.is_none());
@@ -268,12 +268,7 @@ impl Made {
     }
 
     /// Errors of all steps with the document as it stands: before (0), after (1).
-    fn judge<W: Watch>(
-        &mut self,
-        wanted: &Wanted<'_>,
-        sample: usize,
-        watch: &mut impl FnMut() -> W,
-    ) -> Result<(), Error> {
+    fn judge(&mut self, wanted: &Wanted<'_>, sample: usize, watch: &mut dyn Watch) -> Result<(), Error> {
         for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
             let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
             errors((number, run), &self.written, steps, sample, &mut *watch)?;
@@ -291,11 +286,6 @@ impl Made {
         let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
         hull(ends).map(widened)
     }
-
-    /// The report.
-    pub fn report(&self) -> FitReport {
-        super::report::report(self)
-    }
 }
 
 fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
@@ -303,19 +293,19 @@ fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
 }
 
 /// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.
-fn errors<W: Watch>(
+fn errors(
     (number, run): (usize, &Run),
     written: &Written,
     steps: &mut [Measured],
     sample: usize,
-    watch: &mut impl FnMut() -> W,
+    watch: &mut dyn Watch,
 ) -> Result<(), Error> {
     let windows: Vec<[f64; 2]> = steps
         .iter()
         .filter(|step| step.matched.step.run == number)
         .map(|step| step.matched.plateau.window_s)
         .collect();
-    let means = means_within(run, &written.loaded, &windows, watch())?;
+    let means = means_within(run, &written.loaded, &windows, &mut *watch)?;
     let own = steps.iter_mut().filter(|step| step.matched.step.run == number);
     for (step, mean) in own.zip(means) {
         step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);

@@ -28,11 +28,11 @@ pub(super) struct Turned {
 }
 
 /// Reads one run and finds its steps; the inner error is a reason to refuse.
-pub(super) fn read<W: Watch>(
+pub(super) fn read(
     wanted: &Wanted<'_>,
     number: usize,
     run: &Run,
-    watch: &mut impl FnMut() -> W,
+    watch: &mut dyn Watch,
 ) -> Result<Result<Turned, Finding>, Error> {
     let binned = binned(run, wanted.base, &mut *watch)?;
     let counts: Vec<f64> =

@@ -10,7 +10,7 @@ use super::over_temperature::OverTemperature;
 use crate::axes::{AXES, main_axis};
 use crate::finding::Kind;
 use crate::numbers::dot;
-use crate::report::{Coefficient, FitReport, counted, fixed, gyros, per_deg_c, short, together};
+use crate::report::{Report, counted, fixed, gyros, per_deg_c, short, together};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
@@ -19,66 +19,69 @@ const SEEN: f64 = 4.0;
 /// Share by which a weight changes at most without a word: what micromechanical gyros differ by from their data sheet.
 const OTHER_WEIGHT: f64 = 0.1;
 
-/// The report.
-pub(super) fn report(made: &Made) -> FitReport {
-    let document = &made.written.document;
-    let mut report =
-        FitReport::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
-            .counting("steps");
-    report.verdicts.clone_from(&made.verdicts);
-    report.warnings.extend(made.warnings.iter().map(ToString::to_string));
-    let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
-    let temperature = made
-        .temperature_deg_c()
-        .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
-    report.notes.push(format!(
-        "{} of the table and {}{temperature}.",
-        counted(turning, "step", "steps"),
-        counted(made.steps.len() - turning, "rest", "rests")
-    ));
-    report.notes.push(
+impl Made {
+    /// The report.
+    pub fn report(&self) -> Report {
+        let made = self;
+        let document = &made.written.document;
+        let mut report =
+            Report::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
+                .counting("steps");
+        report.verdicts.clone_from(&made.verdicts);
+        report.warnings.extend(made.warnings.iter().map(ToString::to_string));
+        let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
+        let temperature = made
+            .temperature_deg_c()
+            .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
+        report.notes.push(format!(
+            "{} of the table and {}{temperature}.",
+            counted(turning, "step", "steps"),
+            counted(made.steps.len() - turning, "rest", "rests")
+        ));
+        report.notes.push(
         "Before and after are the errors of the corrected rate over the steps, less Earth's rate and mean error \
          (bias). The increment weight is the mean for positive and negative input; asymmetry and nonlinearity are \
          in origin.details."
             .to_owned(),
     );
-    let mut told: Vec<(&str, String)> = Vec::new();
-    for (index, sensor) in document.gyro.sensor.iter().enumerate() {
-        match made.gyros.get(index) {
-            Some(Ok(found)) => {
-                if found.axis.is_none() {
-                    let stays = "the steps turn about fewer than three directions: the input axis is kept from the \
+        let mut told: Vec<(&str, String)> = Vec::new();
+        for (index, sensor) in document.gyro.sensor.iter().enumerate() {
+            match made.gyros.get(index) {
+                Some(Ok(found)) => {
+                    if found.axis.is_none() {
+                        let stays = "the steps turn about fewer than three directions: the input axis is kept from the \
                                  document";
-                    told.push((&sensor.name, stays.to_owned()));
+                        told.push((&sensor.name, stays.to_owned()));
+                    }
+                    let weight = sensor
+                        .increment_weight_arcsec_per_count
+                        .map(|weight| (weight, "″/count"))
+                        .or(sensor.increment_weight_rad_per_rad.map(|weight| (weight, "rad/rad")));
+                    coefficients(&sensor.name, found, weight, &mut report);
+                    linearity(made, index, &sensor.name, found, &mut report);
                 }
-                let weight = sensor
-                    .increment_weight_arcsec_per_count
-                    .map(|weight| (weight, "″/count"))
-                    .or(sensor.increment_weight_rad_per_rad.map(|weight| (weight, "rad/rad")));
-                coefficients(&sensor.name, found, weight, &mut report);
-                linearity(made, index, &sensor.name, found, &mut report);
+                Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis are kept"))),
+                None => {}
             }
-            Some(Err(reason)) => told.push((&sensor.name, format!("{reason}; weight and axis are kept"))),
-            None => {}
         }
+        report.warnings.extend(together(&told));
+        report.warnings.extend(widened(made));
+        report.warnings.extend(other_weights(made));
+        if let Some(over) = &made.over_temperature {
+            over_temperature(made, over, &mut report);
+        }
+        if !made.judged.is_empty() {
+            let steps = counted(made.judged.len(), "step", "steps");
+            report.notes.push(format!("Out of sample: {steps} of the judging logs."));
+            report.tables.push(("Errors of the judging steps".to_owned(), judged(made)));
+        }
+        report.charts.push(("Linearity".to_owned(), chart(made)));
+        report
     }
-    report.warnings.extend(together(&told));
-    report.warnings.extend(widened(made));
-    report.warnings.extend(other_weights(made));
-    if let Some(over) = &made.over_temperature {
-        over_temperature(made, over, &mut report);
-    }
-    if !made.judged.is_empty() {
-        let steps = counted(made.judged.len(), "step", "steps");
-        report.notes.push(format!("Out of sample: {steps} of the judging logs."));
-        report.tables.push(("Errors of the judging steps".to_owned(), judged(made)));
-    }
-    report.charts.push(("Linearity".to_owned(), chart(made)));
-    report
 }
 
 /// Slopes of axes and scale factors, with the figure beside the accelerometers.
-fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport) {
+fn over_temperature(made: &Made, over: &OverTemperature, report: &mut Report) {
     let document = &made.written.document;
     report.notes.push(format!(
         "Axes and scale factors at {} temperatures; weights, axes and linearity are those at {} °C.",
@@ -87,12 +90,7 @@ fn over_temperature(made: &Made, over: &OverTemperature, report: &mut FitReport)
     ));
     for (sensor, line) in document.gyro.sensor.iter().zip(&over.lines) {
         let mut add = |what: String, unit: String, value: f64, sigma: f64| {
-            report.coefficients.push(Coefficient::new(
-                format!("gyro {} {what}", sensor.name),
-                unit,
-                value,
-                Some(sigma),
-            ));
+            report.coefficient(format!("gyro {} {what}", sensor.name), unit, value, sigma);
         };
         for (power, (value, sigma)) in line.scale_ppm.iter().zip(&line.scale_sigma_ppm).enumerate() {
             add(
@@ -139,11 +137,11 @@ fn judged(made: &Made) -> Table {
     Table::of(head, made.judged.iter().map(row))
 }
 
-fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut FitReport) {
+fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, report: &mut Report) {
     let [gain, sigma] = found.gain;
     let relative = sigma / gain.abs();
     let mut add = |what: &str, unit: &str, value: f64, sigma: f64| {
-        report.coefficients.push(Coefficient::new(format!("gyro {name} {what}"), unit, value, Some(sigma)));
+        report.coefficient(format!("gyro {name} {what}"), unit, value, sigma);
     };
     if let Some((weight, unit)) = weight {
         add("increment weight", unit, weight, relative * weight.abs());
@@ -206,7 +204,7 @@ fn widened(made: &Made) -> Option<String> {
     })
 }
 
-fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut FitReport) {
+fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut Report) {
     let axis =
         found.axis.or(made.written.document.gyro.orientation.rows.get(index).copied()).unwrap_or_default();
     let input = |step: usize| -> f64 { made.steps.get(step).map_or(0.0, |step| dot(step.rate, axis)) };

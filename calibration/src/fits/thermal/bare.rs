@@ -1,14 +1,11 @@
 //! A unit without the terms that a thermal fit gives it, and a nominal document for a log that comes without one.
 
-use isotherm_correction::sample::OutputKind;
 use isotherm_correction::thermal::Feature;
-use isotherm_protocol::document::{
-    AccelOutput, Channel, Document, Filter, GyroOutput, Orientation, Temperature,
-};
+use isotherm_protocol::document::{AccelOutput, Document, Filter, GyroOutput, Orientation, Temperature};
 
 use super::checks::median_step_s;
 use crate::axes::AXES;
-use crate::document::{follows, plain};
+use crate::document::{channels, faults, follows, plain};
 use crate::error::Error;
 use crate::numbers::percentile;
 use crate::runs::{self, series::Series};
@@ -64,44 +61,11 @@ pub fn along_axes(document: &Document, pattern: usize) -> Document {
 /// [`Error::Refused`] where the log does not allow it: counts, other than three sensors, thermometers that are not in °C or whose
 /// sensors cannot be told.
 pub fn nominal_of(series: &Series) -> Result<Document, Error> {
-    let mut reasons = Vec::new();
-    for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
-        if ticks.output == Some(OutputKind::Counts) {
-            reasons.push(format!(
-                "the {kind} readings are counts: give a document with their scale (--calibration)"
-            ));
-        }
-        if !ticks.is_empty() && ticks.readings.len() != 3 {
-            let count = ticks.readings.len();
-            reasons.push(format!(
-                "the log has {count} {kind}s: without a document (--calibration) only three have known axes"
-            ));
-        }
-    }
-    if series.gyros.is_empty() {
-        reasons
-            .push("the log has no gyro ticks: the correction runs at their pace and needs them".to_owned());
-    }
-    for (name, channel) in &series.temperatures {
-        let away = channel.raw.iter().filter(|raw| raw.is_finite() && !(DEG_C[0]..=DEG_C[1]).contains(*raw));
-        if 2 * away.count() > channel.raw.len() {
-            reasons.push(format!(
-                "temperature channel {name:?} has readings outside {} to {} °C: it is not a temperature in °C: name \
-                 the right column in the mapping, or give a document with the channel's conversion (--calibration)",
-                DEG_C[0], DEG_C[1]
-            ));
-        }
-    }
+    let reasons = faults(series, false, DEG_C);
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
-    let channel = |(name, readings): (&String, &runs::series::Channel)| Channel {
-        name: name.clone(),
-        conversion_deg_c: vec![0.0, 1.0],
-        range_deg_c: DEG_C,
-        spike_limit_deg_c: spike_limit(&readings.raw),
-    };
-    let mut channels: Vec<Channel> = series.temperatures.iter().map(channel).collect();
+    let mut channels = channels(series, DEG_C, spike_limit);
     let of = |kind: &str| -> Option<Vec<String>> {
         (0..AXES.len()).map(|index| follows(&channels, kind, index)).collect()
     };

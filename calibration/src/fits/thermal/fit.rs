@@ -1,6 +1,6 @@
 //! From runs to a document and its report.
 
-use isotherm_protocol::document::{Document, Origin};
+use isotherm_protocol::document::Document;
 
 use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
@@ -16,23 +16,12 @@ use super::sequential;
 use super::settings::{Method, Settings};
 use super::stand::Stand;
 use super::target::{rest, target};
-use crate::document::{Written, accelerometers};
+use crate::document::{Fitted, accelerometers};
 use crate::error::Error;
-use crate::report::{FitReport, Rest, six};
+use crate::report::{Rest, six};
 use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
 use crate::runs::{Run, Watch};
-
-/// A document and what is to be said of it.
-#[derive(Debug)]
-pub struct Fitted {
-    /// The document.
-    pub written: Written,
-    /// The report.
-    pub report: FitReport,
-    /// Whether any sensor has new terms; without one the document says nothing new.
-    pub any_accepted: bool,
-}
 
 /// One sensor on its way.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +49,6 @@ pub fn fit(
     base: Option<&Document>,
     (runs, judges): (&[Run], &[Run]),
     settings: &Settings,
-    origin: Origin,
     mut watch: impl Watch,
 ) -> Result<Fitted, Error> {
     let mut warnings = Vec::new();
@@ -151,7 +139,7 @@ pub fn fit(
         sensors_of(&mut outcome, columns, &all, (known, longest_s), &samples)?;
         outcome.history(name, &known.history);
     }
-    outcome.finish((runs, judges), origin, |run, stand| rest(run, &base, stand, ()), watch)
+    outcome.finish((runs, judges), |run, stand| rest(run, &base, stand, ()), watch)
 }
 
 /// Whether a run feels what it must in its stated attitude, and what it would put out without error where it does.

@@ -1,19 +1,19 @@
 //! What a thermal fit came to: the document, its verdicts, its report.
 
 use isotherm_correction::thermal::Feature;
-use isotherm_protocol::document::{Document, Filter, Origin, Sample};
+use isotherm_protocol::document::{Document, Filter, Sample};
 
 use super::branches::History;
 use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
 use super::compare;
-use super::fit::{Fitted, Sensor};
+use super::fit::Sensor;
 use super::joint::Found;
 use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
 use crate::axes::output_name;
-use crate::document::{Written, accelerometers};
+use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::Size;
 use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
@@ -83,7 +83,6 @@ impl Outcome {
     pub(super) fn finish(
         mut self,
         (runs, judges): (&[Run], &[Run]),
-        origin: Origin,
         rest: impl Fn(&Run, &Stand) -> Result<Rest, Error>,
         mut watch: impl Watch,
     ) -> Result<Fitted, Error> {
@@ -136,8 +135,6 @@ impl Outcome {
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
         }
-        let mut document = document;
-        document.origin = Some(self.origin(origin, &verdicts));
         let written = Written::of(&document)?;
         for words in troubles {
             if !self.warnings.contains(&words) {
@@ -146,9 +143,10 @@ impl Outcome {
         }
         let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
         self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
+        let about = self.about();
         let mut report = self.report(verdicts, curves);
         report.tables.push((compare::HEADING.to_owned(), table));
-        Ok(Fitted { written, report, any_accepted })
+        Ok(Fitted { written, report, about })
     }
 
     /// The document without the fitted terms, with the filter of the fit.
@@ -179,7 +177,6 @@ impl Outcome {
                 }
             }
         }
-        document.created = self.settings.created.or(self.base.created);
         if self.settings.removes_mean() {
             let level = "The attitude of the unit was not stated: every fitted bias is zero in the middle of its \
                          range, and the level of each output does not change.";

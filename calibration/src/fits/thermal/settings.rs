@@ -1,9 +1,9 @@
 //! What may be asked of a thermal fit.
 
-use clap::ValueEnum;
-use isotherm_protocol::document::Created;
+use clap::{Args, ValueEnum};
 
 use super::stand::{Site, Stand};
+use crate::limits::within;
 
 /// Method of the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -43,22 +43,26 @@ pub enum Terms {
 }
 
 /// All of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Args)]
 pub struct Settings {
-    /// Method of the fit.
+    /// Method of the fit
+    #[arg(long, value_enum, default_value_t = Method::Joint)]
     pub method: Method,
-    /// Who chooses the terms.
+    /// Choice of terms: cross-validation, or the largest model
+    #[arg(long, value_enum, default_value_t = Terms::Auto)]
     pub terms: Terms,
     /// How the unit stands: none where nothing is known, one for all runs, or one for each run of the fit and then for each that judges.
+    #[arg(skip)]
     pub stands: Vec<Stand>,
-    /// Length of the windows of the fit (s).
+    /// Length of the windows of the fit (s)
+    #[arg(long = "fit-window", hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(1.0, 600.0))]
     pub fit_window_s: f64,
-    /// Length of the windows over which residuals are stated (s); `None` for those of the fit, in runs of hours up to ten of them together.
+    /// Windows of the stated residuals (s) (default: those of the fit, up to ten of them in runs of hours)
+    #[arg(long = "window", hide_short_help = true, value_name = "SECONDS", value_parser = within(1.0, 3600.0))]
     pub window_s: Option<f64>,
-    /// Smoothing of the temperature (s); `None` to search it.
+    /// Smoothing of the temperature (s) (default: by cross-validation)
+    #[arg(long = "smoothing", hide_short_help = true, value_name = "SECONDS", value_parser = within(0.0, 3600.0))]
     pub smoothing_s: Option<f64>,
-    /// Date that the document states; `None` for the base document's.
-    pub created: Option<Created>,
 }
 
 impl Default for Settings {
@@ -70,7 +74,6 @@ impl Default for Settings {
             fit_window_s: 10.0,
             window_s: None,
             smoothing_s: None,
-            created: None,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What is said of a thermal fit: the origin in the document, and the report.
 
 use isotherm_pages::Table;
-use isotherm_protocol::document::{Document, Origin};
+use isotherm_protocol::document::Document;
+use serde_json::json;
 
 use super::columns::Basis;
 use super::fit::Sensor;
@@ -10,7 +11,8 @@ use super::model::described;
 use super::outcome::Outcome;
 use super::scale::Kept;
 use super::select::{Target, Tried};
-use crate::report::{Coefficient, Curve, FitReport, Verdict, output_unit, residuals, short};
+use crate::document::{About, by_name};
+use crate::report::{Curve, Report, Sigmas, Verdict, output_unit, short};
 
 impl Outcome {
     /// Says which sensors keep their scale factors, and why.
@@ -39,53 +41,39 @@ impl Outcome {
         }
     }
 
-    pub(super) fn origin(&self, origin: Origin, verdicts: &[Verdict]) -> Origin {
-        let mut details = toml::Table::new();
-        let mut figures = toml::Table::new();
-        for (sensor, _, found) in &self.found {
-            let mut of_sensor = toml::Table::new();
-            of_sensor.insert("model".into(), found.words.clone().into());
+    /// What the document says of the fit beside its coefficients.
+    pub(super) fn about(&self) -> About {
+        let sensors = self.found.iter().map(|(sensor, _, found)| {
+            let mut of = json!({ "model": found.words });
             if let Some(why) = &found.refused {
-                of_sensor.insert("refused".into(), why.clone().into());
+                of["refused"] = json!(why);
             }
-            let sigmas = found.terms.iter().map(|(term, value, sigma)| {
-                let (name, unit) = described(*term, output(&self.base, sensor));
-                let mut row = toml::Table::new();
-                row.insert("of".into(), name.into());
-                row.insert("unit".into(), unit.into());
-                row.insert("value".into(), (*value).into());
-                row.insert("sigma".into(), (*sigma).into());
-                toml::Value::Table(row)
-            });
-            of_sensor.insert("coefficient".into(), toml::Value::Array(sigmas.collect()));
             if let Some((choice, best)) =
                 found.choice.as_ref().and_then(|choice| Some((choice, choice.best()?)))
             {
-                let mut validation = toml::Table::new();
-                validation.insert("left_of_mean".into(), choice.mean.into());
-                validation.insert("left".into(), best.score.into());
-                of_sensor.insert("cross_validation".into(), validation.into());
+                of["cross_validation"] = json!({ "left_of_mean": choice.mean, "left": best.score });
             }
-            figures.insert(sensor.name.clone(), of_sensor.into());
-        }
-        details.insert("sensors".into(), figures.into());
-        details.insert("fit_window_s".into(), self.settings.fit_window_s.into());
-        details.insert("smoothing_s".into(), self.filter.smoothing_s.into());
-        details.insert("derivative_step_s".into(), self.filter.derivative_step_s.into());
-        details.insert("mean_removed".into(), self.settings.removes_mean().into());
-        Origin {
-            method: Some(self.settings.method.name().to_owned()),
+            (sensor.name.as_str(), of)
+        });
+        About {
+            method: self.settings.method.name(),
+            key: "thermal",
+            details: json!({
+                "sensors": by_name(sensors),
+                "fit_window_s": self.settings.fit_window_s,
+                "smoothing_s": self.filter.smoothing_s,
+                "derivative_step_s": self.filter.derivative_step_s,
+                "mean_removed": self.settings.removes_mean(),
+            }),
+            sigmas: Sigmas::default(),
             range_deg_c: Some(self.range_deg_c.map(|t| libm::round(10.0 * t) / 10.0)),
             rate_range_deg_c_per_s: Some(self.rate_range_deg_c_per_s.map(|r| libm::round(1e5 * r) / 1e5)),
-            residual: residuals(verdicts),
-            details: Some(details),
-            ..origin
         }
     }
 
-    pub(super) fn report(self, verdicts: Vec<Verdict>, curves: Vec<Curve>) -> FitReport {
+    pub(super) fn report(self, verdicts: Vec<Verdict>, curves: Vec<Curve>) -> Report {
         let title = format!("Thermal calibration, method {}", self.settings.method.name());
-        let mut report = FitReport::new(title, self.base.unit.clone());
+        let mut report = Report::new(title, self.base.unit.clone());
         report.verdicts = verdicts;
         report.warnings = self.warnings;
         report.notes = self.notes;
@@ -108,7 +96,7 @@ impl Outcome {
             for (term, value, sigma) in &found.terms {
                 let (name, unit) = described(*term, output(&self.base, sensor));
                 let name = format!("{} {name}", sensor.name);
-                report.coefficients.push(Coefficient::new(name, unit, *value, Some(*sigma)));
+                report.coefficient(name, unit, *value, *sigma);
             }
         }
         report.validation = validation(&self.found);

@@ -3,23 +3,21 @@
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use isotherm_protocol::document::{Document, Sample};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::sync::Arc;
 
 use super::acceleration::GyroDrift;
 use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
 use crate::axes::AXES;
-use crate::document::{accelerometers, tidy};
-use crate::error::Error;
+use crate::document::{accelerometers, rows, tidy};
 use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
 use crate::numbers::{Size, norm, unit};
 use crate::report::{
-    Coefficient, Curve, Figure, FitReport, SAME_SHARE, Sigmas, Verdict, counted, fixed, output_unit, short,
-    six,
+    Curve, Figure, Report, SAME_SHARE, Sigmas, Verdict, counted, fixed, output_unit, short, six,
 };
 
 /// Times by which the rms may grow in poses that the fit has not seen.
@@ -63,9 +61,9 @@ pub fn report(
     settings: &Settings,
     run: &str,
     [before, after]: [&Left; 2],
-) -> FitReport {
-    let mut report = FitReport::new("Accelerometers and gyros from a tumbled unit", &document.unit)
-        .counting("poses, turns");
+) -> Report {
+    let mut report =
+        Report::new("Accelerometers and gyros from a tumbled unit", &document.unit).counting("poses, turns");
     let accel = of_accelerometers(tumble, [&before.length, &after.length], settings.gravity);
     let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
     let gyro = gyro.stated_as(Figure::Rms);
@@ -86,7 +84,7 @@ pub fn report(
         six(settings.gravity)
     ));
     report.notes.extend(at_rest(tumble));
-    report.coefficients = coefficients(document, tumble);
+    coefficients(document, tumble, &mut report);
     let time_s: Arc<[f64]> = tumble.poses.iter().map(Pose::middle_s).collect();
     report.residuals.push(Curve {
         of: "|f|−g".to_owned(),
@@ -100,7 +98,7 @@ pub fn report(
         after: after.length.clone(),
     });
     report.charts.push(("What is left".to_owned(), left_chart(tumble, after)));
-    report.tables.push(("Poses".to_owned(), rows(tumble, after)));
+    report.tables.push(("Poses".to_owned(), pose_rows(tumble, after)));
     report
 }
 
@@ -146,7 +144,7 @@ fn left_chart(tumble: &Tumble, after: &Left) -> Chart {
     )
 }
 
-fn rows(tumble: &Tumble, after: &Left) -> Table {
+fn pose_rows(tumble: &Tumble, after: &Left) -> Table {
     let poses = tumble.poses.iter().zip(&after.direction).zip(&after.length).enumerate();
     let row = |(index, ((pose, direction), length)): (usize, ((&Pose, &[f64; 3]), &f64))| {
         let mut row = vec![(index + 1).to_string()];
@@ -190,82 +188,61 @@ fn at_rest(tumble: &Tumble) -> Option<String> {
     Some(format!("Gyros at rest, in unseen poses: {}.", gyros.join("; ")))
 }
 
-fn coefficients(document: &Document, tumble: &Tumble) -> Vec<Coefficient> {
+fn coefficients(document: &Document, tumble: &Tumble, report: &mut Report) {
     let accel = &tumble.accel;
     let output = match output_unit(document) {
         "V" => "V or raw",
         other => other,
     };
-    let mut all = Vec::new();
     for (axis, name) in AXES.iter().enumerate() {
         let of = |what: &str| format!("accelerometer {name} {what}");
         let per_output = 1.0 / accel.scale[axis];
-        let sigma = accel.sigma[axis];
-        all.push(Coefficient::new(
-            of("1/K"),
-            format!("m/s² per {output}"),
-            per_output,
-            Some(per_output.abs() * sigma),
-        ));
-        all.push(Coefficient::new(of("S"), output, accel.bias[axis], Some(accel.sigma[3 + axis])));
+        let unit = format!("m/s² per {output}");
+        report.coefficient(of("1/K"), unit, per_output, per_output.abs() * accel.sigma[axis]);
+        report.coefficient(of("S"), output, accel.bias[axis], accel.sigma[3 + axis]);
     }
+    let mut arcsec = |name: String, value: f64, sigma: f64| {
+        report.coefficient(name, "″", value * ARCSEC_PER_RAD, sigma * ARCSEC_PER_RAD);
+    };
     for (index, (row, column)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
-        let value = accel.rows[row][column] * ARCSEC_PER_RAD;
         let name = format!("accelerometer {} along {}", AXES[row], AXES[column]);
-        all.push(Coefficient::new(name, "″", value, Some(accel.sigma[6 + index] * ARCSEC_PER_RAD)));
+        arcsec(name, accel.rows[row][column], accel.sigma[6 + index]);
     }
-    let Ok(gyro) = &tumble.gyro else { return all };
+    let Ok(gyro) = &tumble.gyro else { return };
     for (axis, name) in AXES.iter().enumerate() {
-        all.push(Coefficient::new(
-            format!("gyro {name} K"),
-            "rad/s per rad/s of the log",
-            gyro.weight[axis],
-            Some(gyro.sigma[axis]),
-        ));
-        all.push(Coefficient::new(
-            format!("gyro {name} at rest"),
-            "°/s",
-            (gyro.weight[axis] * rest(tumble, gyro, axis)).to_degrees(),
-            None,
-        ));
-        let drift = tumble.acceleration[axis].as_ref().ok();
-        for (along, name_of_axis) in drift.into_iter().flat_map(|_| AXES.iter().enumerate()) {
-            let [value, sigma] = deg_per_h_per_g(tumble, axis, along).unwrap_or_default();
-            let name = format!("gyro {name} by force along {name_of_axis}");
-            all.push(Coefficient::new(name, "(°/h)/g", value, Some(sigma)));
-        }
         for (which, column) in gyro.across(axis).into_iter().enumerate() {
-            all.push(Coefficient::new(
-                format!("gyro {name} along {}", AXES[column]),
-                "″",
-                gyro.rows[axis][column] * ARCSEC_PER_RAD,
-                Some(gyro.sigma[3 + 2 * axis + which] * ARCSEC_PER_RAD),
-            ));
+            let name = format!("gyro {name} along {}", AXES[column]);
+            arcsec(name, gyro.rows[axis][column], gyro.sigma[3 + 2 * axis + which]);
         }
     }
-    all
+    for (axis, name) in AXES.iter().enumerate() {
+        let of_log = "rad/s per rad/s of the log";
+        report.coefficient(format!("gyro {name} K"), of_log, gyro.weight[axis], gyro.sigma[axis]);
+        let rest = (gyro.weight[axis] * rest(tumble, gyro, axis)).to_degrees();
+        report.coefficient(format!("gyro {name} at rest"), "°/s", rest, None);
+        for (along, name_of_axis) in AXES.iter().enumerate() {
+            if let Some([value, sigma]) = deg_per_h_per_g(tumble, axis, along) {
+                report.coefficient(
+                    format!("gyro {name} by force along {name_of_axis}"),
+                    "(°/h)/g",
+                    value,
+                    sigma,
+                );
+            }
+        }
+    }
 }
 
 /// What the document says of the fit beside its coefficients.
-///
-/// # Errors
-/// [`Error::Document`] where it cannot be written, which would be a mistake here.
-pub fn details(tumble: &Tumble, settings: &Settings, report: &FitReport) -> Result<toml::Table, Error> {
-    let covariance: Vec<Vec<f64>> =
-        tumble.accel.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
-    let about = json!({
+pub fn details(tumble: &Tumble, settings: &Settings) -> Value {
+    json!({
         "gravity_m_per_s2": settings.gravity,
         "poses": tumble.poses.len(),
         "stillness_factor": tumble.factor,
         "window_s": settings.limits.window_s,
         "held_out_rms_m_per_s2": Size::of(&tumble.held_out).rms,
-        "verdict": report.headline(),
-        "warnings": report.warnings,
-        "coefficients": report.coefficients_by_name(),
-        // Scale factors (relative), biases over K·g, angles xy, xz, yz (rad).
-        "accelerometer_covariance": covariance,
-    });
-    toml::Table::try_from(about).map_err(|error| Error::document(&error))
+        "accelerometer_covariance": rows(&tumble.accel.covariance),
+    })
 }
 
 /// Standard errors of scale factors, biases and axes, for what compares documents.

@@ -15,7 +15,7 @@ use isotherm_correction::sample::{ChannelName, GyroTick, OutputKind, Temperature
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Document, Origin};
+use isotherm_protocol::document::Document;
 use isotherm_simulator::chamber::{Chamber, Profile};
 
 const LAYERS: usize = 24;
@@ -197,7 +197,7 @@ fn gains(coil: u64, case: Case, method: Method) -> [[f64; 3]; 3] {
     let train = logged(&coil, case, &fitted, seed, WALK);
     let judge = logged(&coil, case, &judging, seed + 1, 0.0);
     let settings = Settings { method, ..Settings::default() };
-    let made = match fit(None, (&[train], &[]), &settings, Origin::default(), ()) {
+    let made = match fit(None, (&[train], &[]), &settings, ()) {
         Ok(made) => made,
         Err(error) => {
             println!("{}: {error}", case.name);

@@ -9,7 +9,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Curve, Origin, Shape, StatedTerm};
+use isotherm_protocol::document::{Curve, Shape, StatedTerm};
 
 use crate::drift_generator::Normal;
 
@@ -89,7 +89,7 @@ fn thermometer_at(kept: impl Fn(u32) -> bool) -> Run {
 }
 
 fn tried(run: Run, method: Method) -> Result<Fitted, Error> {
-    fit(None, (&[run], &[]), &Settings { method, ..Settings::default() }, Origin::default(), ())
+    fit(None, (&[run], &[]), &Settings { method, ..Settings::default() }, ())
 }
 
 #[track_caller]
@@ -185,9 +185,12 @@ fn terms_that_are_kept_under_another_filter_are_told() {
     let old_s = base.temperature.filter.as_ref().unwrap().smoothing_s;
     let told = |smoothing_s: f64| {
         let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
-        let made = fit(Some(&base), (&[zero()], &[]), &settings, Origin::default(), ()).unwrap();
+        let made = fit(Some(&base), (&[zero()], &[]), &settings, ()).unwrap();
         let [new, old] = [&made.written.document, &base].map(|document| &document.gyro.sensor[1].terms);
-        assert!(made.any_accepted && new.of(Feature::Lag).eq(old.of(Feature::Lag)));
+        assert!(
+            made.report.verdicts.iter().any(|verdict| verdict.accepted)
+                && new.of(Feature::Lag).eq(old.of(Feature::Lag))
+        );
         made.report.warnings.iter().any(|words| words.starts_with("gyro y: refused, and keeps rate terms"))
     };
     assert!(told(old_s + 30.0) && !told(old_s));
@@ -266,7 +269,7 @@ fn one_direction_and_too_few_plateaus_are_told() {
             .all(|gyro| !gyro.terms.has(Feature::Lag) && !gyro.terms.has(Feature::ThermalRate))
     );
     let made = tried(upwards(), Method::Sequential).unwrap();
-    assert!(!made.any_accepted);
+    assert!(!made.report.verdicts.iter().any(|verdict| verdict.accepted));
     assert!(
         made.report.verdicts.iter().all(|verdict| !verdict.accepted && verdict.reason.contains("both ways"))
     );
@@ -300,7 +303,7 @@ fn a_first_reading_that_is_late_is_no_temperature_of_its_own() {
     let made = tried(run_of(upwards), Method::Joint).unwrap();
     let told = made.report.warnings.iter().any(|words| words.contains("one way only"));
     assert!(told, "{:?}", made.report.warnings);
-    let [low, high] = made.written.document.origin.unwrap().range_deg_c.unwrap();
+    let [low, high] = made.about.range_deg_c.unwrap();
     assert!((11.0..12.5).contains(&low) && (39.0..=40.5).contains(&high), "{low} {high}");
 }
 
@@ -370,7 +373,7 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
 fn all_terms_are_the_largest_model() {
     let fitted = |terms: Terms| {
         let settings = Settings { terms, ..Settings::default() };
-        fit(None, (&[run(0..5400, usual)], &[]), &settings, Origin::default(), ()).unwrap()
+        fit(None, (&[run(0..5400, usual)], &[]), &settings, ()).unwrap()
     };
     let made = fitted(Terms::All);
     let count = |of: &str| made.report.coefficients.iter().filter(|c| c.name.starts_with(of)).count();

@@ -11,7 +11,6 @@ use isotherm_correction::units::Span;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};
-use isotherm_protocol::document::Origin;
 
 /// End of the heating (s since the log's first row).
 const TURN_S: f64 = 3130.0;
@@ -39,7 +38,7 @@ fn part(path: &std::path::Path, from_s: f64, to_s: Option<f64>) -> Run {
 fn fitted(path: &std::path::Path, method: Method) -> Fitted {
     let (train, judge) = (part(path, 0.0, Some(TURN_S)), part(path, TURN_S, None));
     let settings = Settings { method, ..Settings::default() };
-    fit(None, (&[train], &[judge]), &settings, Origin::default(), ()).unwrap()
+    fit(None, (&[train], &[judge]), &settings, ()).unwrap()
 }
 
 /// Rms out of sample about the level of the training part, as the data's README states it, by axis: gyros (°/s), then
@@ -106,7 +105,7 @@ fn without_a_judging_run_no_axis_of_the_real_log_gets_worse_needs_data() {
     for method in [Method::Sequential, Method::Joint] {
         let settings = Settings { method, ..Settings::default() };
         let train = part(&path, 0.0, Some(TURN_S));
-        let made = fit(None, (&[train], &[]), &settings, Origin::default(), ()).unwrap();
+        let made = fit(None, (&[train], &[]), &settings, ()).unwrap();
         println!("{method:?}: {}", made.report.headline());
         let out = out_of_sample(&path, &made.written);
         for axis in 1..6 {

@@ -1,14 +1,14 @@
 //! Scale factors over temperature: from gravity in two attitudes, and from a rate table.
 
 use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, Stand, Turning, fit};
-use isotherm_calibration::report::FitReport;
+use isotherm_calibration::report::{Report, residuals};
 use isotherm_calibration::runs::Run;
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{AccelOutput, Curve, Document, Origin, Sample, Shape};
+use isotherm_protocol::document::{AccelOutput, Curve, Document, Sample, Shape};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path;
@@ -76,7 +76,7 @@ fn base() -> Document {
 
 fn fitted(runs: &[Run], stands: Vec<Stand>, method: Method) -> Fitted {
     let settings = Settings { method, stands, window_s: Some(10.0), ..Settings::default() };
-    fit(Some(&base()), (runs, &[]), &settings, Origin::default(), ()).unwrap()
+    fit(Some(&base()), (runs, &[]), &settings, ()).unwrap()
 }
 
 /// The true scale factor error of a sensor (ppm) as a polynomial about another point.
@@ -232,7 +232,7 @@ fn a_table_that_turns_otherwise_is_refused() {
     let refused = |rate: f64, runs: &[Run]| {
         let stands = vec![stand([0.0, 0.0], rate)];
         let settings = Settings { stands, ..Settings::default() };
-        fit(Some(&base()), (runs, &[]), &settings, Origin::default(), ()).unwrap_err().to_string()
+        fit(Some(&base()), (runs, &[]), &settings, ()).unwrap_err().to_string()
     };
     let words = refused(-20.0, std::slice::from_ref(&turned));
     assert!(words.contains("11.5") && words.contains("-11.5") && words.contains("--rate"), "{words}");
@@ -280,7 +280,7 @@ fn the_residual_of_runs_in_two_attitudes_is_that_of_the_service() {
         }
         for (axis, left) in left.iter().enumerate() {
             let rms = rms(left);
-            let stated = stated(&made.report, &made.written.document, axis);
+            let stated = stated(&made.report, axis);
             assert!((stated / rms - 1.0).abs() < 1e-9, "{method:?} {axis}: {stated} {rms}");
         }
     }
@@ -292,7 +292,7 @@ fn a_known_scale_factor_does_not_get_into_the_bias_where_the_attitude_is_not_kno
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let known = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     let runs = [run("level", &scenario(4, [0.0, 0.0], 0.0))];
-    let made = fit(Some(&known), (&runs, &[]), &Settings::default(), Origin::default(), ()).unwrap();
+    let made = fit(Some(&known), (&runs, &[]), &Settings::default(), ()).unwrap();
     assert!(made.report.accepted(), "{}", made.report.to_text());
     let slope = |document: &Document| {
         let bias = document.accel.as_ref().unwrap().sensor[2].terms.curve(Feature::One).cloned().unwrap();
@@ -304,12 +304,11 @@ fn a_known_scale_factor_does_not_get_into_the_bias_where_the_attitude_is_not_kno
 }
 
 /// What report and document both state of an accelerometer axis in sample (m/s²).
-fn stated(report: &FitReport, document: &Document, axis: usize) -> f64 {
+fn stated(report: &Report, axis: usize) -> f64 {
     let name = ["x", "y", "z"][axis];
-    let residuals = &document.origin.as_ref().unwrap().residual;
-    let of = format!("accel.{name}");
-    let of_long = format!("accelerometer.{name}");
-    let own = residuals.iter().find(|r| (r.of == of || r.of == of_long) && r.sample == Sample::In).unwrap();
+    let of = format!("accelerometer.{name}");
+    let residuals = residuals(&report.verdicts);
+    let own = residuals.iter().find(|r| r.of == of && r.sample == Sample::In).unwrap();
     let verdict = report.verdicts.iter().find(|v| v.of == format!("accelerometer {name}")).unwrap();
     assert!((own.rms_after - verdict.in_sample[1].rms).abs() < 1e-12);
     own.rms_after

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use isotherm_calibration::fits::thermal::{Method, Settings, fit};
+use isotherm_calibration::report::residuals;
 use isotherm_calibration::runs::Run;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogReader;
-use isotherm_protocol::document::{Origin, Sample};
+use isotherm_protocol::document::Sample;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::presets::fibre_optic_chamber;
 use isotherm_simulator::{Scenario, Simulation};
@@ -64,7 +65,7 @@ fn the_residual_of_the_report_is_that_of_the_service() {
     for method in [Method::Sequential, Method::Joint] {
         let run = run_of(&log, &mapping);
         let settings = Settings { method, window_s: Some(10.0), ..Settings::default() };
-        let made = fit(None, (&[run], &[]), &settings, Origin::default(), ()).unwrap();
+        let made = fit(None, (&[run], &[]), &settings, ()).unwrap();
         let out = folder.path().join(format!("{}.toml", method.name()));
         made.written.save(&out, false).unwrap();
         assert!(made.report.verdicts.iter().any(|verdict| verdict.accepted), "{}", made.report.to_text());
@@ -76,7 +77,7 @@ fn the_residual_of_the_report_is_that_of_the_service() {
         }
         unit.finish();
         let ticks = unit.take();
-        let residuals = &made.written.document.origin.as_ref().unwrap().residual;
+        let residuals = residuals(&made.report.verdicts);
         for (axis, name) in ["gyro.x", "gyro.y", "gyro.z"].into_iter().enumerate() {
             let mut means = Vec::new();
             for window in ticks.chunks(10).filter(|window| window.len() == 10) {

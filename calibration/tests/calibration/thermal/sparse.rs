@@ -9,7 +9,6 @@ use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::Origin;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
 use isotherm_simulator::{Scenario, Simulation};
@@ -117,7 +116,7 @@ fn a_log_with_a_row_a_minute_serves_a_fit() {
     base.gyro.orientation.thermal = None;
     let runs = (std::slice::from_ref(&train), std::slice::from_ref(&judge));
     let settings = Settings { window_s: None, ..settings(Method::Joint) };
-    let Fitted { report, .. } = fit(Some(&base), runs, &settings, Origin::default(), ()).unwrap();
+    let Fitted { report, .. } = fit(Some(&base), runs, &settings, ()).unwrap();
     println!("{:.1?}\n{}\n{:#?}", together(&report), report.headline(), report.warnings);
     assert!(report.accepted() && together(&report)[0] > 4.0, "{}", report.headline());
     // No window is shorter than a row.

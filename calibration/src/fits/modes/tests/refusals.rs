@@ -35,7 +35,7 @@ fn changed(scenario: &Scenario, mut change: impl FnMut(&mut GyroTick) -> bool) -
 
 fn made(run: Run, base: &Document) -> Result<Made, Error> {
     let runs = [run];
-    make(&wanted(&runs, base), || ())
+    make(&wanted(&runs, base), &mut ())
 }
 
 #[track_caller]
@@ -155,7 +155,7 @@ fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
             tick.mode.map(|mode| if mode == LasingMode::Plus { LasingMode::Minus } else { LasingMode::Plus });
         true
     });
-    let again = make(&wanted(&[turned], &made.written.document), || ()).unwrap();
+    let again = make(&wanted(&[turned], &made.written.document), &mut ()).unwrap();
     let told = again.warnings.iter().find(|words| words.contains("with the other sign")).unwrap();
     assert!(told.starts_with("gyros x, y, z: "), "{told}");
     assert!(!made.warnings.iter().any(|words| words.contains("with the other sign")));
@@ -226,7 +226,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     zeeman(&mut scenario).reversal.meander_half_period_s = 0.0;
     let base = base();
     let runs = [changed(&scenario, |_| true)];
-    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }, || ()).unwrap();
+    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }, &mut ()).unwrap();
     assert!(made.warnings.iter().any(|words| words.contains("the static bias keeps its constant")));
     assert!(made.warnings.iter().any(|words| words.contains("the phase of the slow meander")));
     for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
@@ -246,7 +246,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     );
     // Orders that the run cannot tell are not invented.
     let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
-    let made = make(&Wanted { asked, ..wanted(&runs, &base) }, || ()).unwrap();
+    let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
     assert!(
         made.report().warnings.iter().any(|words| words.contains("cannot be separated from the static bias"))
     );

@@ -85,8 +85,8 @@ fn several_temperatures_give_the_slopes_of_axes_and_weights() {
             .iter()
             .any(|(heading, chart)| heading == "Axes over temperature" && chart.panels.len() == 6)
     );
-    let details = super::super::document::details(&made);
-    assert_eq!(details["over_temperature"].as_array().unwrap().len(), 3);
+    let (_, axes) = report.tables.iter().find(|(heading, _)| heading == "Axes by temperature, ″").unwrap();
+    assert_eq!(axes.rows.len(), 3);
 }
 
 #[test]

@@ -5,70 +5,28 @@ use isotherm_protocol::document::Document;
 use super::Tumble;
 use crate::axes::{AXES, several};
 use crate::fits::positions::measure;
-use crate::fits::positions::sense::{Beside, found_along, out_of_place, places, turned};
+use crate::fits::positions::sense::{Beside, elsewhere, out_of_place, places};
 use crate::report::short;
 
-/// What to do where sensors lie along the others' axes or the other way round: the fewest mistakes that make it.
+/// Words where gyros lie elsewhere than stated: `Err` where the accelerometers show a mirror image of the case by the fewest mistakes.
 ///
 /// Columns of accelerometers that are swapped, or one with a wrong sign, make a mirror image of the case: |f| is g all the same, and a
-/// rotation, which has no mirror image, is seen by the gyros the other way round.
-fn mistakes(order: [usize; 3], same_way: [bool; 3]) -> String {
-    let moved = out_of_place(order);
-    let wrong: Vec<usize> = (0..3).filter(|axis| !same_way[*axis]).collect();
-    let right: Vec<usize> = (0..3).filter(|axis| same_way[*axis]).collect();
-    match (moved.len(), wrong.as_slice()) {
-        (0, [_]) => format!("{} is found with the other sign: is its sign missing in the mapping?", several("gyro", &wrong, 3)),
-        (0, [_, _]) => format!(
-            "{} are found with the other sign: is the sign of {} missing in the mapping, or are those of both gyros?",
-            several("gyro", &wrong, 3),
-            several("accelerometer", &right, 3)
-        ),
-        (0, _) => format!("{} are found with the other sign: are their signs missing in the mapping?", several("gyro", &wrong, 3)),
-        (2, []) => format!("{} look swapped: check the columns in the mapping", several("gyro", &moved, 3)),
-        (2, [_, _, _]) => format!("{} look swapped: check the columns in the mapping", several("accelerometer", &moved, 3)),
-        (3, []) => "the columns of the gyros, or of the accelerometers, look as if they were in another order: check them in the mapping".to_owned(),
-        (2, _) => format!(
-            "{} look swapped, or accelerometers, and a sign is the other one: check the columns in the mapping, or state how the gyros \
-             lie in the document",
-            several("gyro", &moved, 3)
-        ),
-        _ => "columns of gyros or accelerometers look as if they were in another order, and a sign is the other one: check them in the \
-              mapping"
-            .to_owned(),
-    }
-}
-
-/// Whether the accelerometers show a mirror image of the case, by the fewest mistakes: one sign, or two of their columns swapped. A
-/// document of that would turn the wrong way round.
-fn is_mirrored(order: [usize; 3], same_way: [bool; 3]) -> bool {
-    let wrong = same_way.into_iter().filter(|same| !same).count();
-    matches!((out_of_place(order).len(), wrong), (0, 2) | (2, 3))
-}
-
-/// Words where gyros lie elsewhere than stated: `Err` where that is a mistake of the accelerometers.
+/// rotation, which has no mirror image, is seen by the gyros the other way round. A document of that would turn the wrong way round.
 fn gyros(sensors: &[Beside]) -> Result<Option<String>, String> {
-    let turned = turned(sensors);
-    if turned.is_empty() {
-        return Ok(None);
-    }
-    let places = places(sensors);
-    let what = places.map_or_else(
-        || {
-            format!(
-                "{} far from where the document at hand, or else {} it: are columns of the mapping swapped, of the accelerometers \
-                 too, or is a sign the other one?",
-                if turned.len() == 1 { format!("{} is", several("gyro", &turned, sensors.len())) } else { format!("{} are", several("gyro", &turned, sensors.len())) },
-                if turned.len() == 1 { "its column, has" } else { "their columns, have" },
-            )
-        },
-        |(order, same_way)| mistakes(order, same_way),
-    );
-    let stop = if what.ends_with('?') { "" } else { "." };
-    let words = format!("{what}{stop} {}", found_along("gyro", sensors, &turned));
-    if places.is_some_and(|(order, same_way)| is_mirrored(order, same_way)) {
-        Err(words)
-    } else {
-        Ok(Some(words))
+    let Some(words) = elsewhere("gyro", sensors) else { return Ok(None) };
+    let Some((order, same_way)) = places(sensors) else { return Ok(Some(words)) };
+    let moved = out_of_place(order);
+    let right: Vec<usize> = (0..3).filter(|axis| same_way[*axis]).collect();
+    match (moved.len(), right.as_slice()) {
+        (0, [_]) => Err(format!(
+            "the accelerometers show a mirror image of the case: is the sign of {} missing in the mapping? {words}",
+            several("accelerometer", &right, 3)
+        )),
+        (2, []) => Err(format!(
+            "{} look swapped: check the columns in the mapping: they show a mirror image of the case. {words}",
+            several("accelerometer", &moved, 3)
+        )),
+        _ => Ok(Some(words)),
     }
 }
 
@@ -91,14 +49,7 @@ pub(in crate::fits::tumble) fn odd(
             .zip(stated.iter().zip(&accel.orientation.rows))
             .map(|((scale, row), (old, axis))| Beside::new([*scale, *old], [*row, *axis]));
         let beside: Vec<Beside> = beside.collect();
-        let turned: Vec<usize> = turned(&beside);
-        if !turned.is_empty() {
-            words.push(format!(
-                "{}: are columns of the mapping swapped, or is a sign the other one? {}",
-                several("accelerometer", &turned, beside.len()),
-                found_along("accelerometer", &beside, &turned)
-            ));
-        }
+        words.extend(elsewhere("accelerometer", &beside));
         let scale = &tumble.accel.scale;
         words.extend(measure::Beside::accelerometers(accel.output, scale, &stated).words());
         words.extend(measure::already_m_per_s2(accel.output, scale, &stated));
@@ -165,18 +116,9 @@ mod tests {
             [back(x), back(y), back(z)],
             "gyros x, y and z are found with the other sign: are their signs missing",
         );
-        pointed_out(
-            [y, z, x],
-            "the columns of the gyros, or of the accelerometers, look as if they were in another order",
-        );
-        pointed_out(
-            [y, back(x), z],
-            "gyros x and y look swapped, or accelerometers, and a sign is the other one",
-        );
-        pointed_out(
-            [[0.6, 0.8, 0.0], y, z],
-            "gyro x is far from where the document at hand, or else its column, has it: ",
-        );
+        pointed_out([y, z, x], "gyros x, y and z are far from where the document at hand has them: ");
+        pointed_out([y, back(x), z], "gyros x and y are far from where the document at hand has them: ");
+        pointed_out([[0.6, 0.8, 0.0], y, z], "gyro x is far from where the document at hand has it: ");
     }
 
     #[test]
@@ -189,7 +131,7 @@ mod tests {
         let sign = said([back(x), y, back(z)]).unwrap_err();
         assert!(
             sign.starts_with(
-                "gyros x and z are found with the other sign: is the sign of accelerometer y missing"
+                "the accelerometers show a mirror image of the case: is the sign of accelerometer y missing"
             ),
             "{sign}"
         );

@@ -1,0 +1,107 @@
+//! What comes of a fit, and what its document says of it.
+
+use std::path::PathBuf;
+
+use isotherm_protocol::document::{Created, Document};
+use nalgebra::DMatrix;
+use serde_json::{Map, Value, json};
+
+use super::{Written, command_line, origin, tidy};
+use crate::error::Error;
+use crate::report::{Report, Sigmas, residuals};
+
+/// What comes of a fit.
+#[derive(Debug)]
+pub struct Fitted {
+    /// The document without what is to be said of its origin.
+    pub written: Written,
+    /// What is said of the fit.
+    pub report: Report,
+    /// What the document says of it beside its coefficients.
+    pub about: About,
+}
+
+/// What a document says of a fit beside its coefficients.
+#[derive(Debug, Default)]
+pub struct About {
+    /// Method.
+    pub method: &'static str,
+    /// Name of its table in `origin.details`.
+    pub key: &'static str,
+    /// What that table has besides verdict, warnings, notes and coefficients with their standard errors: an object.
+    pub details: Value,
+    /// Standard errors, as what compares documents reads them.
+    pub sigmas: Sigmas,
+    /// Range of temperature (°C).
+    pub range_deg_c: Option<[f64; 2]>,
+    /// Range of its rate (°C/s).
+    pub rate_range_deg_c_per_s: Option<[f64; 2]>,
+}
+
+impl About {
+    /// A document with its origin.
+    ///
+    /// # Errors
+    /// [`Error::Log`] for a log that cannot be read again, [`Error::Document`].
+    pub fn complete(
+        &self,
+        mut document: Document,
+        logs: &[PathBuf],
+        report: &Report,
+        created: Created,
+    ) -> Result<Written, Error> {
+        let mut origin = origin(logs, &command_line())?;
+        origin.method = Some(self.method.to_owned());
+        origin.range_deg_c = self.range_deg_c;
+        origin.rate_range_deg_c_per_s = self.rate_range_deg_c_per_s;
+        origin.residual = residuals(&report.verdicts);
+        let before = document.origin.take();
+        let mut details = before.as_ref().and_then(|before| before.details.clone()).unwrap_or_default();
+        if let Some(before) = before.filter(|before| before.tool.is_some() || before.method.is_some()) {
+            // What the rest of the document rests on.
+            let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
+            let earlier = json!({ "tool": tool, "method": method, "log": before.log });
+            details.extend(kept(earlier).map(|earlier| ("before".to_owned(), earlier)));
+        }
+        let mut own = json!({
+            "verdict": report.headline(),
+            "warnings": report.warnings,
+            "notes": report.notes,
+            "coefficients": report.coefficients_by_name(),
+        });
+        if let (Some(own), Some(more)) = (own.as_object_mut(), self.details.as_object()) {
+            own.extend(more.clone());
+        }
+        details.extend(kept(own).map(|own| (self.key.to_owned(), own)));
+        self.sigmas.write(&mut details);
+        origin.details = Some(details);
+        document.origin = Some(origin);
+        document.created = Some(created);
+        Written::of(&document)
+    }
+}
+
+/// As a document keeps it, which has no null: what is not known is left out, and in a list it is no number.
+fn kept(value: Value) -> Option<toml::Value> {
+    match value {
+        Value::Null => None,
+        Value::Array(all) => {
+            Some(all.into_iter().map(|one| kept(one).unwrap_or(f64::NAN.into())).collect::<Vec<_>>().into())
+        }
+        Value::Object(all) => {
+            let known = all.into_iter().filter_map(|(key, one)| Some((key, kept(one)?)));
+            Some(toml::Value::Table(known.collect()))
+        }
+        other => toml::Value::try_from(other).ok(),
+    }
+}
+
+/// A covariance by rows, as documents keep it.
+pub(crate) fn rows(matrix: &DMatrix<f64>) -> Value {
+    matrix.row_iter().map(|row| row.iter().map(|value| tidy(*value)).collect::<Vec<f64>>()).collect()
+}
+
+/// Something of each sensor, by the sensor's name.
+pub(crate) fn by_name<'a>(all: impl IntoIterator<Item = (&'a str, Value)>) -> Value {
+    Value::Object(all.into_iter().map(|(name, of)| (name.to_owned(), of)).collect::<Map<_, _>>())
+}

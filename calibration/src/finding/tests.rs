@@ -1,0 +1,89 @@
+use super::*;
+use crate::runs::swapped::Looks;
+
+fn examples() -> Vec<Finding> {
+    let plateau = |from: f64, rate: [f64; 3]| Plateau {
+        bins: [0, 1],
+        window_s: [from, from + 8.0],
+        rate: rate.map(|rate| 3600.0 * rate).to_vec(),
+    };
+    let found = || vec![plateau(11.0, [36.0, 0.01, -0.02]), plateau(31.0, [-36.1, 0.0, 0.0])];
+    let window_s = [11.0, 19.0];
+    let looks = |order| {
+        Box::new(Looks {
+            kind: "accelerometers",
+            measure: "m/s²",
+            order,
+            mean: [0.1, 9.8, 0.02],
+            stated: [9.8, 0.1, 0.0],
+        })
+    };
+    let stated = (36.0, [0.0, 1.0, 0.0]);
+    let shown = || vec![("y".to_owned(), 0.02), ("x".to_owned(), 36.0)];
+    let stray = Kind::OtherPlateaus { stated: 1, turning: 2, found: found() };
+    vec![
+        Kind::NoStepStated { log: "y.csv".into() }.in_log(1),
+        Kind::Dead { log: "y.csv".into() }.of_gyro("z"),
+        Kind::NoTicks { window_s }.in_log(0),
+        Kind::StepsOverlap { windows_s: [window_s, [12.0, 20.0]] }.in_log(0),
+        Kind::SomeTimes.in_log(0),
+        stray.clone().in_log(0),
+        Kind::OutOfProportion { window_s, shown: 35.0, stated: 72.0, allowed: 3.6, found: found() }.in_log(0),
+        Kind::UnstatedTurn {
+            stated: 2,
+            turn: plateau(51.0, [5.0, 0.0, 0.0]),
+            allowed: [7.2, 1.8],
+            found: found(),
+        }
+        .in_log(0),
+        Kind::BesideGaps { kind: Box::new(stray), share: 0.25 }.in_log(2),
+        Kind::TurnedOtherwise {
+            window_s,
+            stated,
+            shown: shown(),
+            instead: Box::new(Instead::Axis([1.0, 0.0, 0.0], [90.0, 30.0])),
+        }
+        .in_log(0),
+        Kind::TurnedOtherwise {
+            window_s,
+            stated,
+            shown: shown(),
+            instead: Box::new(Instead::Factor([10.0, 2.0])),
+        }
+        .in_log(0),
+        Kind::Unsteady { window_s, stated: 36.0, range: [0.0, 36.2] }.in_log(0),
+        Kind::Lost { window_s, share: [0.12, 0.05] }.in_log(0),
+        Kind::AtLimit { window_s, stated: 400.0 }.in_log(0),
+        Kind::NotLevel {
+            at_beginning: true,
+            force: Some([9.7, 0.1, 0.2]),
+            troubles: vec!["2 ticks refused".into()],
+        }
+        .in_log(0),
+        Kind::NotLevel { at_beginning: true, force: None, troubles: Vec::new() }.in_log(0),
+        Kind::NotLevel { at_beginning: false, force: None, troubles: Vec::new() }.into(),
+        Kind::OneWay { axes: vec![0, 2] }.into(),
+        Kind::NoAttitude.into(),
+        Kind::ShortSteps { rates: vec![1.0, -1.0, 1.0] }.into(),
+        Kind::Gravity { looks: looks(Some([1, 0, 2])), rest: None, others: vec![1, 2] }.in_log(0),
+        Kind::Gravity { looks: looks(None), rest: Some((window_s, 3)), others: vec![1] }.in_log(0),
+        Kind::NothingTurns.of_gyro("x"),
+        Kind::Across.of_gyro("x"),
+        Kind::FewSteps { steps: 1 }.of_gyro("x"),
+        Kind::OtherScale { factor: -2e-4, most: 2.0 }.of_gyro("x"),
+        Kind::NotStraight { left: 10.0, share: [0.1, 0.01], chi_square: 1e9 }.of_gyro("x"),
+        Kind::Worse { axis: 2 }.of_gyro("x"),
+        Kind::Passed { words: "x.csv, y.csv, each: 2 ticks refused".into() }.into(),
+    ]
+}
+
+/// Every sentence, so that a change of words is seen. `ISOTHERM_WORDS=1 cargo test -p isotherm-calibration words` writes the file anew.
+#[test]
+fn all_words() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/finding/words.txt");
+    let words: String = examples().iter().map(|finding| finding.to_string() + "\n").collect();
+    if std::env::var_os("ISOTHERM_WORDS").is_some() {
+        std::fs::write(path, &words).unwrap();
+    }
+    assert_eq!(words, std::fs::read_to_string(path).unwrap());
+}
