@@ -109,10 +109,11 @@ pub fn validate(
         }
     }
     if let Some(channels) = coverage.silent() {
-        return Err(Error::refused(format!(
+        let deaf = format!(
             "{name} follows the temperatures {channels}, of which the logs have no reading: is it the document of this \
              unit?"
-        )));
+        );
+        return Err(Error::Refused([vec![deaf], report.warnings].concat()));
     }
     report.verdicts = Curve::verdicts(&report.residuals)
         .into_iter()

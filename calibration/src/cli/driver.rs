@@ -92,6 +92,7 @@ impl<'a> Task<'a> {
             let work = work?;
             let report = written(&Job { work: &work, among: None })?;
             emit(files.json, || report.to_json(), || report.to_text())?;
+            files.say_written(report.verdicts.iter().any(|verdict| verdict.accepted));
             return Error::end(refusals(&report, self.accept_partial), work.cuts());
         }
         units.iter().try_for_each(|(unit, _)| files.check_unit(unit.as_str()))?;

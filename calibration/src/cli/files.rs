@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use isotherm_cli::say;
 use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 
 use crate::document::write_file;
@@ -59,6 +60,15 @@ impl Files<'_> {
     pub(super) fn check_unit(&self, unit: &str) -> Result<(), Error> {
         let mut outputs = self.out.into_iter().chain(self.html);
         outputs.try_for_each(|out| Ok(refuse_replacing(&of_unit(out, unit), self.overwrite)?))
+    }
+
+    /// Says which files were written; a document is where one `came`.
+    pub(super) fn say_written(&self, came: bool) {
+        let there = self.out.filter(|_| came).into_iter().chain(self.html);
+        let names: Vec<_> = there.map(|path| path.display().to_string()).collect();
+        if !names.is_empty() {
+            say(format_args!("written: {}", names.join(", ")));
+        }
     }
 
     /// Writes the page, where one is wanted, under what its name is turned into.
