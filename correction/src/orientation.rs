@@ -29,7 +29,7 @@ pub use parts::{
     AxesPlay, CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
 };
 
-use crate::lanes::Readings;
+use crate::lanes::{Lanes, Readings};
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
 use crate::thermal::MAX_PLAYS;
 use crate::vector::dot;
@@ -91,9 +91,9 @@ pub struct Orientation {
     reference_deg_c: f64,
     range_deg_c: [f64; 2],
     sensors: usize,
-    /// Rows of `C_0`, normalised; rows beyond `sensors` are zero.
-    rows: Rows,
-    slopes_per_deg_c: Rows,
+    /// `C_0` with its rows normalised, and `C_1` (1/°C): by case axis, a lane for each sensor.
+    cosines: [Lanes; 3],
+    slopes_per_deg_c: [Lanes; 3],
     plays: ArrayVec<AxesPlay, MAX_PLAYS>,
     /// √w with the mean of w over all sensors made one, so that parity keeps the sensors' unit.
     root_weights: [f64; MAX_SENSORS],
@@ -130,15 +130,15 @@ impl Orientation {
             reference_deg_c: parts.reference_deg_c,
             range_deg_c: parts.range_deg_c,
             sensors: parts.rows.len(),
-            rows,
-            slopes_per_deg_c,
+            cosines: array::from_fn(|axis| rows.map(|row| row[axis])),
+            slopes_per_deg_c: array::from_fn(|axis| slopes_per_deg_c.map(|row| row[axis])),
             plays: parts.plays.iter().copied().take(MAX_PLAYS).collect(),
             root_weights: root_weights(&parts.weights, parts.rows.len()),
             parity_limit: parts.parity_limit,
             parity_confirm_ticks: parts.parity_confirm_ticks,
         };
         let [first, last] = parts.range_deg_c;
-        let at_reference = condition_number(&orientation.rows);
+        let at_reference = condition_number(&rows);
         let stated = [
             (parts.reference_deg_c, at_reference),
             (first, condition_number(&orientation.rows_at(first))),
@@ -226,7 +226,8 @@ impl Orientation {
     /// A temperature (°C) in a range at which the sensors of `mask` are ill-conditioned, with the condition number.
     fn ill_conditioned(&self, mask: SensorMask, range_deg_c: [f64; 2]) -> Option<(f64, f64)> {
         let rows_at = |temperature_deg_c| masked(self.rows_at(temperature_deg_c), mask);
-        range::ill_conditioned(range_deg_c, rows_at, &masked(self.slopes_per_deg_c, mask), CONDITION_LIMIT)
+        let slopes = by_sensor(|axis, sensor| self.slopes_per_deg_c[axis][sensor]);
+        range::ill_conditioned(range_deg_c, rows_at, &masked(slopes, mask), CONDITION_LIMIT)
     }
 
     /// What the sensors read for the vector `v` in case axes: s = C(T)·v (unit of `v`).
@@ -240,19 +241,12 @@ impl Orientation {
     #[inline]
     pub(crate) fn axes_at(&self, temperature_deg_c: f64) -> impl Fn(usize, usize) -> f64 {
         let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
-        move |axis, sensor| self.rows[sensor][axis] + self.slopes_per_deg_c[sensor][axis] * excess
+        move |axis, sensor| self.cosines[axis][sensor] + self.slopes_per_deg_c[axis][sensor] * excess
     }
 
     /// C(T), with T clamped to the fitted range and NaN standing for the reference.
     pub(crate) fn rows_at(&self, temperature_deg_c: f64) -> Rows {
-        let excess = self.clamped(temperature_deg_c) - self.reference_deg_c;
-        let mut rows = self.rows;
-        for (row, slope) in rows.iter_mut().zip(&self.slopes_per_deg_c) {
-            for (c, slope) in row.iter_mut().zip(slope) {
-                *c += slope * excess;
-            }
-        }
-        rows
+        by_sensor(self.axes_at(temperature_deg_c))
     }
 
     /// A temperature within the fitted range; NaN stands for the reference (°C).
@@ -284,6 +278,11 @@ fn root_weights(weights: &[f64], sensors: usize) -> [f64; MAX_SENSORS] {
         *root = libm::sqrt(weight / largest * count / sum);
     }
     roots
+}
+
+/// What is known by case axis and sensor, as rows.
+fn by_sensor(of: impl Fn(usize, usize) -> f64) -> Rows {
+    array::from_fn(|sensor| array::from_fn(|axis| of(axis, sensor)))
 }
 
 /// The rows with those of the sensors outside the mask made zero.
@@ -325,6 +324,17 @@ impl Inverse {
         sum_of_columns::<MAX_SENSORS>(&self.columns, readings.lanes())
     }
 
+    /// What [`lerp`](Self::lerp) to `other` gives along the case axes at `u` from 0 on; readings of sensors that take no part must be zero.
+    #[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
+    #[inline(always)]
+    pub(crate) fn apply_to<const N: usize>(&self, other: &Self, u: f64, readings: &[f64; N]) -> [f64; 3] {
+        if self.mask == other.mask && u < 1.0 {
+            sum_of_columns(&self.columns_to(other, u), readings)
+        } else {
+            sum_of_columns(other.columns.first_chunk().unwrap_or(&[[0.0; 4]; N]), readings)
+        }
+    }
+
     /// The columns of what [`lerp`](Self::lerp) to `other` gives at `u` from 0 on, of the first `N` sensors.
     #[expect(clippy::inline_always, reason = "twice per tick: a call costs as much as half of the work")]
     #[inline(always)]
@@ -332,11 +342,11 @@ impl Inverse {
         let mut columns = [[0.0; 4]; N];
         let ends = self.columns.iter().zip(&other.columns);
         if self.mask == other.mask && u < 1.0 {
-            columns.iter_mut().zip(ends).for_each(|(column, (from, to))| {
+            for (column, (from, to)) in columns.iter_mut().zip(ends) {
                 *column = array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * u);
-            });
+            }
         } else {
-            columns.iter_mut().zip(ends).for_each(|(column, (_, to))| *column = *to);
+            columns.iter_mut().zip(&other.columns).for_each(|(column, to)| *column = *to);
         }
         columns
     }
@@ -356,9 +366,9 @@ impl Inverse {
 #[inline(always)]
 pub(crate) fn sum_of_columns<const N: usize>(columns: &[[f64; 4]; N], readings: &[f64; N]) -> [f64; 3] {
     let mut sum = [0.0; 4];
-    columns.iter().zip(readings).for_each(|(column, reading)| {
+    for (column, reading) in columns.iter().zip(readings) {
         sum = array::from_fn(|axis| sum[axis] + column[axis] * reading);
-    });
+    }
     let [x, y, z, _] = sum;
     [x, y, z]
 }

@@ -266,7 +266,7 @@ struct Excess {
 
 /// Middle of a tick.
 fn middle(end_time: Timestamp, duration: Span) -> Timestamp {
-    end_time - Span::from_ns(duration.as_ns() / 2)
+    end_time - duration.half()
 }
 
 /// `(c₁ + c₂)/Δt` (counts/s).

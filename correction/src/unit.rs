@@ -168,12 +168,12 @@ impl Unit {
         let mut starts_anew = false;
         let mut rest = ticks;
         while let Some((tick, others)) = rest.split_first() {
-            let run = self.run(output, rest);
+            let waiting = self.accels.waiting();
+            let run = self.run(output, rest, waiting);
             if let Some((run, behind)) = rest.split_at_checked(run)
                 && let Some(last) = run.last()
             {
-                let accels = self.accels.waiting();
-                let accels = accels.get(..run.len()).unwrap_or_default();
+                let accels = waiting.get(..run.len()).unwrap_or_default();
                 let (end_time, met) = (last.end_time, accels.len());
                 self.gyros.passed(run);
                 self.pipeline.pass(&Run { ticks: run, accels, before: Break::default() }, true, emit);
@@ -196,11 +196,11 @@ impl Unit {
     }
 
     /// How many of these ticks need not wait: they go on where the last one left off, fit the calibration, and have their accelerometer
-    /// ticks, or there are no accelerometers.
+    /// ticks among those that wait, or there are no accelerometers.
     #[inline]
-    fn run(&self, output: OutputKind, ticks: &[GyroTick]) -> usize {
+    fn run(&self, output: OutputKind, ticks: &[GyroTick], accels: &[PendingAccel]) -> usize {
         let Some(calibration) = self.pipeline.settled() else { return 0 };
-        let (accels, accel_count) = (self.accels.waiting(), calibration.accels.len());
+        let accel_count = calibration.accels.len();
         if calibration.gyro_output != output || (accel_count == 0 && !accels.is_empty()) {
             return 0;
         }

@@ -113,6 +113,13 @@ impl Span {
     pub const fn as_s(self) -> f64 {
         seconds(self.0)
     }
+
+    /// Half of it, in whole nanoseconds.
+    #[must_use]
+    pub const fn half(self) -> Self {
+        // A span is never negative.
+        Self(self.0 >> 1)
+    }
 }
 
 /// An instant on the producer's own clock: nanoseconds since that clock's epoch.
@@ -136,18 +143,24 @@ impl Timestamp {
     }
 
     /// Time from `earlier` to `self`; zero where `earlier` is the later one.
+    #[inline]
     #[must_use]
     pub const fn since(self, earlier: Self) -> Span {
-        Span::from_ns(self.0.saturating_sub(earlier.0))
+        Span::from_ns(self.ns_from(earlier))
     }
 
     /// Signed time from `other` to `self` (s).
     #[must_use]
     pub const fn seconds_from(self, other: Self) -> f64 {
-        // What `saturating_sub` gives, with a branch that is never taken in place of what it always computes.
+        seconds(self.ns_from(other))
+    }
+
+    /// Signed time from `other` to `self` (ns), as `saturating_sub` gives it, with a branch that is never taken in place of what that
+    /// always computes.
+    const fn ns_from(self, other: Self) -> i64 {
         match self.0.checked_sub(other.0) {
-            Some(ns) => seconds(ns),
-            None => seconds(ends_apart(self.0)),
+            Some(ns) => ns,
+            None => ends_apart(self.0),
         }
     }
 
@@ -177,14 +190,15 @@ const fn ends_apart(from: i64) -> i64 {
 impl Add<Span> for Timestamp {
     type Output = Self;
     fn add(self, span: Span) -> Self {
-        Self(self.0.saturating_add(span.0))
+        // A span is never negative: there is one end to stop at.
+        Self(self.0.checked_add(span.0).unwrap_or(i64::MAX))
     }
 }
 
 impl Sub<Span> for Timestamp {
     type Output = Self;
     fn sub(self, span: Span) -> Self {
-        Self(self.0.saturating_sub(span.0))
+        Self(self.0.checked_sub(span.0).unwrap_or(i64::MIN))
     }
 }
 

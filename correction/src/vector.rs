@@ -26,7 +26,7 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Vector products of one vector with many, whose axes are lanes.
 #[inline]
-pub(crate) fn cross_lanes<const N: usize>(a: [f64; 3], b: &[[f64; N]; 3]) -> [[f64; N]; 3] {
+pub(crate) fn cross_lanes<const N: usize>(a: [f64; 3], b: [&[f64; N]; 3]) -> [[f64; N]; 3] {
     let part = |i: usize, j: usize| array::from_fn(|lane| a[i] * b[j][lane] - a[j] * b[i][lane]);
     [part(1, 2), part(2, 0), part(0, 1)]
 }

@@ -9,6 +9,7 @@ use super::DriftModel;
 use super::gyro::{DriftEstimate, GRID, GyroDrift};
 use super::reference::{Reference, ReferenceCounters, ReferenceRefusal, Waiting};
 use super::ring::{Covered, OpenCell, cell_end};
+use crate::lanes::within;
 use crate::observation::{GyroLanes, Observation, SOUND};
 use crate::sample::{MAX_SENSORS, SensorFlags, Sensors};
 use crate::units::{Span, Timestamp};
@@ -239,21 +240,20 @@ impl DriftEstimator {
                 observation.settled & flags[lane].contains(SensorFlags::VALID) & residual.is_finite();
             counts.then_some(residual)
         };
-        let count = MAX_SENSORS.min(*count);
+        let lanes = || 0..MAX_SENSORS.min(*count);
         match self.open.as_mut().and_then(|open| Some((open.within(start, end)?, open))) {
             Some((covered_s, open)) => {
                 let all: [f64; N] = array::from_fn(|lane| rate[lane] - bias[lane]);
-                let finite = all.iter().fold(true, |finite, residual| finite & residual.is_finite());
-                let whole = finite & observation.settled;
+                let whole = within(&all, &[f64::INFINITY; N]) & observation.settled;
                 if whole && *flags == SOUND {
                     open.gain_all(covered_s, all);
                 } else {
-                    (0..count).filter_map(|lane| Some((lane, residual(lane)?))).for_each(|(lane, rate)| {
+                    lanes().filter_map(|lane| Some((lane, residual(lane)?))).for_each(|(lane, rate)| {
                         open.gain(lane, covered_s, rate);
                     });
                 }
             }
-            None => self.go_on((start, end), count, residual),
+            None => self.go_on((start, end), lanes().len(), residual),
         }
         self.observed_until = Some(end);
     }

@@ -85,6 +85,7 @@ impl<const T: usize> Follows<T> for MotionTerms {
 /// Everything of a unit that follows motion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Motion {
+    /// Of each sensor; none where no sensor of the kind has any.
     pub(crate) gyros: Vec<MotionTerms>,
     pub(crate) accels: Vec<MotionTerms>,
     /// Whether a gyro drifts with the specific force.
@@ -117,6 +118,8 @@ impl Motion {
             lanes.iter_mut().zip(delays).for_each(|(lane, delay)| *lane = longest - delay);
             lanes
         });
+        let [gyros, accels] = [gyros, accels]
+            .map(|terms| if terms.iter().all(MotionTerms::is_empty) { Vec::new() } else { terms });
         let feels_force = gyros.iter().any(|gyro| gyro.terms.feel_force());
         let differs = |lane: &f64| *lane != 0.0;
         let motion = Self {
@@ -128,21 +131,12 @@ impl Motion {
             holds_back: held_back_ticks.iter().flatten().any(differs),
             held_back_ticks,
         };
-        (!motion.is_empty()).then(|| Box::new(motion))
-    }
-
-    fn is_empty(&self) -> bool {
-        let has_terms = self.gyros.iter().chain(&self.accels).any(|terms| !terms.is_empty());
-        !(has_terms || self.has_positions || self.holds_back)
+        let has_terms = !(motion.gyros.is_empty() && motion.accels.is_empty());
+        (has_terms || motion.has_positions || motion.holds_back).then(|| Box::new(motion))
     }
 
     /// Whether a gyro's weight follows its rate.
     pub(crate) fn has_curves(&self) -> bool {
         self.gyros.iter().any(|gyro| gyro.over_rate.is_some())
-    }
-
-    /// Whether an accelerometer has a second-order term.
-    pub(crate) fn has_squares(&self) -> bool {
-        self.accels.iter().any(|accel| !accel.terms.is_empty())
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::counters::Counters;
 use super::gyro_intake::{LONGEST_KEPT, MAX_TICK_DURATION, is_possible};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
-use crate::units::{Span, Timestamp};
+use crate::units::Timestamp;
 
 /// Most accelerometer ticks that wait.
 const MAX_PENDING: usize = 8192;
@@ -26,14 +26,13 @@ impl PendingAccel {
     /// Whether it ends with a gyro tick, nearer than half the gyro tick's duration.
     #[inline]
     pub(super) fn ends_with(&self, gyro: &GyroTick) -> bool {
-        let half = Span::from_ns(gyro.duration.as_ns() / 2);
-        self.tick.end_time < gyro.end_time + half && !self.ends_before(gyro)
+        let (end_time, half) = (self.tick.end_time, gyro.duration.half());
+        end_time < gyro.end_time + half && end_time + half > gyro.end_time
     }
 
     /// Whether it ends earlier than that.
-    #[inline]
     fn ends_before(&self, gyro: &GyroTick) -> bool {
-        self.tick.end_time + Span::from_ns(gyro.duration.as_ns() / 2) <= gyro.end_time
+        self.tick.end_time + gyro.duration.half() <= gyro.end_time
     }
 }
 
@@ -48,6 +47,8 @@ pub(super) struct AccelIntake {
     gyro_messages: u64,
     /// End of the last gyro tick that was released in this series.
     released: Option<Timestamp>,
+    /// No tick that waits ends later, nor has such a gyro tick been released: what does goes behind all.
+    newest: Option<Timestamp>,
 }
 
 impl AccelIntake {
@@ -58,27 +59,23 @@ impl AccelIntake {
             counters.bad_duration += 1;
             return;
         }
-        // Made where it is put: a copy costs as much as all that is asked of it.
-        let after = self.gyro_messages;
-        let pending = || PendingAccel { tick: tick.clone(), output, after };
-        if self.released.is_some_and(|released| tick.end_time <= released) {
-            self.note_late(pending(), counters);
-        } else if self.follows(tick.end_time) {
-            self.pending.push_back(pending());
+        if self.newest.is_none_or(|newest| newest < tick.end_time) && self.pending.len() < MAX_PENDING {
+            self.newest = Some(tick.end_time);
+            let after = self.gyro_messages;
+            self.pending.push_back(PendingAccel { tick: tick.clone(), output, after });
         } else {
-            self.insert_between(pending(), counters);
+            self.admit_between(tick, output, counters);
         }
     }
 
-    /// Whether a tick that ends at `time` goes behind all that wait.
-    #[inline]
-    fn follows(&self, time: Timestamp) -> bool {
-        self.pending.back().is_none_or(|last| last.tick.end_time < time) && self.pending.len() < MAX_PENDING
-    }
-
-    /// Sets a tick apart whose gyro tick has gone.
+    /// Takes a tick that does not go behind all others; one whose gyro tick has gone is set apart.
     #[cold]
-    fn note_late(&mut self, late: PendingAccel, counters: &mut Counters) {
+    fn admit_between(&mut self, tick: &AccelTick, output: OutputKind, counters: &mut Counters) {
+        let late = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
+        if self.released.is_none_or(|released| tick.end_time > released) {
+            self.insert_between(late, counters);
+            return;
+        }
         counters.accel_late += 1;
         if self.behind.len() < MAX_PENDING {
             self.behind.push_back(late);
@@ -100,6 +97,7 @@ impl AccelIntake {
             self.pending.pop_back();
             counters.accel_unpaired += 1;
         }
+        self.newest = self.pending.back().map(|last| last.tick.end_time).max(self.released);
     }
 
     /// The ticks that wait, the oldest first, as far as they lie in one piece.
@@ -122,6 +120,7 @@ impl AccelIntake {
     #[inline]
     pub(super) fn gyros_released(&mut self, end_time: Timestamp, met: usize) {
         self.released = Some(end_time);
+        self.newest = self.newest.max(self.released);
         for _ in 0..met {
             self.pending.pop_front();
         }
@@ -130,7 +129,9 @@ impl AccelIntake {
     /// Notes that gyro ticks came which start no new series.
     #[inline]
     pub(super) fn goes_on(&mut self) {
-        self.behind.clear();
+        if !self.behind.is_empty() {
+            self.behind.clear();
+        }
         self.gyro_messages += 1;
         if self.pending.is_empty() && self.pending.capacity() > LONGEST_KEPT {
             self.pending = VecDeque::new();
@@ -158,6 +159,7 @@ impl AccelIntake {
         };
         let before = self.pending.len();
         self.pending.retain(near);
+        self.newest = self.pending.back().map(|last| last.tick.end_time);
         counters.accel_unpaired += before.abs_diff(self.pending.len()) as u64;
         while let Some(tick) = self.behind.pop_front() {
             self.insert_between(tick, counters);

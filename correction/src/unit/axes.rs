@@ -112,11 +112,11 @@ impl Axes {
         self.included
     }
 
-    /// The inverse at `time`, where it takes all sensors.
+    /// The inverse at `time`, where it takes all sensors and none is excluded.
     #[inline]
     pub(super) fn inverse<const N: usize>(&self, time: Timestamp) -> Option<[[f64; 4]; N]> {
         let [from, to] = &self.ends;
-        self.whole.then(|| from.columns_to(to, self.share(time)))
+        (self.whole && self.included == self.all).then(|| from.columns_to(to, self.share(time)))
     }
 
     /// Case axes from the sensors of `usable`, and whether they can be trusted: where the usable ones do not span the space, from
@@ -132,9 +132,12 @@ impl Axes {
     ) -> ([f64; 3], bool) {
         if self.whole && usable == self.all {
             let [from, to] = &self.ends;
-            let inverse =
-                if let Some(known) = inverse { known } else { from.columns_to(to, self.share(time)) };
-            return (sum_of_columns(&inverse, readings), true);
+            // Two sums, rather than one of a copy.
+            let axes = match inverse {
+                Some(known) => sum_of_columns(&known, readings),
+                None => from.apply_to(to, self.share(time), readings),
+            };
+            return (axes, true);
         }
         // A copy, so that the readings themselves need no place in memory.
         let readings = *readings;
@@ -143,7 +146,7 @@ impl Axes {
 
     /// Likewise from some of the sensors, or with others than the last time.
     #[cold]
-    fn resolve_some<const N: usize>(
+    pub(super) fn resolve_some<const N: usize>(
         &mut self,
         orientation: &Orientation,
         usable: SensorMask,
@@ -162,7 +165,7 @@ impl Axes {
         }
         let [from, to] = &self.ends;
         let readings = array::from_fn(|lane| if self.mask.contains(lane) { readings[lane] } else { 0.0 });
-        (sum_of_columns::<N>(&from.columns_to(to, self.share(time)), &readings), trusted)
+        (from.apply_to::<N>(to, self.share(time), &readings), trusted)
     }
 
     /// How far along the way between the inverses `time` is.

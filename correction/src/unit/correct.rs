@@ -284,9 +284,11 @@ impl Corrector {
         out.duration = raw.duration;
         out.ticks = 1;
         out.mode = raw.mode;
-        out.delta_velocity = [0.0; 3];
-        out.gyro_parity.clear();
-        out.accel_parity.clear();
+        let seen = &mut self.seen;
+        seen.sequence = raw.sequence;
+        seen.end_time = raw.end_time;
+        seen.missed = missed;
+        seen.mode = raw.mode;
         out.flags = if self.thermal.warming_up { TickFlags::WARM_UP } else { TickFlags::empty() };
         if let Some(held) = self.motion.held.as_mut().filter(|_| missed > 0) {
             held.interrupt();
@@ -297,14 +299,14 @@ impl Corrector {
         self.gyros::<N>(calibration, tick, shares, counters, out);
         let per_second = 1.0 / raw.duration.as_s();
         let seen = &mut self.seen;
-        seen.sequence = raw.sequence;
-        seen.end_time = raw.end_time;
         seen.duration = raw.duration;
-        seen.missed = missed;
-        seen.mode = raw.mode;
         seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
         if let Some(felt) = felt {
             self.resolve_force(calibration, felt, counters, out);
+        } else {
+            out.delta_velocity = [0.0; 3];
+            out.accel_parity.clear();
+            (seen.specific_force, seen.accels.count) = (None, 0);
         }
         let seen = &mut self.seen;
         seen.flags = out.flags;
@@ -324,8 +326,13 @@ impl Corrector {
         self.disturb();
     }
 
-    /// The swap that is on its way at the present tick.
+    /// The swap that is on its way at the present tick: mostly none, which is all that a tick asks.
     fn slewing(&self) -> Option<Slewing<'_>> {
+        if self.slew.is_none() { None } else { self.slewing_from() }
+    }
+
+    #[cold]
+    fn slewing_from(&self) -> Option<Slewing<'_>> {
         let slew = self.slew.as_deref().filter(|_| self.slew_share > 0.0);
         slew.map(|from| Slewing { from, share: self.slew_share })
     }

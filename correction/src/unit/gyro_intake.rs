@@ -135,18 +135,17 @@ impl GyroIntake {
         if newest.sequence != last || !self.pending.is_empty() {
             return 0;
         }
-        let mut last_end_ns = newest.end_time.as_ns();
+        let mut last_end = newest.end_time;
         let goes_on = |(index, tick): &(usize, &GyroTick)| {
-            let (end_ns, duration_ns) = (tick.end_time.as_ns(), tick.duration.as_ns());
-            let (step_ns, is_later) = (end_ns.abs_diff(last_end_ns), end_ns > last_end_ns);
-            (last, last_end_ns) = (last.wrapping_add(1), end_ns);
+            let (is_later, step) = (tick.end_time > last_end, tick.end_time.since(last_end));
+            (last, last_end) = (last.wrapping_add(1), tick.end_time);
             tick.sequence == last
                 && last > 0
                 && tick.series == series
                 && is_possible(tick.duration)
                 && is_later
-                && step_ns <= MAX_STEP.as_ns().unsigned_abs()
-                && step_ns >= (duration_ns / 2).unsigned_abs()
+                && step <= MAX_STEP
+                && step >= tick.duration.half()
                 && fits(*index, tick)
         };
         ticks.iter().enumerate().take_while(goes_on).count()
@@ -164,8 +163,8 @@ impl GyroIntake {
         self.jump = None;
         self.newest = Some(Newest { sequence: last.sequence, end_time: last.end_time });
         let count = u32::try_from(run.len()).unwrap_or(u32::MAX);
-        let moved = |bits: u128| bits.checked_shl(count).unwrap_or(0);
-        self.released = moved(self.released) | moved(1).wrapping_sub(1);
+        // So many ones behind what there was.
+        self.released = self.released.wrapping_add(1).checked_shl(count).unwrap_or(0).wrapping_sub(1);
         self.last = Some(last.sequence);
     }
 

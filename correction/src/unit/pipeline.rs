@@ -95,8 +95,8 @@ impl Pipeline {
         let takeover = Takeover { now: self.last_end, since_turn_on_s, slew, drift };
         let corrector = Corrector::new(&calibration, kept, takeover);
         self.operating.calibration_changed(&calibration);
-        // Ticks without σ must not go out with that of the last one.
-        self.corrected.sigma = None;
+        // Ticks without σ and parity must not go out with those of the last one.
+        self.corrected = CorrectedTick::default();
         let kept = kept_sigma.flatten();
         let sigma = calibration.sigma.as_ref().map(|_| kept.unwrap_or_default());
         self.active = Some(Active { calibration, corrector, revision, sigma });

@@ -66,9 +66,8 @@ impl Corrector {
         out: &mut CorrectedTick,
     ) -> Option<Felt<N>> {
         let count = calibration.accels.len();
-        self.seen.specific_force = None;
-        self.seen.accels.count = 0;
-        let Some(axes) = &self.thermal.accel_axes else {
+        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
+        else {
             out.accel_flags.clear();
             return None;
         };
@@ -101,11 +100,12 @@ impl Corrector {
             (usable, flags) = (counted, found);
             let (felt, last): (_, [f64; N]) =
                 (sensed(&terms, output, patched, duration_s), *narrow(&self.last_forces));
-            forces = array::from_fn(|i| if numbers.contains(i) { felt[i] } else { last[i] });
+            let felt: [f64; N] = array::from_fn(|i| if numbers.contains(i) { felt[i] } else { last[i] });
             let taken = SensorFlags::OVERRANGE | SensorFlags::NOT_FINITE;
             let good: [f64; N] =
-                array::from_fn(|i| if flags[i].intersects(taken) { last[i] } else { forces[i] });
+                array::from_fn(|i| if flags[i].intersects(taken) { last[i] } else { felt[i] });
             put(&mut self.last_forces, good);
+            forces = felt;
             self.accel_health.note(flags);
         }
         let seen = &mut self.seen.accels;
@@ -113,17 +113,19 @@ impl Corrector {
         put(&mut seen.reading, *readings);
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
-        if self.calm.follows.squares {
-            forces = self.remove_squares(shares, forces);
-        }
-        if self.calm.follows.delays {
+        if self.calm.follows.squares | self.calm.follows.delays {
             let (mut left, mut counted) = (forces, usable);
-            self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
+            if self.calm.follows.squares {
+                self.remove_squares(shares, &mut left);
+            }
+            if self.calm.follows.delays {
+                self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
+            }
             (forces, usable) = (left, counted);
         }
         let mut felt = Felt { forces, usable, duration_s, inverse: None };
         if self.calm.follows.force & within {
-            felt.inverse = self.note_force(calibration, forces, time);
+            felt.inverse = self.note_force(orientation, forces, time);
         }
         Some(felt)
     }
@@ -134,18 +136,18 @@ impl Corrector {
     pub(super) fn resolve_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        Felt { mut forces, usable, duration_s, inverse }: Felt<N>,
+        Felt { forces, usable, duration_s, inverse }: Felt<N>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
-        if self.calm.follows.positions {
-            forces = self.remove_size_effect(calibration, out, forces);
-        }
-        let time = out.end_time;
-        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &mut self.thermal.accel_axes)
-        else {
-            return;
+        let Some(orientation) = &calibration.accel_orientation else { return };
+        let forces = if self.calm.follows.positions {
+            self.remove_size_effect(calibration, orientation, out, forces)
+        } else {
+            forces
         };
+        let Some(axes) = &mut self.thermal.accel_axes else { return };
+        let time = out.end_time;
         let sensors = orientation.sensors();
         let mut excluded = false;
         if sensors > MIN_SENSORS {

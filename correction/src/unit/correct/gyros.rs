@@ -105,7 +105,7 @@ impl Corrector {
             (drift, clamped) = self.drift_with_motion(calibration, shares, scale, readings, duration_s);
             bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
-        if reversal.is_some() | self.calm.special {
+        if reversal.is_some() || self.calm.special {
             self.servo.advance(lost, time, raw.duration);
         }
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
@@ -136,7 +136,8 @@ impl Corrector {
             let patch = (&mut patched, &calibration.gyro_limits, count);
             let (found, numbers) = self.thermal.gyro_footing.patch(time, patch, &mut counted, counters);
             (usable, flags) = (counted, found);
-            let scaled = scale.angles(patched);
+            // A copy: what is looked at lane by lane gets a place in memory.
+            let (scaled, subtrahend) = (scale.angles(patched), subtrahend);
             let before: [f64; N] = *narrow(&self.last_rates);
             increments = array::from_fn(|i| {
                 if numbers.contains(i) {
@@ -160,7 +161,6 @@ impl Corrector {
             Some((_, input)) if self.substitution.passes(&input) => {
                 let mut of_sensors = [f64::NAN; MAX_SENSORS];
                 put(&mut of_sensors, rates);
-                of_sensors.iter_mut().take(N).skip(count).for_each(|rate| *rate = f64::NAN);
                 self.substitution.pass(&input, of_sensors);
             }
             None if !self.calm.special => {}
@@ -194,11 +194,19 @@ impl Corrector {
         self.gyro_health.ticks += 1;
         if sound {
             put(&mut self.last_rates, rates);
-            return;
+        } else {
+            let copied = rates;
+            self.note_good_rates(flags, &copied);
         }
-        let before: [f64; N] = *narrow(&self.last_rates);
-        let is_valid = |lane: usize| flags[lane].contains(SensorFlags::VALID);
-        put::<N>(&mut self.last_rates, array::from_fn(|i| if is_valid(i) { rates[i] } else { before[i] }));
+    }
+
+    #[cold]
+    fn note_good_rates(&mut self, flags: [SensorFlags; MAX_SENSORS], rates: &[f64]) {
+        for ((last, rate), flags) in self.last_rates.iter_mut().zip(rates).zip(flags) {
+            if flags.contains(SensorFlags::VALID) {
+                *last = *rate;
+            }
+        }
         self.gyro_health.note(flags);
     }
 
@@ -261,10 +269,13 @@ impl Corrector {
         let orientation = &calibration.gyro_orientation;
         let axes = &mut self.thermal.gyro_axes;
         let mut excluded = false;
-        if orientation.sensors() > MIN_SENSORS && !out.flags.contains(TickFlags::INTERPOLATED) {
+        if orientation.sensors() > MIN_SENSORS {
+            out.gyro_parity.clear();
             let watched = rates;
             let watched = &watched[..orientation.sensors()];
-            excluded = axes.watch(orientation, usable, watched, (&mut out.gyro_parity, &mut out.flags));
+            if !out.flags.contains(TickFlags::INTERPOLATED) {
+                excluded = axes.watch(orientation, usable, watched, (&mut out.gyro_parity, &mut out.flags));
+            }
         }
         let (angle, trusted) = axes.resolve(orientation, usable, (&increments, None), out.end_time);
         out.delta_angle = self.slewing().map_or(angle, |slewing| {

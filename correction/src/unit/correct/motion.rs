@@ -10,11 +10,11 @@ use super::Corrector;
 use super::held::HeldBack;
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow};
-use crate::orientation::SensorMask;
+use crate::orientation::{Orientation, SensorMask, sum_of_columns};
 use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
 use crate::thermal::{Bank, Motion, MotionBanks, Shares};
 use crate::unit::slew::between;
-use crate::units::{Span, Timestamp};
+use crate::units::Timestamp;
 use crate::vector::{cross_lanes, minus, plus};
 
 /// Place of the asymmetry among the lines of a gyro's terms that follow motion.
@@ -141,7 +141,7 @@ impl Corrector {
             force: motions().any(|motion| motion.feels_force),
             curves,
             rates: curves || old.is_some() || self.thermal.motion.as_deref().is_some_and(is_asymmetric),
-            squares: motions().any(Motion::has_squares),
+            squares: motions().any(|motion| !motion.accels.is_empty()),
             positions: motions().any(|motion| motion.has_positions),
             delays: motions().any(|motion| motion.holds_back) || self.motion.held.is_some(),
         }
@@ -165,8 +165,11 @@ impl Corrector {
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     #[inline(always)]
     pub(super) fn drift_with_force<const N: usize>(&self, shares: Shares<'_>) -> [f64; N] {
-        let ([x, y, z, _], force) = (self.gyro_motion::<N>(shares), self.motion.force);
-        array::from_fn(|lane| x[lane] * force[0] + y[lane] * force[1] + z[lane] * force[2])
+        let mut drift = [0.0; N];
+        for (along, force) in self.gyro_motion::<N>(shares).iter().zip(self.motion.force) {
+            drift = array::from_fn(|lane| drift[lane] + along[lane] * force);
+        }
+        drift
     }
 
     /// Takes from the gyros' drift (rad/s) what their weights miss at the rates that they read (rad/s), before any bias is subtracted. Gives
@@ -220,29 +223,31 @@ impl Corrector {
     #[inline(always)]
     pub(super) fn note_force<const N: usize>(
         &mut self,
-        calibration: &Calibration,
+        orientation: &Orientation,
         forces: [f64; N],
         time: Timestamp,
     ) -> Option<[[f64; 4]; N]> {
-        let (orientation, axes) =
-            (calibration.accel_orientation.as_ref()?, self.thermal.accel_axes.as_mut()?);
-        let (included, inverse) = (axes.included(), axes.inverse(time));
-        let (force, trusted) = axes.resolve(orientation, included, (&forces, inverse), time);
-        if trusted {
-            self.motion.force = force;
-        }
-        inverse
+        let axes = self.thermal.accel_axes.as_mut()?;
+        let Some(inverse) = axes.inverse(time) else {
+            let felt = forces;
+            if let (force, true) = axes.resolve_some(orientation, axes.included(), &felt, time) {
+                self.motion.force = force;
+            }
+            return None;
+        };
+        self.motion.force = sum_of_columns(&inverse, &forces);
+        Some(inverse)
     }
 
     /// Takes second-order terms out of the forces that the accelerometers feel (m/s²): m = f + K2·f² has the solution
     /// f = 2m/(1 + √(1 + 4·K2·m)) next to m.
     #[inline(never)]
-    pub(super) fn remove_squares<const N: usize>(&self, shares: Shares<'_>, forces: [f64; N]) -> [f64; N] {
+    pub(super) fn remove_squares<const N: usize>(&self, shares: Shares<'_>, forces: &mut [f64; N]) {
         let [second_order] = self.accel_motion::<N>(shares);
-        array::from_fn(|lane| {
-            let root = libm::sqrt((1.0 + 4.0 * second_order[lane] * forces[lane]).max(0.0));
-            2.0 * forces[lane] / (1.0 + root)
-        })
+        for (force, second_order) in forces.iter_mut().zip(second_order) {
+            let root = libm::sqrt((1.0 + 4.0 * second_order * *force).max(0.0));
+            *force = 2.0 * *force / (1.0 + root);
+        }
     }
 
     /// Takes out what accelerometers feel for sitting elsewhere: ω × (ω × r) + α × r along the input axis.
@@ -251,8 +256,9 @@ impl Corrector {
     pub(super) fn remove_size_effect<const N: usize>(
         &mut self,
         calibration: &Calibration,
+        orientation: &Orientation,
         out: &CorrectedTick,
-        mut forces: [f64; N],
+        forces: [f64; N],
     ) -> [f64; N] {
         let (rate, acceleration) = self.turning(out);
         let slewed;
@@ -262,25 +268,16 @@ impl Corrector {
             slewed = self.positions_on_their_way(calibration);
             &slewed
         };
-        let (Some(orientation), Some(axes)) = (&calibration.accel_orientation, &self.thermal.accel_axes)
-        else {
-            return forces;
-        };
+        let Some(axes) = &self.thermal.accel_axes else { return forces };
         let axes = orientation.axes_at(axes.temperature_deg_c(out.end_time));
-        // Two lanes at a time, so that all of it stays in registers.
-        for (pair, forces) in forces.chunks_exact_mut(2).enumerate() {
-            let of = |lanes: &Lanes| [lanes[2 * pair], lanes[2 * pair + 1]];
-            let at = positions.each_ref().map(of);
-            let turned = cross_lanes(rate, &cross_lanes(rate, &at));
-            let hastened = cross_lanes(acceleration, &at);
-            let along = |axis: usize, lane: usize| {
-                axes(axis, 2 * pair + lane) * (turned[axis][lane] + hastened[axis][lane])
-            };
-            for (lane, force) in forces.iter_mut().enumerate() {
-                *force -= along(0, lane) + along(1, lane) + along(2, lane);
-            }
-        }
-        forces
+        let at = positions.each_ref().map(narrow::<N>);
+        let turned = cross_lanes(rate, at);
+        let turned = cross_lanes(rate, turned.each_ref());
+        let hastened = cross_lanes(acceleration, at);
+        let [x, y, z]: [[f64; N]; 3] = [0, 1, 2].map(|axis: usize| {
+            array::from_fn(|lane| axes(axis, lane) * (turned[axis][lane] + hastened[axis][lane]))
+        });
+        array::from_fn(|lane| forces[lane] - (x[lane] + y[lane] + z[lane]))
     }
 
     /// Where the accelerometers sit, axis by axis (m), in the middle of a swap.
@@ -301,7 +298,7 @@ impl Corrector {
             self.motion.interrupt();
             return (rate, [0.0; 3]);
         }
-        let (rate, middle) = (self.seen.angular_rate, out.end_time - Span::from_ns(out.duration.as_ns() / 2));
+        let (rate, middle) = (self.seen.angular_rate, out.end_time - out.duration.half());
         (rate, self.motion.acceleration(rate, middle))
     }
 }
