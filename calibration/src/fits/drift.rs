@@ -10,8 +10,7 @@
 //! | [`mod@fit`] | all of it for one sensor, and for all on both processor cores |
 //! | [`document`] | what the estimator is to expect: `[gyro.sensor.drift]`, as text and put into a document |
 //! | [`allan`], [`spectrum`] | Allan variances and what they show; power spectrum |
-//! | [`report`], [`page`] | tables, JSON; the HTML report |
-//! | `closing` | its part in the table of several units |
+//! | [`report`], [`page`] | verdicts, tables, JSON; charts |
 
 pub mod allan;
 pub mod columns;

@@ -149,6 +149,25 @@ fn a_channel_that_the_calibration_does_not_have_is_named_while_one_of_its_own_is
 }
 
 #[test]
+fn readings_that_the_calibration_cannot_take_are_a_fault_with_its_reason() {
+    let mut actor = actor(Sink::default().outlet());
+    let mems = Document::parse(include_str!("../../../../config/calibration/MEMS-0001.toml"), None).unwrap();
+    install(&mut actor, Arc::new(mems.calibration), [1; 8]);
+    let mut look = |sequences: std::ops::Range<u64>| {
+        for (stream, frame) in sequences.flat_map(frames) {
+            actor.receive(stream, &frame, Instant::now());
+        }
+        actor.measure_rates(Instant::now());
+        actor.status("test").faults.into_iter().find(|fault| fault.kind == "ticks_unfit")
+    };
+    assert_eq!(look(0..0), None);
+    let fault = look(0..30).expect("counts where means belong");
+    assert!(fault.first.contains("takes means, but counts come") && fault.count >= 30, "{fault:?}");
+    assert_eq!(look(0..0).map(|again| again.count), Some(fault.count));
+    assert!(look(30..40).is_some_and(|more| more.count >= fault.count + 10));
+}
+
+#[test]
 fn an_outlet_that_fails_costs_its_ticks_and_they_are_counted() {
     let mut actor = actor(Box::new(|_| Err("closed".into())));
     for (stream, frame) in (0..20).flat_map(frames) {
