@@ -142,7 +142,7 @@ impl Substitution {
         self.is_settled() && !input.restart && !self.may_switch(input)
     }
 
-    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); lanes without a sensor are not looked at.
+    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); NaN where there is no sensor.
     #[expect(clippy::inline_always, reason = "once per tick: the reading is made where it is put")]
     #[inline(always)]
     pub(crate) fn pass(&mut self, input: &TickInput, rates: Lanes) {

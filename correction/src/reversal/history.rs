@@ -22,7 +22,7 @@ pub(super) struct Reading {
     end_time: Timestamp,
     /// Measured duration, above zero.
     pub(super) duration: Span,
-    /// Mean rate per sensor (rad/s); NaN where there is no number.
+    /// Mean rate per sensor (rad/s); NaN where there is no sensor or no number.
     rates: Lanes,
 }
 
