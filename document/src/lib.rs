@@ -40,6 +40,7 @@
 pub mod escape;
 pub mod file;
 mod kind;
+mod looks;
 mod number;
 mod problem;
 mod reader;

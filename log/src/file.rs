@@ -8,32 +8,19 @@ use std::path::{Path, PathBuf, absolute};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use isotherm_document::file::read_bounded;
-use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use crate::error::Error;
 
 /// Reads a mapping, calibration document or scenario; a log given in its place must not fill the memory.
 ///
 /// # Errors
-/// [`Error::File`].
-pub fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
+/// [`Error::File`], also where it is too long or not UTF-8.
+pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
     let failed = |source| Error::file(path, action, source);
     let bytes = read_bounded(path).map_err(failed)?;
-    if bytes.len() > MAX_DOCUMENT_BYTES {
-        let words = format!("longer than {MAX_DOCUMENT_BYTES} bytes: is it the right file?");
-        return Err(failed(io::Error::other(words)));
-    }
-    Ok(bytes)
-}
-
-/// The same as text.
-///
-/// # Errors
-/// [`Error::File`], also where it is not UTF-8.
-pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
-    String::from_utf8(read_small(path, action)?).map_err(|error| {
-        let words = format!("not UTF-8 at byte {}: is it the right file?", error.utf8_error().valid_up_to());
-        Error::file(path, action, io::Error::other(words))
+    let text = isotherm_document::file::text(&bytes, "").map(ToOwned::to_owned);
+    text.map_err(|problems| {
+        failed(io::Error::other(problems.into_iter().map(|problem| problem.message).collect::<String>()))
     })
 }
 
@@ -243,11 +230,9 @@ mod tests {
 
     #[test]
     fn a_small_file_is_small() {
-        let error = read_small(Path::new("/dev/zero"), "read the mapping").unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?"
-        );
+        let error = read_small_text(Path::new("/dev/zero"), "read the mapping").unwrap_err().to_string();
+        let words = "is longer than 1048576 bytes: is it the right file, saved as UTF-8?";
+        assert_eq!(error, format!("/dev/zero: cannot read the mapping: {words}"));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
+use isotherm_protocol::document::Document;
 use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::status::{Output, Status};
@@ -269,9 +270,9 @@ impl UnitPlot {
     }
 
     /// Notes a document's nominal scale.
-    pub(super) fn learn(&mut self, document: &str) {
-        if let Some(nominal) = Nominal::of(document) {
-            self.nominal = Some(nominal);
+    fn learn(&mut self, document: &str) {
+        if let Ok(parsed) = Document::parse(document, None) {
+            self.nominal = Some(Nominal::of(&parsed.document));
         }
     }
 

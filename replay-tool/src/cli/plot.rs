@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{read_small_text, refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::offline::read_document;
 use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
@@ -130,8 +131,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     refuse_overwriting(&args.out, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     refuse_replacing(&args.out, args.overwrite)?;
     let calibration = args.calibration.as_deref();
-    let calibration =
-        calibration.map(|path| read_small_text(path, "read the calibration document")).transpose()?;
+    let calibration = calibration.map(read_document).transpose()?;
 
     let unnamed = UnitId::new(UNNAMED).ok();
     let first_units = args.log.units()?;

@@ -8,7 +8,7 @@ use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_log::diff::DiffOptions;
 use isotherm_log::error::few;
-use isotherm_log::file::read_small;
+use isotherm_log::file::read_small_text;
 use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::replica::{Changes, Outlines, scan};
@@ -73,7 +73,7 @@ fn make(
     let inputs: Vec<_> = args.log.inputs().into_iter().chain(args.calibration.iter().cloned()).collect();
     let mut sink = Sink::open(args, &units, &inputs)?;
     for path in documents {
-        sink.document(read_small(path, "read the calibration document")?)?;
+        sink.document(read_small_text(path, "read the calibration document")?.into_bytes())?;
     }
     // A journal is followed from its beginning; what comes before the part is corrected and not given out.
     let by_journal = plans.iter().any(|plan| matches!(plan.basis, Basis::Journal { .. }));
