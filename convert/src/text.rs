@@ -13,10 +13,10 @@ use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::HealthBatch;
 
-use super::output::{Place, Sink, folder};
+use super::output::{Place, folder};
 use super::{Conversion, Converted, Found, Outcome, Target, Written};
 use isotherm_log::error::Error;
-use isotherm_log::file::Partial;
+use isotherm_log::file::{Partial, Sink};
 use isotherm_log::offline::rows::{write_header, write_tick};
 
 pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {

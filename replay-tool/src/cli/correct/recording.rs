@@ -14,10 +14,10 @@ use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::replica::{Changes, Outlines, scan};
 use isotherm_protocol::key::UnitId;
 
-use super::CorrectArgs;
 use super::report::Report;
 use super::sink::Sink;
-use crate::cli::{print, show};
+use super::{CorrectArgs, print_summary};
+use crate::cli::show;
 use crate::error::Error;
 
 /// Gyro ticks in a message of a text log.
@@ -100,12 +100,7 @@ fn make(
     sink.finish(&args.log.log)?;
     let report = Report::new(&units, &log);
     report.warn();
-    let text = if args.json { show::json(&report) } else { report.human() };
-    if args.out.as_deref() == Some(Path::new("-")) {
-        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
-    } else {
-        print(text.as_bytes())?;
-    }
+    print_summary(args, &if args.json { show::json(&report) } else { report.human() })?;
     Ok(Exit::of_loss(report.lost_data()))
 }
 
