@@ -158,14 +158,15 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let state = open_store(settings.state.as_deref())?;
     let awaited = settings.zenoh.session.awaited()?;
     let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
-    let session = tokio::select! {
-        session = open_session(settings.zenoh.session.clone(), &awaited) => session?,
-        // There is nothing to flush.
-        _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
+    let start = async {
+        let session = open_session(settings.zenoh.session.clone(), &awaited).await?;
+        let locators = isotherm_bus::locators(&session);
+        let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
+        Ok::<_, ServiceError>((service, locators))
     };
-    let locators = isotherm_bus::locators(&session);
-    let service = tokio::select! {
-        service = start_on(settings, Calibrations::default(), state, metrics, session) => service?,
+    let (service, locators) = tokio::select! {
+        started = start => started?,
+        // There is nothing to flush.
         _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
     };
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
@@ -201,8 +202,7 @@ async fn open_session(options: SessionOptions, awaited: &str) -> Result<Session,
             Ok(Err(join)) => return Err(ServiceError::Thread(std::io::Error::other(join))),
             Err(_) => {
                 let waited_s = start.elapsed().as_secs();
-                tracing::warn!(waited_s, "nothing is corrected yet: waiting for {awaited}");
-                supervisor::status(&format!("nothing is corrected yet: waiting for {awaited}"));
+                tracing::warn!(waited_s, "{}", supervisor::waiting_for(awaited));
                 pause = FURTHER_WORDS;
             }
         }
