@@ -173,7 +173,7 @@ pub(super) async fn run(args: &CommandArgs) -> Result<Exit, ConsoleError> {
 fn answer(reply: &CommandReply, json: bool) -> Exit {
     let exit = if reply.accepted { Exit::Ok } else { Exit::Failed };
     if json {
-        return print(&(serde_json::to_string_pretty(reply).unwrap_or_default() + "\n"), exit);
+        return print(&isotherm_cli::json(reply), exit);
     }
     if reply.accepted {
         return print(&(in_words(reply) + "\n"), exit);

@@ -198,7 +198,7 @@ fn tell(reply: &SwapReply, name: Option<&str>) {
 fn result(reply: &SwapReply, json: bool) -> Exit {
     let exit = if reply.outcome == SwapOutcome::Refused { Exit::BadConfiguration } else { Exit::Ok };
     if json {
-        return print(&(serde_json::to_string_pretty(reply).unwrap_or_default() + "\n"), exit);
+        return print(&isotherm_cli::json(reply), exit);
     }
     // A service before 0.2 says the proposed digest in the place of the one in force.
     let digest = short(reply.proposed.as_ref().unwrap_or(&reply.digest));

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use isotherm_bus::SessionOptions;
-use isotherm_cli::{Exit, failed, print_within, say};
+use isotherm_cli::{Exit, print_within};
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
 
@@ -80,18 +80,8 @@ pub async fn run(args: ServeArgs) -> Exit {
             tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
-        Err(error) => refused(&error),
+        Err(error) => error.tell(),
     }
-}
-
-/// Says what is wrong, every problem on a line of its own.
-fn refused(error: &ServiceError) -> Exit {
-    if let ServiceError::Configuration(problems) = error {
-        for problem in problems {
-            say(problem);
-        }
-    }
-    failed(error, error.exit())
 }
 
 /// Says what was done.

@@ -226,7 +226,7 @@ fn work(status: &Status, add: &mut impl FnMut(Level, String)) {
 }
 
 /// When a change takes effect.
-pub(super) fn schedule(schedule: Schedule) -> String {
+pub(crate) fn schedule(schedule: Schedule) -> String {
     match schedule {
         Schedule::NextTick => "from the next tick on".to_owned(),
         Schedule::Sequence(sequence) => format!("from tick {sequence} on"),

@@ -2,13 +2,13 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use isotherm_document::few;
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, StoreStatus,
 };
 
 use super::manager::Worker;
-use super::start::first_of;
 
 /// Kind of the standing problem of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";
@@ -100,7 +100,7 @@ impl Worker {
             .records
             .iter()
             .filter(|(_, record)| record.untrusted.is_some())
-            .map(|(unit, _)| unit)
+            .map(|(unit, _)| unit.as_str())
             .collect();
         let count = untrusted.len() as u64;
         let untrusted = (count > 0).then(|| Standing {
@@ -108,7 +108,7 @@ impl Worker {
             count,
             words: format!(
                 "restored without a signature that is now trusted: {}; `isotherm status UNIT` says what to do",
-                first_of(untrusted.into_iter())
+                few(untrusted)
             ),
         });
         let unwritten = self.folder.unwritten();

@@ -6,8 +6,8 @@ use std::thread::available_parallelism;
 
 use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
+use isotherm_document::few;
 use isotherm_log::diff::DiffOptions;
-use isotherm_log::error::few;
 use isotherm_log::file::read_small_text;
 use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
 use isotherm_log::part::{LogFiles, Part};

@@ -2,14 +2,14 @@
 
 use super::{Report, show};
 use crate::play::{Acknowledge, PlayOptions, PlayReport, UnitReport};
-use isotherm_log::error::few;
+use isotherm_document::few;
 use isotherm_log::source::LogReport;
 
 /// What whoever reads only the table must know.
 pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
     let of = |chosen: fn(&UnitReport) -> bool| {
-        let units: Vec<_> = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).collect();
-        (!units.is_empty()).then(|| few(&units))
+        let mut units = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).peekable();
+        units.peek().is_some().then(|| few(units))
     };
     let uncalibrated =
         of(|unit| unit.returned.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {

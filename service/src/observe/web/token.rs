@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Exit, failed, print, say};
+use isotherm_cli::{Exit, print, say};
 use isotherm_protocol::digest::Digest;
 
 use crate::ServiceError;
@@ -57,12 +57,7 @@ pub fn show(args: &WebArgs) -> Exit {
             };
             print(&(text + "\n"), Exit::Ok)
         }
-        Err(error) => {
-            if let ServiceError::Configuration(problems) = &error {
-                problems.iter().for_each(say);
-            }
-            failed(&error, error.exit())
-        }
+        Err(error) => error.tell(),
     }
 }
 
