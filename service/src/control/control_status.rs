@@ -86,7 +86,8 @@ impl Worker {
 
     /// What is wrong until somebody does something about it.
     fn problems(&self) -> Vec<Standing> {
-        let lost = self.lost.iter().map(|words| Standing {
+        let lost = self.lost.as_deref().or(self.store.write_failure());
+        let lost = lost.into_iter().map(|words| Standing {
             kind: "state_folder",
             count: 1,
             words: format!("swaps are refused, the state folder cannot be written: {words}"),

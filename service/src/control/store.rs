@@ -68,6 +68,8 @@ pub struct Store {
     prune_due: bool,
     /// Lines of the audit file were lost.
     is_damaged: bool,
+    /// Why the last write failed, until one works.
+    write_failure: Option<String>,
 }
 
 /// Where the entries go.
@@ -127,11 +129,9 @@ impl Store {
             opened.lost = lost.collect();
         }
         let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
-        let full_bytes = FULL_BYTES;
         let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
-        let (stuck, prune_due, written) = (false, true, BTreeMap::new());
-        let store =
-            Self { journal, documents, overlays, index, written, full_bytes, stuck, prune_due, is_damaged };
+        let prune_due = true;
+        let store = Self { journal, documents, overlays, index, prune_due, is_damaged, ..Self::in_memory() };
         Ok((store, opened))
     }
 
@@ -148,6 +148,7 @@ impl Store {
             stuck: false,
             prune_due: false,
             is_damaged: false,
+            write_failure: None,
         }
     }
 
@@ -165,8 +166,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::TooLong`], [`StoreError::Lost`] or [`StoreError::Write`].
     pub fn put_document(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
-        self.check_held()?;
-        self.documents.put(bytes)
+        self.write(|store| store.documents.put(bytes))
     }
 
     /// Keeps calibration documents, each under its digest: all of them are on the disk when this returns. Much sooner than
@@ -175,8 +175,7 @@ impl Store {
     /// # Errors
     /// As [`Self::put_document`]; some may be kept then.
     pub fn put_documents(&mut self, documents: &[(Digest, CompressedBytes)]) -> Result<(), StoreError> {
-        self.check_held()?;
-        self.documents.put_all(documents)
+        self.write(|store| store.documents.put_all(documents))
     }
 
     /// Keeps an overlay, as [`Self::put_document`] does a document.
@@ -184,8 +183,7 @@ impl Store {
     /// # Errors
     /// The same.
     pub fn put_overlay(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
-        self.check_held()?;
-        self.overlays.put(bytes)
+        self.write(|store| store.overlays.put(bytes))
     }
 
     /// Writes an entry down and gives its number; it is on the disk when this returns. Texts and lists are cut to their
@@ -214,8 +212,15 @@ impl Store {
         time: SystemTime,
         entries: impl IntoIterator<Item = (Option<&'e UnitId>, &'e str, AuditEvent)>,
     ) -> Result<u64, StoreError> {
-        let entries: Vec<_> = entries.into_iter().collect();
-        self.check_held()?;
+        let entries = entries.into_iter().collect();
+        self.write(|store| store.write_entries(time, entries))
+    }
+
+    fn write_entries(
+        &mut self,
+        time: SystemTime,
+        entries: Vec<(Option<&UnitId>, &str, AuditEvent)>,
+    ) -> Result<u64, StoreError> {
         entries.iter().try_for_each(|(_, _, event)| self.check_stored(event))?;
         self.begin_anew_if_due(time)?;
         let revision = |event: &AuditEvent| match event {
@@ -253,6 +258,22 @@ impl Store {
             Mark::note_entry(path, self.index.next_number.saturating_sub(1));
         }
         Ok(self.index.next_number.saturating_sub(1))
+    }
+
+    /// Why nothing can be written: the last write failed, as on a full disk.
+    pub(crate) fn write_failure(&self) -> Option<&str> {
+        self.write_failure.as_deref()
+    }
+
+    /// Writes into the folder that was opened, and remembers that it failed until the next time that works.
+    fn write<T>(&mut self, write: impl FnOnce(&mut Self) -> Result<T, StoreError>) -> Result<T, StoreError> {
+        let written = self.check_held().and_then(|()| write(self));
+        match &written {
+            Ok(_) => self.write_failure = None,
+            Err(error @ StoreError::Write { .. }) => self.write_failure = Some(error.to_string()),
+            Err(_) => {}
+        }
+        written
     }
 
     /// Refuses what would not survive a restart.
