@@ -14,7 +14,7 @@ use super::document::Document;
 use super::file::read_all;
 use super::manager::Worker;
 use super::revision::{Calibrations, Record, Revision};
-use crate::control::watch::{Known, documents_in};
+use crate::control::watch::{Known, files_in};
 use crate::signing::check_signature;
 
 /// What was found of each file of the folder, for its watcher.
@@ -85,7 +85,7 @@ impl Worker {
         let Some(folder) = self.folder.path().map(Path::to_owned) else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
-        for (file, read) in read_all(&documents_in(&folder)?) {
+        for (file, read) in read_all(&files_in(&folder, "toml")?) {
             match read {
                 Ok(read) => {
                     found.insert(file.clone(), Known::Content(read.digest.0));
