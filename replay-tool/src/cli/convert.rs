@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_cli::Exit;
 use isotherm_log::offline::read_document;
-use isotherm_log::source::LogReport;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
@@ -202,23 +201,5 @@ fn human(outcome: &convert::Outcome) -> String {
             text += &show::table(&rows);
         }
     }
-    text + &reading(&outcome.log)
-}
-
-/// What reading the log came to, in words.
-fn reading(report: &LogReport) -> String {
-    match report {
-        LogReport::Text(report) => show::reading(report),
-        LogReport::Recording(report) => {
-            let mut text = String::new();
-            if let Some(words) = &report.cut_short {
-                text = format!("{words}; everything before it has been used\n");
-            }
-            if report.foreign_messages > 0 {
-                text += &report.foreign_messages.to_string();
-                text += " messages of other programs were skipped\n";
-            }
-            text
-        }
-    }
+    text + &show::reading(&outcome.log)
 }

@@ -130,5 +130,5 @@ fn human(report: &Report<'_>) -> String {
         ("mean rate (°/h)", summary.mean_rate_deg_per_h, 4),
         ("mean specific force (m/s²)", summary.mean_specific_force_m_per_s2, 6),
     ];
-    show::table(&rows) + &show::axes(&means) + &show::reading(report.log)
+    show::table(&rows) + &show::axes(&means) + &show::rows(report.log)
 }
