@@ -10,6 +10,8 @@ use isotherm_protocol::service_status::{
 
 use super::manager::Worker;
 
+/// Kind of the standing problem of a state folder that cannot be written.
+pub(crate) const STATE_FOLDER: &str = "state_folder";
 /// Kind of the standing problem of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";
 
@@ -28,6 +30,13 @@ pub(crate) struct Posted {
     pub(crate) accepted: u64,
     /// Swaps refused since the start.
     pub(crate) refused: u64,
+}
+
+impl Posted {
+    /// The problem of a kind, if there is one.
+    pub(crate) fn standing(&self, kind: &str) -> Option<&Standing> {
+        self.problems.iter().find(|problem| problem.kind == kind)
+    }
 }
 
 /// Something that is wrong until somebody does something about it.
@@ -86,9 +95,8 @@ impl Worker {
 
     /// What is wrong until somebody does something about it.
     fn problems(&self) -> Vec<Standing> {
-        let lost = self.lost.as_deref().or(self.store.write_failure());
-        let lost = lost.into_iter().map(|words| Standing {
-            kind: "state_folder",
+        let lost = self.lost.iter().map(|words| Standing {
+            kind: STATE_FOLDER,
             count: 1,
             words: format!("swaps are refused, the state folder cannot be written: {words}"),
         });

@@ -23,6 +23,7 @@ mod log;
 mod opened;
 mod read;
 mod retention;
+mod trial;
 mod verify;
 
 pub use error::StoreError;
@@ -31,7 +32,7 @@ pub use verify::{Break, Verification, verify};
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Instant, SystemTime};
 
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::chain::Chain;
@@ -70,6 +71,8 @@ pub struct Store {
     is_damaged: bool,
     /// Why the last write failed, until one works.
     write_failure: Option<String>,
+    /// When it is tried whether one works.
+    next_trial: Instant,
 }
 
 /// Where the entries go.
@@ -149,6 +152,7 @@ impl Store {
             prune_due: false,
             is_damaged: false,
             write_failure: None,
+            next_trial: Instant::now(),
         }
     }
 
@@ -260,22 +264,6 @@ impl Store {
         Ok(self.index.next_number.saturating_sub(1))
     }
 
-    /// Why nothing can be written: the last write failed, as on a full disk.
-    pub(crate) fn write_failure(&self) -> Option<&str> {
-        self.write_failure.as_deref()
-    }
-
-    /// Writes into the folder that was opened, and remembers that it failed until the next time that works.
-    fn write<T>(&mut self, write: impl FnOnce(&mut Self) -> Result<T, StoreError>) -> Result<T, StoreError> {
-        let written = self.check_held().and_then(|()| write(self));
-        match &written {
-            Ok(_) => self.write_failure = None,
-            Err(error @ StoreError::Write { .. }) => self.write_failure = Some(error.to_string()),
-            Err(_) => {}
-        }
-        written
-    }
-
     /// Refuses what would not survive a restart.
     fn check_stored(&self, event: &AuditEvent) -> Result<(), StoreError> {
         let AuditEvent::Accepted(accepted) = event else { return Ok(()) };
@@ -312,6 +300,7 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let lost = match self.check_held() {
             Ok(()) => {
+                self.try_if_due(Instant::now());
                 self.prune_if_due(time);
                 return Ok(false);
             }
@@ -335,6 +324,7 @@ impl Store {
         self.index.next_number = next_number;
         [self.documents, self.overlays] = shelves;
         self.journal = Journal::Folder { path, log, lock, mark };
+        self.write_failure = None;
         Ok(true)
     }
 
