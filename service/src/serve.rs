@@ -92,18 +92,9 @@ fn report(totals: &Totals, json: bool) -> Exit {
 
 /// The configuration with the command line's options put over it.
 fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
-    let mut settings = match &args.config {
-        Some(path) => Settings::load(path)?,
-        None => Settings::default(),
-    };
-    if let Some(folder) = &args.calibrations {
-        settings.calibrations = Some(folder.clone());
-    }
-    if let Some(folder) = &args.state {
-        settings.state = Some(folder.clone());
-    }
-    if args.metrics.is_some() {
-        settings.metrics.listen = args.metrics;
+    let mut settings = Settings::given(args.config.as_deref(), args.state.as_ref(), args.metrics)?;
+    if args.calibrations.is_some() {
+        settings.calibrations.clone_from(&args.calibrations);
     }
     settings.web.enabled |= args.web;
     settings.listen_for_web();

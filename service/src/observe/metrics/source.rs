@@ -158,14 +158,9 @@ impl Source {
         }
     }
 
-    /// The same, of a service whose receive path is felt.
-    pub(crate) fn feeling(self, pulse: Arc<Pulse>) -> Self {
-        Self { pulse: Some(pulse), ..self }
-    }
-
-    /// The same, of a service that asks for receipts.
-    pub(crate) fn asking(self, subscribers: Arc<Subscribers>) -> Self {
-        Self { subscribers, ..self }
+    /// The same, of a service whose receive path is felt, and that asks for receipts.
+    pub(crate) fn at_work(self, pulse: Arc<Pulse>, subscribers: Arc<Subscribers>) -> Self {
+        Self { pulse: Some(pulse), subscribers, ..self }
     }
 
     /// Whether the receive path is alive, as far as it is felt.

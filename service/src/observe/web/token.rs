@@ -62,13 +62,7 @@ pub fn show(args: &WebArgs) -> Exit {
 }
 
 fn address(args: &WebArgs) -> Result<(String, String), ServiceError> {
-    let mut settings = args.config.as_deref().map_or_else(|| Ok(Settings::default()), Settings::load)?;
-    if args.state.is_some() {
-        settings.state.clone_from(&args.state);
-    }
-    if args.metrics.is_some() {
-        settings.metrics.listen = args.metrics;
-    }
+    let mut settings = Settings::given(args.config.as_deref(), args.state.as_ref(), args.metrics)?;
     settings.web.enabled = true;
     settings.listen_for_web();
     let Some(file) = file(&settings) else {
