@@ -164,9 +164,9 @@ impl Conversion {
     fn provenance(&self) -> Vec<(String, String)> {
         let mut words = vec![("isotherm".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         words.extend(self.sources.iter().cloned());
-        if self.part.start.as_ns() > 0 || self.part.end.is_some() {
-            words.push(("start_s".to_owned(), self.part.start.as_s().to_string()));
-            words.extend(self.part.end.map(|end| ("end_s".to_owned(), end.as_s().to_string())));
+        if let Some((start, end)) = self.part.window() {
+            words.push(("start_s".to_owned(), start.as_s().to_string()));
+            words.extend(end.map(|end| ("end_s".to_owned(), end.as_s().to_string())));
         }
         words
     }
