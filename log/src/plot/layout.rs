@@ -165,10 +165,7 @@ impl Drawing {
             self.raw(log, gyro, scale, what, &mut parts.rates, &mut parts.unplaced, &mut parts.flags);
         }
         if let Some(accel) = shown.accel {
-            let scale = match (nominal.and_then(|nominal| nominal.accel.clone()), accel.kind) {
-                (Some(scale), _) => Some(scale),
-                (None, _) => None,
-            };
+            let scale = nominal.and_then(|nominal| nominal.accel.clone());
             let what = ("accelerometer", "specific force along", "m/s²");
             self.raw(log, accel, scale, what, &mut parts.forces, &mut parts.unplaced, &mut parts.flags);
         }
