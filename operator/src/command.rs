@@ -197,7 +197,11 @@ fn in_words(reply: &CommandReply) -> String {
 }
 
 /// Gives one command.
-async fn give(client: &Client, unit: &UnitId, order: &CommandOrder) -> Result<CommandReply, ConsoleError> {
+pub(super) async fn give(
+    client: &Client,
+    unit: &UnitId,
+    order: &CommandOrder,
+) -> Result<CommandReply, ConsoleError> {
     let order = serde_json::to_vec(order).unwrap_or_default();
     client.json(&client.order(key::command(unit)), "", Some(&order)).await
 }

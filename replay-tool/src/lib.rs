@@ -17,3 +17,4 @@ pub mod pace;
 pub mod play;
 pub mod record;
 pub mod simulated;
+mod stop;
