@@ -152,12 +152,17 @@ impl Settings {
     }
 
     /// The configuration of a file, else the default, with what the command line puts in its place.
-    pub(crate) fn given(
+    ///
+    /// # Errors
+    /// As [`Settings::load`].
+    pub fn given(
         config: Option<&Path>,
+        calibrations: Option<&PathBuf>,
         state: Option<&PathBuf>,
         metrics: Option<SocketAddr>,
     ) -> Result<Self, ServiceError> {
         let mut settings = config.map_or_else(|| Ok(Self::default()), Self::load)?;
+        settings.calibrations = calibrations.cloned().or(settings.calibrations);
         settings.state = state.cloned().or(settings.state);
         settings.metrics.listen = metrics.or(settings.metrics.listen);
         Ok(settings)

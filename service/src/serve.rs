@@ -92,10 +92,8 @@ fn report(totals: &Totals, json: bool) -> Exit {
 
 /// The configuration with the command line's options put over it.
 fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
-    let mut settings = Settings::given(args.config.as_deref(), args.state.as_ref(), args.metrics)?;
-    if args.calibrations.is_some() {
-        settings.calibrations.clone_from(&args.calibrations);
-    }
+    let (calibrations, state) = (args.calibrations.as_ref(), args.state.as_ref());
+    let mut settings = Settings::given(args.config.as_deref(), calibrations, state, args.metrics)?;
     settings.web.enabled |= args.web;
     settings.listen_for_web();
     let (configured, given) = (&mut settings.zenoh.session, &args.session);

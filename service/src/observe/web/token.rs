@@ -62,7 +62,7 @@ pub fn show(args: &WebArgs) -> Exit {
 }
 
 fn address(args: &WebArgs) -> Result<(String, String), ServiceError> {
-    let mut settings = Settings::given(args.config.as_deref(), args.state.as_ref(), args.metrics)?;
+    let mut settings = Settings::given(args.config.as_deref(), None, args.state.as_ref(), args.metrics)?;
     settings.web.enabled = true;
     settings.listen_for_web();
     let Some(file) = file(&settings) else {
