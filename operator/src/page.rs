@@ -31,7 +31,7 @@ pub use figure::fit;
 pub(crate) use figure::{deg_per_h, of, short};
 pub use pairs::{of_unit, pairs, said as said_of_pairs};
 pub(crate) use remark::schedule;
-pub use remark::{Level, is_running, knows_rates, state_word};
+pub use remark::{Level, Remark, is_running, knows_rates, state_word};
 pub use services::{services, tally};
 pub use sheet::sheet;
 pub use units::{applied, channel_in_view, range, units};
@@ -63,7 +63,7 @@ impl<'a> Unit<'a> {
 
     /// What is to be noticed, the gravest first.
     #[must_use]
-    pub fn remarks(&self) -> Vec<remark::Remark> {
+    pub fn remarks(&self) -> Vec<Remark> {
         remark::remarks(self)
     }
 

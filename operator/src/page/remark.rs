@@ -59,7 +59,7 @@ impl Level {
 }
 
 /// Something to be noticed.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
     /// How grave it is.
     pub level: Level,
