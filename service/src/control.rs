@@ -44,4 +44,5 @@ pub(crate) use carry::Carried;
 pub(crate) use control_status::{ControlStatus, Posted, STATE_FOLDER, UNWRITTEN};
 pub(crate) use manager::{SwapManager, Worker};
 pub(crate) use queue::{Asked, Inbox, Notice, Origin, PreLaunchEnd};
+pub(crate) use request::is_asked;
 pub(crate) use start::Found;
