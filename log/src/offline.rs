@@ -142,6 +142,13 @@ impl Offline {
         self.stream.next_frame(frame).is_some()
     }
 
+    /// Takes the corrected ticks that are ready, as rows or frames.
+    pub fn give_out(&mut self, form: Form) -> Output {
+        let mut output = Output::default();
+        output.give_out(&mut self.stream, form);
+        output
+    }
+
     /// What was refused or passed over, in words for whoever reads only the summary.
     #[must_use]
     pub fn troubles(&self) -> Vec<String> {

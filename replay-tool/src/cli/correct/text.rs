@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use isotherm_cli::{Bar, Exit};
-use isotherm_log::offline::rows::{write_frame, write_tick};
 use isotherm_log::offline::sums::{Summary, Sums};
-use isotherm_log::offline::{Form, Made, Offline, Output, load_calibration};
+use isotherm_log::offline::{Form, Made, Offline, load_calibration};
 use isotherm_log::text::ReadReport;
 use serde::Serialize;
 
@@ -98,19 +97,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
 /// Takes what is ready and sums it up.
 fn take(unit: &mut Offline, sums: &mut Sums, form: Form) -> Made {
     unit.peek().for_each(|tick| sums.add(tick));
-    let mut output = Output::default();
-    // Writing to a vector does not fail.
-    if form == Form::Wire {
-        let mut frame = Vec::new();
-        while unit.next_frame(&mut frame) {
-            let _ = write_frame(&mut output.bytes, &frame);
-        }
-    } else {
-        let ticks = unit.take();
-        let rows = if form == Form::Csv { ticks.as_slice() } else { &[] };
-        let _ = rows.iter().try_for_each(|tick| write_tick(&mut output.bytes, tick));
-    }
-    vec![(0, output)]
+    vec![(0, unit.give_out(form))]
 }
 
 /// The summary as tables.
