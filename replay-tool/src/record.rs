@@ -41,7 +41,7 @@ use services::{await_service, follow_services, open, start_asker};
 use writer::{FileWriter, Told};
 
 pub use queue::TopicCount;
-pub use report::{EndedBy, RecordReport};
+pub use report::{Done, EndedBy, RecordReport};
 pub use topics::{TopicFilter, is_first, key_expressions};
 pub use writer::Bounds;
 
@@ -104,7 +104,7 @@ pub struct RecordOptions {
 /// # Errors
 /// [`Error::Usage`] and [`Error::Log`] where the file cannot be begun, [`Error::Bus`] where the session cannot be opened or
 /// no service answers, [`Error::Stopped`] where it was stopped before it began. A disk that is full later is no error: see
-/// [`RecordReport::failure`].
+/// [`Done::failure`].
 pub async fn record(
     options: &RecordOptions,
     mut watch: impl FnMut(&RecordReport),
