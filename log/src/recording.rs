@@ -38,7 +38,7 @@ pub use place::is_being_written;
 pub use reader::{RecordingReader, RecordingReport};
 pub(crate) use record::chunk_records;
 pub use recover::recover;
-pub use writer::{RecordingOptions, RecordingWriter};
+pub use writer::{RecordingOptions, RecordingWriter, io_error};
 
 /// Encoding of the messages: frames of `docs/wire.md`.
 pub const MESSAGE_ENCODING: &str = "isotherm";

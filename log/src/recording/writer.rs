@@ -311,9 +311,14 @@ fn enter(
 
 /// An error of the library as one of this crate.
 pub(super) fn failed(path: &Path, source: McapError) -> Error {
-    let source = match source {
+    Error::file(path, "write the recording", io_error(source))
+}
+
+/// An error of the library as one of the system.
+#[must_use]
+pub fn io_error(source: McapError) -> io::Error {
+    match source {
         McapError::Io(source) => source,
         other => io::Error::other(other),
-    };
-    Error::file(path, "write the recording", source)
+    }
 }
