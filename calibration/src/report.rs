@@ -34,7 +34,7 @@ pub use curve::{Curve, Judged, Rest, judge, output_unit};
 pub use figures::{alike, counted, fixed, per_deg_c, short, six, superscript, table, within};
 pub(crate) use page::bars;
 pub use sigma::Sigmas;
-pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
+pub use verdict::{FLAT, SAME_SHARE, Verdict, residuals};
 
 pub(crate) use words::{grouped, gyros, of_logs, together};
 
@@ -54,13 +54,6 @@ pub struct Coefficient {
     pub value: f64,
     /// Its standard error, where the fit knows one.
     pub sigma: Option<f64>,
-}
-
-impl Coefficient {
-    /// A coefficient with its standard error.
-    pub fn new(name: impl Into<String>, unit: impl Into<String>, value: f64, sigma: Option<f64>) -> Self {
-        Self { name: name.into(), unit: unit.into(), value, sigma }
-    }
 }
 
 /// What a command has to say; lists that do not apply stay empty.
@@ -120,7 +113,8 @@ impl Report {
         value: f64,
         sigma: impl Into<Option<f64>>,
     ) {
-        self.coefficients.push(Coefficient::new(name, unit, value, sigma.into()));
+        let (name, unit, sigma) = (name.into(), unit.into(), sigma.into());
+        self.coefficients.push(Coefficient { name, unit, value, sigma });
     }
 
     /// Adds a table unless it has no rows.

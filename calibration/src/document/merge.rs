@@ -7,7 +7,7 @@
 //! user decides.
 
 mod check;
-mod origin;
+pub(crate) mod origin;
 mod sections;
 #[cfg(test)]
 mod tests;

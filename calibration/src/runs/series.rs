@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
+use isotherm_correction::sample::{OutputKind, TemperatureReading};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::key::UnitId;
@@ -15,8 +15,6 @@ use crate::numbers::seconds;
 /// Ticks of one kind of sensor, as columns of equal length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ticks {
-    /// Sequence numbers.
-    pub sequence: Vec<u64>,
     /// Ends (ns on the producer's clock).
     pub end_ns: Vec<i64>,
     /// Durations (s).
@@ -52,8 +50,6 @@ pub struct Series {
     pub unit: UnitId,
     /// Gyro ticks.
     pub gyros: Ticks,
-    /// Lasing mode by gyro tick: +1, −1, or 0 where the producer states none.
-    pub mode: Vec<i8>,
     /// Accelerometer ticks.
     pub accels: Ticks,
     /// Temperature channels by name.
@@ -68,7 +64,6 @@ impl Series {
         Self {
             unit,
             gyros: Ticks::default(),
-            mode: Vec::new(),
             accels: Ticks::default(),
             temperatures: BTreeMap::new(),
             bad_frames: 0,
@@ -94,27 +89,17 @@ impl Series {
     /// As [`Series::take_message`].
     pub fn take_event(&mut self, event: &LogEvent) -> Result<(), Error> {
         match event {
-            LogEvent::Gyro { output, tick } => self.gyro(*output, tick)?,
-            LogEvent::Accel { output, tick } => self.accel(*output, tick)?,
+            LogEvent::Gyro { output, tick } => {
+                let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
+                self.gyros.push(*output, tick.sequence, lasts, &tick.readings)?;
+            }
+            LogEvent::Accel { output, tick } => {
+                let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
+                self.accels.push(*output, tick.sequence, lasts, &tick.readings)?;
+            }
             LogEvent::Temperature(reading) => self.temperature(reading),
         }
         Ok(())
-    }
-
-    fn gyro(&mut self, output: OutputKind, tick: &GyroTick) -> Result<(), Error> {
-        let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
-        self.gyros.push(output, tick.sequence, (end, duration), &tick.readings)?;
-        self.mode.push(match tick.mode {
-            Some(LasingMode::Plus) => 1,
-            Some(LasingMode::Minus) => -1,
-            None => 0,
-        });
-        Ok(())
-    }
-
-    fn accel(&mut self, output: OutputKind, tick: &AccelTick) -> Result<(), Error> {
-        let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
-        self.accels.push(output, tick.sequence, (end, duration), &tick.readings)
     }
 
     fn temperature(&mut self, reading: &TemperatureReading) {
@@ -162,7 +147,6 @@ impl Ticks {
                 self.output.unwrap_or(output),
             )));
         }
-        self.sequence.push(sequence);
         self.end_ns.push(end_ns);
         self.duration_s.push(duration_s);
         self.readings.iter_mut().zip(readings).for_each(|(column, reading)| column.push(*reading));

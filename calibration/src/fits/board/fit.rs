@@ -12,7 +12,7 @@ use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
 use crate::numbers::{dot, hull};
-use crate::report::{Curve, Figure, Judged, Report, Rest, Sigmas, fixed, judge, per_deg_c, short};
+use crate::report::{Curve, Judged, Report, Rest, Sigmas, fixed, judge, per_deg_c, short};
 use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
@@ -113,7 +113,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     let mut report =
         Report::new("Ratio of the accelerometers' board over its temperature", &wanted.base.unit);
     report.residuals = curves;
-    report.verdicts = verdicts.into_iter().map(|verdict| verdict.stated_as(Figure::Rms)).collect();
+    report.verdicts = verdicts;
     report.warnings = troubled;
     tell(&mut report, (wanted, sensors, &mains), &found);
     Ok(Made { written, found, report })

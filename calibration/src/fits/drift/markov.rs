@@ -63,8 +63,6 @@ pub struct Fit {
     pub beta: Vec<f64>,
     /// Covariance of β.
     pub covariance: DMatrix<f64>,
-    /// −2·ln of the restricted likelihood, up to a constant of the columns.
-    pub minus_two_log: f64,
     /// −2·ln of the plain likelihood, which fits with other things beside the noise can be compared by.
     pub minus_two_log_of_readings: f64,
     /// Middle and half length of the log (h).
@@ -179,7 +177,6 @@ impl Fit {
             white,
             beta: solution.beta.iter().copied().collect(),
             covariance: &solution.inverse * variance,
-            minus_two_log: solution.minus_two_log(),
             minus_two_log_of_readings: solution.minus_two_log_of_readings(),
             span_h: problem.span_h,
             noise,

@@ -1,4 +1,4 @@
-//! The HTML report of a log's noise and drift.
+//! Charts of a log's noise and drift.
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 

@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
 use crate::numbers::{Size, hull, median};
-use crate::report::{Figure, Verdict, of_logs};
+use crate::report::{Verdict, of_logs};
 use crate::runs::{Run, Watch};
 
 /// Rounds in which the Earth's turning and the fit settle.
@@ -328,7 +328,6 @@ fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
             let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
             let outside = (!judged.is_empty()).then(|| both(judged));
             let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
-            let verdict = verdict.stated_as(Figure::Rms);
             if verdict.accepted {
                 return verdict;
             }

@@ -16,7 +16,7 @@ use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::Size;
-use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
+use crate::report::{Curve, FLAT, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
 
@@ -255,7 +255,6 @@ impl Outcome {
     /// Gives the verdicts their reasons.
     fn say(&self, verdicts: &mut [Verdict]) {
         for verdict in verdicts {
-            verdict.figure = Figure::Rms;
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
             let Some((sensor, _, found)) = mine else { continue };
             if let Some(why) = &found.refused {
