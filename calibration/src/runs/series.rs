@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{OutputKind, TemperatureReading};
-use isotherm_log::message::{Message, Topic};
+use isotherm_correction::sample::OutputKind;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::key::UnitId;
 
-use super::readings;
+use super::{Fed, readings};
 
 use crate::error::Error;
 use crate::numbers::seconds;
@@ -70,24 +69,19 @@ impl Series {
         }
     }
 
-    /// Takes what a message has of raw readings; a frame that cannot be read is counted.
+    /// Takes an event, or the readings of a frame; a frame that cannot be read is counted.
     ///
     /// # Errors
     /// [`Error::Refused`] where ticks are of another instrument than those before.
-    pub fn take_message(&mut self, message: &Message) -> Result<(), Error> {
-        let Topic::Raw(_, stream) = &message.topic else { return Ok(()) };
-        let Some(readings) = readings(*stream, &message.frame) else {
-            self.bad_frames += 1;
-            return Ok(());
+    pub(super) fn take(&mut self, fed: &Fed<'_>) -> Result<(), Error> {
+        let event = match fed {
+            Fed::Event(event) => event,
+            Fed::Frame(stream, frame) => {
+                let events = readings(*stream, frame);
+                self.bad_frames += u64::from(events.is_none());
+                return events.iter().flatten().try_for_each(|event| self.take(&Fed::Event(event)));
+            }
         };
-        readings.iter().try_for_each(|event| self.take_event(event))
-    }
-
-    /// Takes one event.
-    ///
-    /// # Errors
-    /// As [`Series::take_message`].
-    pub fn take_event(&mut self, event: &LogEvent) -> Result<(), Error> {
         match event {
             LogEvent::Gyro { output, tick } => {
                 let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
@@ -97,15 +91,13 @@ impl Series {
                 let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
                 self.accels.push(*output, tick.sequence, lasts, &tick.readings)?;
             }
-            LogEvent::Temperature(reading) => self.temperature(reading),
+            LogEvent::Temperature(reading) => {
+                let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
+                channel.time_ns.push(reading.time.as_ns());
+                channel.raw.push(reading.raw);
+            }
         }
         Ok(())
-    }
-
-    fn temperature(&mut self, reading: &TemperatureReading) {
-        let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
-        channel.time_ns.push(reading.time.as_ns());
-        channel.raw.push(reading.raw);
     }
 }
 

@@ -4,12 +4,10 @@ use std::collections::VecDeque;
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick, OutputKind};
 use isotherm_correction::unit::{Unit, UnitSettings};
-use isotherm_log::message::Topic;
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::key::RawStream;
 
-use super::{Fed, Piece, Run, Troubles, Watch, readings};
+use super::{Fed, Run, Troubles, Watch};
 use crate::error::Error;
 
 impl Run {
@@ -22,17 +20,9 @@ impl Run {
         watch: impl Watch,
         mut each: impl FnMut(OutputKind, &GyroTick),
     ) -> Result<(), Error> {
-        self.walk(watch, |piece| {
-            match piece {
-                Piece::Event(LogEvent::Gyro { output, tick }) => each(*output, tick),
-                Piece::Message(message) if matches!(message.topic, Topic::Raw(_, RawStream::Gyro)) => {
-                    for event in readings(RawStream::Gyro, &message.frame).iter().flatten() {
-                        if let LogEvent::Gyro { output, tick } = event {
-                            each(*output, tick);
-                        }
-                    }
-                }
-                Piece::Event(_) | Piece::Message(_) => {}
+        self.walk(watch, |fed| {
+            if let Fed::Event(LogEvent::Gyro { output, tick }) = fed {
+                each(*output, tick);
             }
             Ok(())
         })
