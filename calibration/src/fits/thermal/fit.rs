@@ -4,7 +4,7 @@ use isotherm_protocol::document::Document;
 
 use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
-use super::columns::{Columns, Term};
+use super::columns::{Columns, Effect};
 use super::filter::{choose_filter, longest_run_s};
 use super::joint::{CUBIC, Found, Joint, rivals};
 use super::known::{Known, channel, histories};
@@ -226,7 +226,8 @@ fn step_by_step(
     } else {
         vec![lags(&[(3.0 * grid).max(10.0)], 0).terms]
     };
-    columns.make(&(0..=sequential::degree(history).max(CUBIC)).map(Term::Static).collect::<Vec<_>>())?;
+    let degree = sequential::degree(history).max(CUBIC);
+    columns.make(&Effect::Static.powers(0..=degree).collect::<Vec<_>>())?;
     for terms in &steps {
         columns.make(terms)?;
     }
