@@ -7,6 +7,7 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::fixture::simulated;
 use crate::numbers::Size;
+use crate::runs::Run;
 use crate::runs::table::Rows;
 
 fn size(peak_to_peak: f64) -> Size {
@@ -110,8 +111,8 @@ fn judging_a_run_shows_what_the_terms_do() {
     let after = Written::read(Path::new(path)).unwrap();
     let before = Written::of(&after.document.nominal()).unwrap();
     let judged = |rest: Rest| {
-        let pair = (&before.loaded, &after.loaded);
-        judge(&run, Sample::Out, pair, (&after.document, &rest), Rows::valid(5.0), ()).unwrap()
+        let of_run = |_, _: &Run| Ok((rest, Rows::valid(5.0), ""));
+        judge((&[], std::slice::from_ref(&run)), [&before, &after], of_run, ()).unwrap()
     };
     let means = judged(Rest::default());
     let names: Vec<&str> = means.curves.iter().map(|curve| curve.of.as_str()).collect();

@@ -1,7 +1,7 @@
 //! The whole procedure: look at the switches, gather, fit, write, judge.
 
 use isotherm_correction::earth::Place;
-use isotherm_protocol::document::{Document, Sample};
+use isotherm_protocol::document::Document;
 
 use super::cells::{Cut, gather};
 use super::checks;
@@ -239,16 +239,10 @@ impl Made {
         watch: &mut dyn Watch,
     ) -> Result<Vec<Residual>, Error> {
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
-        let about = (&self.written.document, &Rest { rate_deg_per_h, ..Rest::default() });
-        let documents = (&self.before.loaded, &self.written.loaded);
+        let rest = Rest { rate_deg_per_h, ..Rest::default() };
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };
-        let runs = wanted.runs.iter().map(|run| (run, Sample::In));
-        let runs = runs.chain(wanted.judge.iter().map(|run| (run, Sample::Out)));
-        let mut residuals = Vec::new();
-        for (run, sample) in runs {
-            let curves = judge(run, sample, documents, about, rows, &mut *watch)?.curves;
-            residuals.extend(curves.into_iter().filter(|curve| curve.of.starts_with("gyro")));
-        }
-        Ok(residuals)
+        let documents = [&self.before, &self.written];
+        let of_run = |_, _: &Run| Ok((rest, rows, "gyro"));
+        Ok(judge((wanted.runs, wanted.judge), documents, of_run, watch)?.curves)
     }
 }
