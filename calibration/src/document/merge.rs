@@ -23,7 +23,7 @@ use crate::document::show::terms::tree;
 use crate::error::Error;
 use crate::report::Report;
 use check::{check, same_unit};
-use sections::{Sections, build, group, sections};
+use sections::{Sections, group, sections, with};
 
 /// Which part decides over keys that begin so.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,7 +76,7 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
     let words = |found: Vec<isotherm_protocol::document::Problem>| {
         Error::Document(found.iter().map(ToString::to_string).collect())
     };
-    let tree = build(&tree(&base.document)?, &sections);
+    let tree = with(tree(&base.document)?, &old, &sections);
     let mut document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
     document.origin = Some(origin::origin(base, parts, &from)?);
     let taken = from.into_iter().filter(|(key, _)| sections.contains_key(key)).collect();
