@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Sample};
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path as Movement;
 use isotherm_simulator::presets::{mems_chamber, zeeman_rest};
-use isotherm_simulator::{Scenario, Simulation};
 use serde_json::Value;
 
 use crate::command::{calibrate, fails, shipped, succeeds, words};
-use crate::simulated_logs::record_events;
+use crate::simulated_logs::{events_after, record_events};
 
 /// Scenarios one after the other, as one recording; each starts where the last one ended.
 pub(crate) fn record(path: &Path, scenarios: &[Scenario]) {
@@ -22,22 +22,12 @@ pub(crate) fn record(path: &Path, scenarios: &[Scenario]) {
 
 /// What the unit reads through scenarios one after the other.
 pub(crate) fn events(scenarios: &[Scenario]) -> Vec<LogEvent> {
-    let (mut events, mut offset) = (Vec::new(), 0);
+    let (mut all, mut ticks) = (Vec::new(), 0);
     for scenario in scenarios {
-        let mut next = offset;
-        for mut step in Simulation::new(scenario).unwrap() {
-            events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
-            step.gyro.sequence += offset;
-            next = step.gyro.sequence + 1;
-            if let (Some(output), Some(mut tick)) = (scenario.instrument.accel_output_kind(), step.accel) {
-                tick.sequence += offset;
-                events.push(LogEvent::Accel { output, tick });
-            }
-            events.push(LogEvent::Gyro { output: scenario.instrument.gyros.output_kind(), tick: step.gyro });
-        }
-        offset = next;
+        all.extend(events_after(scenario, ticks));
+        ticks = all.iter().filter(|event| matches!(event, LogEvent::Gyro { .. })).count() as u64;
     }
-    events
+    all
 }
 
 /// The Zeeman unit through a chamber programme at ten ticks a second, with its accelerometers.

@@ -6,9 +6,10 @@ use isotherm_protocol::document::Sample;
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 
-use super::fixture::{base, cycle, events, fitted, place, run, scenario, truth, wanted, zeeman};
+use super::fixture::{base, cycle, fitted, place, run, scenario, truth, wanted, zeeman};
 use crate::fits::modes::fit::{Made, Wanted, make};
 use crate::fits::modes::model::{Asked, deg_per_h};
+use crate::fixture::events;
 
 /// Normalised errors of all constants over some seeds: how many runs have all within three standard errors, and the
 /// errors by constant.
