@@ -173,10 +173,12 @@ impl Report {
         self.verdicts.iter().all(|verdict| verdict.accepted)
     }
 
-    /// The refusals, for the end of a command.
-    pub fn refusals(&self) -> Vec<String> {
+    /// What is refused, for the end of a command, which has printed why.
+    pub fn refusals(&self) -> Option<String> {
         let refused = self.verdicts.iter().filter(|verdict| !verdict.accepted);
-        refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
+        let refused: Vec<&str> = refused.map(|verdict| verdict.of.as_str()).collect();
+        (!refused.is_empty())
+            .then(|| format!("{}: {}: refused, for the reasons above", self.unit, refused.join(", ")))
     }
 
     /// What an engineer decides by, as the lines of a terminal.

@@ -103,7 +103,8 @@ pub fn validate(
         report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
         if log.known {
             report.warnings.push(format!(
-                "{} is one of the logs that the document was made from: it is in sample",
+                "{} is one of the logs that the document was made from: it counts as in sample, whichever part of it was \
+                 fitted",
                 run.name
             ));
         }

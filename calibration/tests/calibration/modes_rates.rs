@@ -283,9 +283,11 @@ fn rates_are_judged_on_steps_that_the_fit_has_not_seen() {
 
     // What makes the judging steps worse is refused, and the gyro keeps what it had.
     let (code, report, errors) = words(&calibrate(&refs(&fit(&other, &bad))));
-    assert!(code == Some(1) && errors.contains("gyro z: the errors of its steps grow"), "{errors}");
+    assert!(code == Some(1) && errors.contains("gyro z: refused"), "{errors}");
     let report: Value = serde_json::from_str(&report).unwrap();
-    assert_eq!(report["verdicts"][2]["accepted"], false);
+    let refused = &report["verdicts"][2];
+    assert_eq!(refused["accepted"], false);
+    assert!(refused["reason"].as_str().unwrap().contains("the errors of its steps grow"), "{refused}");
     let kept = document(&bad).gyro.sensor[2].increment_weight_rad_per_rad;
     assert_eq!(kept, Some(1.0), "the nominal weight");
     assert_ne!(made.gyro.sensor[2].increment_weight_rad_per_rad, kept);
