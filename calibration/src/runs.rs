@@ -21,10 +21,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::sample::{CorrectedTick, GyroTick};
-use isotherm_correction::unit::{MAX_TICK_DURATION, Unit, UnitSettings};
+use isotherm_correction::sample::GyroTick;
+use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_log::message::Topic;
-use isotherm_log::offline::{Loaded, Offline};
+use isotherm_log::offline::Offline;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
 use isotherm_log::source::Log;
@@ -169,61 +169,6 @@ impl Run {
             return Err(Error::Refused(reasons));
         }
         Ok(series)
-    }
-
-    /// Corrects the run with a calibration, as `isotherm-replay correct --ignore-journal` does; `each` sees every
-    /// corrected tick, and the unit as it stands behind it.
-    ///
-    /// # Errors
-    /// [`Error::Log`] where the log cannot be read; [`Error::Refused`] where nothing comes out.
-    pub fn correct(
-        &self,
-        loaded: &Loaded,
-        watch: impl Watch,
-        each: impl FnMut(&CorrectedTick, &Unit),
-    ) -> Result<Troubles, Error> {
-        self.correct_beside(loaded, watch, |_| (), each)
-    }
-
-    /// The same, and its readings as columns beside, from one reading of the log. The columns end where [`Run::series`] would refuse
-    /// them; the correction says what is wrong with the log.
-    ///
-    /// # Errors
-    /// As [`Run::correct`]; the columns are there all the same.
-    pub fn correct_with_series(
-        &self,
-        loaded: &Loaded,
-        watch: impl Watch,
-        each: impl FnMut(&CorrectedTick, &Unit),
-    ) -> (Series, Result<Troubles, Error>) {
-        let (mut series, mut takes) = (Series::empty(self.unit.clone()), true);
-        let beside = |fed: &Fed<'_>| takes = takes && series.take(fed).is_ok();
-        let troubles = self.correct_beside(loaded, watch, beside, each);
-        (series, troubles)
-    }
-
-    fn correct_beside(
-        &self,
-        loaded: &Loaded,
-        watch: impl Watch,
-        beside: impl FnMut(&Fed<'_>),
-        mut each: impl FnMut(&CorrectedTick, &Unit),
-    ) -> Result<Troubles, Error> {
-        let mut unit = Offline::new(loaded, UnitSettings::default());
-        let mut count = 0_u64;
-        let mut give_out = |unit: &mut Offline| {
-            for tick in &unit.take() {
-                count += 1;
-                each(tick, unit.unit());
-            }
-        };
-        self.feed(&loaded.calibration, watch, beside, |fed| {
-            fed.give(&mut unit);
-            give_out(&mut unit);
-        })?;
-        unit.finish();
-        give_out(&mut unit);
-        self.judge_troubles(count, unit.troubles())
     }
 
     /// That its recording was cut short, and where, once that was found by reading it.

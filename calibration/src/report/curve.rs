@@ -64,7 +64,7 @@ pub type Judging = (Rest, Rows, &'static str);
 /// averaged over windows. `of_run` is told the run's number among all.
 ///
 /// # Errors
-/// As [`Run::correct`].
+/// As [`Run::correct_together`].
 pub fn judge(
     (runs, unseen): (&[Run], &[Run]),
     [before, after]: [&Written; 2],

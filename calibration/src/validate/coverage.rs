@@ -1,5 +1,7 @@
 //! What of the fitted range of temperature the logs cover, and how often it was left.
 
+use std::slice;
+
 use isotherm_correction::sample::SensorFlags;
 use isotherm_pages::Table;
 
@@ -73,7 +75,8 @@ impl Coverage {
     /// Goes through a run tick by tick.
     pub(super) fn count(&mut self, run: &Run, written: &Written, watch: impl Watch) -> Result<(), Error> {
         let (channels, gyros, accels) = (&mut self.channels, &mut self.gyros, &mut self.accels);
-        run.correct(&written.loaded, watch, |tick, unit| {
+        run.correct_together(slice::from_ref(&written.loaded), watch, |_, ticks, unit| {
+            let Some(tick) = ticks.first() else { return };
             let flagged = gyros.iter_mut().zip(&tick.gyro_flags);
             for (sensor, flags) in flagged.chain(accels.iter_mut().zip(&tick.accel_flags)) {
                 sensor.ticks += 1;

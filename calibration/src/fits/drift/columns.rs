@@ -125,10 +125,10 @@ impl Columns {
     /// The raw readings decide first: behind a correction a dead sensor still shows a little of the others.
     ///
     /// # Errors
-    /// As [`Run::correct`] and [`checks::raw`].
+    /// As [`Run::correct_together`] and [`checks::raw`].
     pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
         let mut columns = Self::empty(loaded.unit.clone(), kind);
-        let (series, troubles) = run.correct_with_series(loaded, watch, |tick, _| columns.push(tick));
+        let (series, troubles) = run.correct_with_series(loaded, watch, |tick| columns.push(tick));
         columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
         columns.notes = troubles?;
         if run.unit != loaded.unit {

@@ -44,7 +44,7 @@ impl Track {
     /// Reads a run, once as it stands and once through the service's own code.
     ///
     /// # Errors
-    /// As [`Run::series`] and [`Run::correct`]; [`Error::Refused`] without accelerometers.
+    /// As [`Run::series`] and [`Run::correct_together`]; [`Error::Refused`] without accelerometers.
     pub fn of(run: &Run, loaded: &Loaded, mut watch: impl Watch) -> Result<Self, Error> {
         let series = run.series(&mut watch)?;
         let accels = &series.accels;

@@ -52,7 +52,7 @@ pub struct Binned {
 /// Bins a run.
 ///
 /// # Errors
-/// As [`Run::correct`].
+/// As [`Run::correct_together`].
 pub fn binned(run: &Run, document: &Document, watch: &mut dyn Watch) -> Result<Binned, Error> {
     let sensors = document.gyro.sensor.len();
     let mut whole = Binned::default();
@@ -130,7 +130,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// in them.
 ///
 /// # Errors
-/// As [`Run::correct`].
+/// As [`Run::correct_together`].
 pub fn means_within(
     run: &Run,
     loaded: &Loaded,
