@@ -127,10 +127,14 @@ fn put(tree: &mut Table, key: &str, value: Option<Value>) {
         entries.push(Value::Table(Table::from_iter([("name".to_owned(), name.into())])));
         entries.len() - 1
     });
-    match (term, value, &mut entries[at]) {
-        (Some(term), value, Value::Table(entry)) => set(entry, term, value),
-        (_, Some(value), entry) => *entry = value,
-        (_, None, _) => drop(entries.remove(at)),
+    match (term, value) {
+        (Some(term), value) => {
+            if let Value::Table(entry) = &mut entries[at] {
+                set(entry, term, value);
+            }
+        }
+        (None, Some(value)) => entries[at] = value,
+        (None, None) => drop(entries.remove(at)),
     }
 }
 
