@@ -62,21 +62,8 @@ pub(super) struct PositionsArgs {
     /// Level error of the stand (″, one sigma)
     #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 60.0, value_parser = above_0)]
     levelling: f64,
-    /// Window of the search for still poses (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
-    window: f64,
-    /// Largest variance of a still window, relative to the log's quietest fifth
-    #[arg(long, hide_short_help = true, value_name = "FACTOR", default_value_t = 4.0, value_parser = above_0)]
-    threshold: f64,
-    /// Rate above which the unit turns (°/s)
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 0.2, value_parser = above_0)]
-    still_rate: f64,
-    /// Time to leave out at the beginning of each pose (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 2.0, value_parser = from_0)]
-    settle: f64,
-    /// Shortest pose (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = above_0)]
-    least: f64,
+    #[command(flatten)]
+    limits: StillLimits,
     /// Temperature channels that the axes follow by their mean (default: the document's, else the accelerometers')
     #[arg(long, value_name = "CHANNEL")]
     channel: Vec<String>,
@@ -123,13 +110,7 @@ impl PositionsArgs {
         let settings = Settings {
             plan,
             gravity,
-            limits: StillLimits {
-                window_s: self.window,
-                factor: self.threshold,
-                rate_deg_per_s: self.still_rate,
-                least_s: self.least,
-                settle_s: self.settle,
-            },
+            limits: self.limits,
             times: self.times.as_deref().map(Times::read).transpose()?,
             positioning_rad: self.positioning.hypot(self.run_out) / ARCSEC_PER_RAD,
             levelling_rad: self.levelling / ARCSEC_PER_RAD,

@@ -33,7 +33,7 @@ pub(super) fn groups(sensors: usize) -> Vec<[usize; 3]> {
 pub(super) fn transition_ticks(wanted: &Wanted<'_>, switches: &Switches, warnings: &mut Vec<String>) -> u8 {
     let tick = Span::from_s(switches.tick_s);
     let stated = wanted.base.mode_reversal.as_ref().map(|reversal| reversal.ticks(tick));
-    if let Some(given) = wanted.transition_ticks {
+    if let Some(given) = wanted.asked.transition_ticks {
         return given;
     }
     let seen = u8::try_from(switches.transition_ticks()).unwrap_or(u8::MAX);

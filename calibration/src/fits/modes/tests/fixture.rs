@@ -70,16 +70,7 @@ pub(super) fn run(scenario: &Scenario) -> Run {
 }
 
 pub(super) fn wanted<'a>(runs: &'a [Run], base: &'a Document) -> Wanted<'a> {
-    Wanted {
-        runs,
-        judge: &[],
-        base,
-        place: Some(place()),
-        asked: Asked::default(),
-        transition_ticks: None,
-        settle_s: None,
-        reference_deg_c: None,
-    }
+    Wanted { runs, judge: &[], base, place: Some(place()), asked: Asked::default() }
 }
 
 pub(super) fn fitted(scenario: &Scenario, base: &Document) -> Made {
