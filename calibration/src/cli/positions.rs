@@ -12,7 +12,7 @@ use super::units::Logs;
 use crate::document::{About, Fitted, Written};
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
-use crate::fits::positions::budget::{ARCSEC_PER_RAD, Budget};
+use crate::fits::positions::budget::Budget;
 use crate::fits::positions::document::{complete, range};
 use crate::fits::positions::fit::{Analysis, Settings, analyse, positions};
 use crate::fits::positions::judged::{Judgement, judge};
@@ -24,6 +24,7 @@ use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
 use crate::limits::{above_0, from_0};
+use crate::numbers::ARCSEC_PER_RAD;
 use crate::runs::{Run, Watch};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several

@@ -5,10 +5,8 @@ use isotherm_protocol::document::{Document, Orientation};
 use super::parts;
 use super::terms::Term;
 use crate::document::accelerometers;
+use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Report, short};
-
-/// Seconds of arc in a radian.
-pub(crate) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 
 /// Unit, sensors, and how good it is by its own account.
 pub(super) fn words(document: &Document) -> String {
@@ -115,7 +113,7 @@ fn axes<P>(names: Vec<String>, orientation: &Orientation<P>) -> Vec<Vec<String>>
         let slopes = orientation.thermal.as_ref().and_then(|t| t.slopes_arcsec_per_deg_c.get(index));
         let slope = slopes.map_or_else(|| "–".to_owned(), |slope| slope.map(short).join(", "));
         // Off by more than 10° it stands askew on purpose.
-        let angle = libm::atan2(rest, largest) * ARCSEC;
+        let angle = libm::atan2(rest, largest) * ARCSEC_PER_RAD;
         let off = if angle < 36_000.0 { format!("{angle:.1}") } else { format!("{:.2}°", angle / 3600.0) };
         let mut cells = vec![name];
         cells.extend(row.iter().map(|part| format!("{part:.7}")));

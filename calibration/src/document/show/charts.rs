@@ -2,11 +2,10 @@
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
-use super::about::ARCSEC;
 use super::terms::Term;
 use super::{Sum, lasing_mode, places, ramp_words, spoken, steady, sums};
 use crate::document::Written;
-use crate::numbers::{Size, once_each};
+use crate::numbers::{ARCSEC_PER_RAD, Size, once_each};
 use crate::report::Report;
 
 /// Points of a curve.
@@ -86,7 +85,7 @@ fn axes(written: &Written, range: [f64; 2]) -> Vec<Panel> {
                 let row = rows(*x).get(index).copied().unwrap_or([f64::NAN; 3]);
                 let from = centre.get(index).copied().unwrap_or([f64::NAN; 3]);
                 let squares = row.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-                (*x, libm::sqrt(squares) * ARCSEC)
+                (*x, libm::sqrt(squares) * ARCSEC_PER_RAD)
             };
             Series::line(name, ink, at.iter().map(turned))
         });

@@ -73,9 +73,6 @@ pub fn unnamed() -> Result<UnitId, Error> {
     Ok(unit_id("unnamed")?)
 }
 
-/// ″ per count and s in °/h: 1 ″/s is 1 °/h.
-const DEG_PER_H_IN_ARCSEC_PER_S: f64 = 1.0;
-
 impl Columns {
     /// From raw ticks of a kind; counts of gyros need the angle that one stands for (″).
     ///
@@ -101,7 +98,8 @@ impl Columns {
                     "the {sensor} readings are counts: give {weight}a calibration document with --calibration"
                 )));
             }
-            (Some(OutputKind::Counts), weight) => weight.map(|weight| weight * DEG_PER_H_IN_ARCSEC_PER_S),
+            // ″ per count and s are °/h: 1 ″/s is 1 °/h.
+            (Some(OutputKind::Counts), weight) => weight,
             (Some(OutputKind::Mean), _) => None,
         };
         let names: Vec<String> =

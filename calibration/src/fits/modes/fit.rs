@@ -3,13 +3,13 @@
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
-use super::cells::{Cut, gather};
+use super::cells::{Cut, gather, groups};
 use super::checks;
 use super::dither;
 use super::document::{self, base_constant, reference_of};
 
 use super::model::{Asked, Given, GyroFit, fit};
-use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, transition_ticks, window_s};
+use super::prepare::{check, earth_of, earth_rate, gaps, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
 use super::switches::Switches;
 use super::{temperatures, units};

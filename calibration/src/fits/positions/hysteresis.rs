@@ -2,14 +2,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::budget::ARCSEC_PER_RAD;
 use super::doubts::{ACCIDENT, survival};
 use super::model::{Degrees, SMALL, Taken};
 use super::pose::Pose;
 use super::solve::{Fit, Positions};
 use crate::finding::AccelKind;
 use crate::lsq::linear;
-use crate::numbers::real;
+use crate::numbers::{ARCSEC_PER_RAD, real};
 
 /// The axes at one temperature, before and after others were visited.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,6 @@
 use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::budget::ARCSEC_PER_RAD;
 use super::charts::{across, axes_chart, bend, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
@@ -13,6 +12,7 @@ use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
 use crate::document::accelerometers;
+use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Curve, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six};
 
 /// A set of judged positions with the names of its runs.

@@ -107,7 +107,10 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         }
         gyros = (0..sensors)
             .map(|sensor| {
-                solve(&points(wanted, &runs, &rates, sensor, walk[sensor]), axes_of(wanted.base, sensor))
+                solve(
+                    &points(wanted, &runs, &rates, sensor, walk[sensor]),
+                    row(wanted.base, sensor, f64::NAN),
+                )
             })
             .collect();
         for (sensor, found) in gyros.iter().enumerate() {
@@ -130,7 +133,7 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     if let Some(over) = &over_temperature {
         for (sensor, found) in gyros.iter_mut().enumerate() {
             let points = over.at_reference(wanted, (&runs, &rates), sensor, &walk);
-            *found = solve(&points, axes_of(wanted.base, sensor));
+            *found = solve(&points, row(wanted.base, sensor, f64::NAN));
         }
     }
     let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
@@ -286,10 +289,6 @@ impl Made {
         let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
         hull(ends).map(widened)
     }
-}
-
-fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
-    row(base, sensor, f64::NAN)
 }
 
 /// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.

@@ -11,11 +11,10 @@ use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
 use crate::axes::AXES;
 use crate::document::{accelerometers, rows, tidy};
-use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
-use crate::numbers::{Size, norm, unit};
+use crate::numbers::{ARCSEC_PER_RAD, Size, norm, unit};
 use crate::report::{Curve, Report, SAME_SHARE, Sigmas, Verdict, counted, fixed, output_unit, short, six};
 
 /// Times by which the rms may grow in poses that the fit has not seen.
