@@ -139,9 +139,7 @@ impl PositionsArgs {
         let document = complete(&base.document, &analysis, settings.gravity);
         let before = Written::of(&before(&base.document, &analysis, settings.gravity, work.base.is_some()))?;
         let after = Written::of(&document)?;
-        let inside: Vec<(Pose, usize)> =
-            analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
-        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], watch)?;
+        let inside = judged(settings, &analysis, &analysis.poses, runs, [&before, &after], watch)?;
         let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], watch)?;
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
