@@ -31,7 +31,7 @@ use serde_json::{Value, json};
 
 pub use batch::{Batch, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
-pub use figures::{alike, counted, fixed, per_deg_c, short, six, superscript, table, within};
+pub use figures::{alike, counted, fixed, or_dash, per_deg_c, short, six, superscript, table, within};
 pub(crate) use page::bars;
 pub use sigma::Sigmas;
 pub use verdict::{FLAT, SAME_SHARE, Verdict, residuals};
@@ -232,13 +232,12 @@ impl Report {
             let Coefficient { name, unit, value, sigma } = coefficient;
             let known = sigma.filter(|sigma| sigma.is_finite());
             let ratio = known.filter(|sigma| *sigma > 0.0).map(|sigma| value.abs() / sigma);
-            let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
             vec![
                 (index + 1).to_string(),
                 name.clone(),
                 stated(*value, known),
-                or_dash(known),
-                or_dash(ratio),
+                or_dash(known.map(short)),
+                or_dash(ratio.map(short)),
                 unit.clone(),
             ]
         };

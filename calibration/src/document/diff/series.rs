@@ -9,7 +9,7 @@ use super::{BEYOND, Changes, changes};
 use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::once_each;
-use crate::report::{Report, short};
+use crate::report::{Report, or_dash, short};
 
 /// The changes from each document to the next, and from the first to the last.
 #[derive(Debug, Clone)]
@@ -89,8 +89,7 @@ impl Series {
 
 /// A row of a table; what did not change is a dash.
 fn row(of: &str, cells: impl Iterator<Item = Option<String>>) -> Vec<String> {
-    let cells = cells.map(|cell| cell.unwrap_or_else(|| "–".to_owned()));
-    std::iter::once(of.to_owned()).chain(cells).collect()
+    std::iter::once(of.to_owned()).chain(cells.map(or_dash)).collect()
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
-use crate::report::{Report, short};
+use crate::report::{Report, or_dash, short};
 
 /// Entries of an origin that are shown one by one.
 const MOST_ABOUT: usize = 12;
@@ -109,7 +109,7 @@ impl Changes {
             let mut cells = vec![axis.of.clone()];
             cells.extend(axis.change_arcsec.into_iter().zip(axis.sigma_arcsec).map(cosine));
             cells.push(plus_minus(axis.turned_arcsec, axis.turned_sigma_arcsec, tenths));
-            cells.push(axis.significance.map_or_else(|| "–".to_owned(), tenths));
+            cells.push(or_dash(axis.significance.map(tenths)));
             cells.push(tenths(axis.largest_arcsec));
             cells.push(
                 match axis.significance {
@@ -145,9 +145,8 @@ impl Changes {
 
     fn entries_table(&self, sheet: &mut Report) {
         let about = |key: &str| ["origin", "note", "created"].iter().any(|about| key.starts_with(about));
-        let or_dash = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
         let row = |entry: &isotherm_protocol::control::DocumentChange| {
-            vec![entry.key.clone(), or_dash(&entry.before), or_dash(&entry.after)]
+            vec![entry.key.clone(), or_dash(entry.before.clone()), or_dash(entry.after.clone())]
         };
         let matter = self.entries.iter().filter(|entry| !about(&entry.key)).map(row);
         sheet.table("Entries that differ", ["key", "before", "after"], matter);

@@ -4,7 +4,7 @@ use isotherm_protocol::document::{Document, Measure, Residual, Sample};
 use toml::Table;
 
 use crate::document::merge::origin::Part;
-use crate::report::{Report, short};
+use crate::report::{Report, or_dash, short};
 
 /// Most entries of a list that are named.
 const NAMED: usize = 4;
@@ -28,7 +28,6 @@ pub(super) fn tables(sheet: &mut Report, document: &Document) {
     let details = document.origin.as_ref().and_then(|origin| origin.details.as_ref());
     let parts = parts(details, "");
     let row = |(name, part): &(String, Part)| {
-        let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
         vec![
             name.clone(),
             or_dash(part.origin.method.clone()),
@@ -74,6 +73,6 @@ pub(super) fn of_residual(residual: &Residual) -> Vec<String> {
     vec![
         format!("{}, {measure}, {sample}", residual.of),
         pair(residual.rms_before, residual.rms_after),
-        peaks.map_or_else(|| "–".to_owned(), |(before, after)| pair(before, after)),
+        or_dash(peaks.map(|(before, after)| pair(before, after))),
     ]
 }
