@@ -1,7 +1,5 @@
 //! Vectors in case axes.
 
-use core::array;
-
 use serde::{Deserialize, Serialize};
 
 /// Sum of two vectors.
@@ -22,13 +20,6 @@ pub(crate) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 /// Vector product of two vectors.
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// Vector products of one vector with many, whose axes are lanes.
-#[inline]
-pub(crate) fn cross_lanes<const N: usize>(a: [f64; 3], b: [&[f64; N]; 3]) -> [[f64; N]; 3] {
-    let part = |i: usize, j: usize| array::from_fn(|lane| a[i] * b[j][lane] - a[j] * b[i][lane]);
-    [part(1, 2), part(2, 0), part(0, 1)]
 }
 
 /// Mean of a vector over time.

@@ -44,4 +44,4 @@ pub(crate) use carry::Carried;
 pub(crate) use control_status::{ControlStatus, Posted, UNWRITTEN};
 pub(crate) use manager::{SwapManager, Worker};
 pub(crate) use queue::{Asked, Inbox, Notice, Origin, PreLaunchEnd};
-pub(crate) use start::Found;
+pub(crate) use start::{Found, first_of};

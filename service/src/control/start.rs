@@ -167,7 +167,7 @@ impl Worker {
 }
 
 /// The first few units, and how many more there are.
-pub(super) fn first_of<'u>(units: impl ExactSizeIterator<Item = &'u UnitId>) -> String {
+pub(crate) fn first_of<'u>(units: impl ExactSizeIterator<Item = &'u UnitId>) -> String {
     let beyond = units.len().saturating_sub(NAMED);
     let named: Vec<_> = units.take(NAMED).map(UnitId::as_str).collect();
     let more = if beyond > 0 { format!(" and {beyond} more") } else { String::new() };

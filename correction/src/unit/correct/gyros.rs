@@ -159,10 +159,10 @@ impl Corrector {
 
         match reversal {
             Some((_, input)) if self.substitution.passes(&input) => {
-                let mut of_sensors = [f64::NAN; MAX_SENSORS];
-                put(&mut of_sensors, rates);
                 // A memory of the unit holds them, and is the same to the bit wherever it is made.
-                of_sensors.iter_mut().take(N).skip(count).for_each(|rate| *rate = f64::NAN);
+                let counted: [f64; N] = array::from_fn(|i| if i < count { rates[i] } else { f64::NAN });
+                let mut of_sensors = [f64::NAN; MAX_SENSORS];
+                put(&mut of_sensors, counted);
                 self.substitution.pass(&input, of_sensors);
             }
             None if !self.calm.special => {}

@@ -15,7 +15,7 @@ use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
 use crate::thermal::{Bank, Motion, MotionBanks, Shares};
 use crate::unit::slew::between;
 use crate::units::Timestamp;
-use crate::vector::{cross_lanes, minus, plus};
+use crate::vector::{minus, plus};
 
 /// Place of the asymmetry among the lines of a gyro's terms that follow motion.
 const ASYMMETRY: usize = 3;
@@ -271,11 +271,12 @@ impl Corrector {
         let Some(axes) = &self.thermal.accel_axes else { return forces };
         let axes = orientation.axes_at(axes.temperature_deg_c(out.end_time));
         let at = positions.each_ref().map(narrow::<N>);
-        let turned = cross_lanes(rate, at);
-        let turned = cross_lanes(rate, turned.each_ref());
-        let hastened = cross_lanes(acceleration, at);
+        let of_place = acceleration_by_place(rate, acceleration);
         let [x, y, z]: [[f64; N]; 3] = [0, 1, 2].map(|axis: usize| {
-            array::from_fn(|lane| axes(axis, lane) * (turned[axis][lane] + hastened[axis][lane]))
+            let [by_x, by_y, by_z] = of_place[axis];
+            array::from_fn(|lane| {
+                axes(axis, lane) * (by_x * at[0][lane] + by_y * at[1][lane] + by_z * at[2][lane])
+            })
         });
         array::from_fn(|lane| forces[lane] - (x[lane] + y[lane] + z[lane]))
     }
@@ -301,4 +302,14 @@ impl Corrector {
         let (rate, middle) = (self.seen.angular_rate, out.end_time - out.duration.half());
         (rate, self.motion.acceleration(rate, middle))
     }
+}
+
+/// ω × (ω × r) + α × r as a matrix on r (1/s²), from angular rate (rad/s) and acceleration (rad/s²).
+#[inline]
+fn acceleration_by_place([x, y, z]: [f64; 3], [ax, ay, az]: [f64; 3]) -> [[f64; 3]; 3] {
+    [
+        [-(y * y + z * z), x * y - az, x * z + ay],
+        [x * y + az, -(x * x + z * z), y * z - ax],
+        [x * z - ay, y * z + ax, -(x * x + y * y)],
+    ]
 }

@@ -12,6 +12,7 @@ use super::stand::{Folders, LIMIT, Stand, UNIT, assert_accepted, document};
 async fn the_service_tells_of_units_folder_store_and_swaps_and_is_alive() {
     let folders = Folders::new();
     folders.put("bad.toml", "schema = 1");
+    folders.put("silent.toml", &document("ZLG-8", 1.0));
     let mut stand = Stand::start(folders.settings()).await;
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &SwapOptions::default()).await, 1);
     stand.revisions(UNIT, 20).await;
@@ -35,6 +36,11 @@ async fn the_service_tells_of_units_folder_store_and_swaps_and_is_alive() {
     assert_eq!(status.calibrations.unwrap().state, FolderState::Watching);
     assert!(status.bad_documents[0].file.ends_with("bad.toml"), "{:#?}", status.bad_documents);
     assert!(status.store.unwrap().audit_entries >= 2);
+    let awaited: Vec<_> = status.faults.iter().filter(|fault| fault.kind == "awaited_units").collect();
+    assert!(
+        matches!(awaited[..], [fault] if fault.count == 1 && fault.first.ends_with(": ZLG-8")),
+        "{awaited:?}"
+    );
     assert_eq!((status.pid, status.swaps_refused), (Some(std::process::id()), 1));
 
     for (token, alive) in [

@@ -94,6 +94,7 @@ impl Instance {
         let mut faults: Vec<_> =
             posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
         faults.extend(intake.faults());
+        faults.extend(intake.awaited());
         let dropped = dropped_lines();
         if dropped > 0 {
             let words = "log lines were dropped: stderr was blocked (a stopped terminal, a full pipe)";

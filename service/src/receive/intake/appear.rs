@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::status::Output;
+use isotherm_protocol::status::{Fault, Output};
 
 use super::units::{Unit, Units};
 use super::{Intake, lock, read};
-use crate::control::revision::Calibrations;
-use crate::receive::fault::FaultKind;
+use crate::control::first_of;
+use crate::receive::fault::{FaultKind, standing};
 use crate::receive::unit::{Footing, Outlet, StreamTimeoutSettings, UnitActor};
 
 /// How long a unit without a calibration is silent before another may have its place.
@@ -106,12 +106,21 @@ impl Intake {
 
     /// Whether one more unit may appear; places for units that have a calibration are kept free for them.
     fn has_place(&self, units: &Units, calibrated: bool) -> bool {
-        let waiting = |calibrations: &Calibrations| {
-            calibrations.units().filter(|unit| !units.by_serial.contains_key(*unit)).count()
-        };
         let limit = self.settings.max_units;
         // Most of the time there is room for all of them, whoever has appeared.
-        units.len() < limit && (calibrated || units.len() + waiting(&read(&self.calibrations)) < limit)
+        units.len() < limit
+            && (calibrated || units.len() + units.awaited(&read(&self.calibrations)).count() < limit)
+    }
+
+    /// That units with a calibration have not appeared: their serial may be misspelt, or their producer be off.
+    pub(crate) fn awaited(&self) -> Option<Fault> {
+        // The units first, as everywhere: what is locked in one order locks nobody out.
+        let (units, calibrations) = (read(&self.units), read(&self.calibrations));
+        let awaited: Vec<_> = units.awaited(&calibrations).collect();
+        (!awaited.is_empty()).then(|| {
+            let words = format!("calibrated, nothing received yet: {}", first_of(awaited.iter().copied()));
+            standing("awaited_units", awaited.len() as u64, words)
+        })
     }
 
     /// Forgets the unit without a calibration that has been silent longest, if that is long enough: anybody can make one appear, and
