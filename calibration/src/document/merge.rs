@@ -7,7 +7,7 @@
 //! user decides.
 
 mod check;
-pub(crate) mod origin;
+mod origin;
 mod sections;
 #[cfg(test)]
 mod tests;

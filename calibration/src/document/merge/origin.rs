@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_protocol::document::{Created, Log, Origin};
-use serde::{Deserialize, Serialize};
+use isotherm_protocol::document::{Log, Origin};
 use toml::{Table, Value};
 
+use crate::document::show::terms::tree;
 use crate::document::{TOOL, Written, command_line};
 use crate::error::Error;
 use crate::numbers::hull;
@@ -13,18 +13,6 @@ use crate::report::Sigmas;
 
 /// Most logs that a document's origin lists; more are in the parts' own origins only.
 const MOST_LOGS: usize = 64;
-
-/// A part's own origin, and what was taken of it, as the merged document keeps them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Part {
-    #[serde(flatten)]
-    pub(crate) origin: Origin,
-    pub(crate) created: Option<Created>,
-    note: Option<String>,
-    /// Keys of the sections that were taken.
-    #[serde(default)]
-    pub(crate) taken: Vec<String>,
-}
 
 /// The origin of the merged document.
 pub(super) fn origin(
@@ -35,16 +23,18 @@ pub(super) fn origin(
     let documents: Vec<&Written> = [base].into_iter().chain(parts).collect();
     let (mut kept, mut log) = (Table::new(), Vec::<Log>::new());
     for document in &documents {
-        let (name, document) = (&document.name, &document.document);
-        let origin = document.origin.clone().unwrap_or_default();
-        for one in &origin.log {
+        let own = tree(&document.document)?;
+        let mut about = own.get("origin").and_then(Value::as_table).cloned().unwrap_or_default();
+        let dated = ["created", "note"].into_iter();
+        about.extend(dated.filter_map(|key| Some((key.to_owned(), own.get(key)?.clone()))));
+        let taken = from.iter().filter(|(_, name)| **name == document.name);
+        about.insert("taken".to_owned(), Value::Array(taken.map(|(key, _)| key.as_str().into()).collect()));
+        kept.insert(document.name.clone(), Value::Table(about));
+        for one in document.document.origin.iter().flat_map(|origin| &origin.log) {
             if log.iter().all(|other| other.sha256 != one.sha256) {
                 log.push(one.clone());
             }
         }
-        let taken = from.iter().filter(|(_, part)| *part == name).map(|(key, _)| key.clone()).collect();
-        let part = Part { origin, created: document.created, note: document.note.clone(), taken };
-        kept.insert(name.clone(), Value::try_from(part).map_err(|error| Error::document(&error))?);
     }
     log.truncate(MOST_LOGS);
     let mut details = Table::from_iter([("parts".to_owned(), Value::Table(kept))]);

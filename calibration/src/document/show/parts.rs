@@ -1,23 +1,28 @@
 //! What a merged document was put together from: `origin.details.parts`.
 
 use isotherm_protocol::document::{Document, Measure, Residual, Sample};
-use toml::Table;
+use toml::{Table, Value};
 
-use crate::document::merge::origin::Part;
 use crate::report::{Report, or_dash, short};
 
 /// Most entries of a list that are named.
 const NAMED: usize = 4;
 
-/// The parts by their names, and theirs where they were merged themselves.
-fn parts(details: Option<&Table>, above: &str) -> Vec<(String, Part)> {
+/// One part, as the document keeps its origin.
+struct Part<'a> {
+    name: String,
+    about: &'a Table,
+}
+
+/// Its parts, and theirs where they were merged themselves.
+fn parts<'a>(details: Option<&'a Table>, above: &str) -> Vec<Part<'a>> {
     let own = details.and_then(|details| details.get("parts")?.as_table());
     let mut all = Vec::new();
     for (name, about) in own.into_iter().flatten() {
-        let Ok(part) = about.clone().try_into::<Part>() else { continue };
+        let Some(about) = about.as_table() else { continue };
         let name = if above.is_empty() { name.clone() } else { format!("{above} / {name}") };
-        let below = parts(part.origin.details.as_ref(), &name);
-        all.push((name, part));
+        let below = parts(about.get("details").and_then(Value::as_table), &name);
+        all.push(Part { name, about });
         all.extend(below);
     }
     all
@@ -27,26 +32,30 @@ fn parts(details: Option<&Table>, above: &str) -> Vec<(String, Part)> {
 pub(super) fn tables(sheet: &mut Report, document: &Document) {
     let details = document.origin.as_ref().and_then(|origin| origin.details.as_ref());
     let parts = parts(details, "");
-    let row = |(name, part): &(String, Part)| {
+    let row = |part: &Part<'_>| {
+        let text = |key: &str| part.about.get(key).and_then(Value::as_str).unwrap_or("–").to_owned();
+        let taken = part.about.get("taken").and_then(Value::as_array).into_iter().flatten();
+        let logs = part.about.get("log").and_then(Value::as_array).into_iter().flatten();
+        let logs = logs.filter_map(|log| log.get("name")?.as_str());
         vec![
-            name.clone(),
-            or_dash(part.origin.method.clone()),
-            or_dash(part.created.map(|created| created.to_string())),
-            named(part.taken.iter().map(String::as_str)),
-            named(part.origin.log.iter().map(|log| log.name.as_str())),
+            part.name.clone(),
+            text("method"),
+            or_dash(part.about.get("created").map(Value::to_string)),
+            named(taken.filter_map(Value::as_str)),
+            named(logs),
         ]
     };
     let head = ["part", "method", "of", "taken from it", "logs"];
     sheet.table("Parts", head, parts.iter().map(row));
-    let of_part = |(name, part): &(String, Part)| -> Vec<Vec<String>> {
-        let named = |residual| {
-            let mut row = of_residual(residual);
-            row[0] = format!("{name}: {}", row[0]);
-            row
-        };
-        part.origin.residual.iter().map(named).collect()
-    };
-    sheet.table("Residuals as stated by each part", HEAD, parts.iter().flat_map(of_part));
+    let mut rows = Vec::new();
+    for part in &parts {
+        for residual in part.about.get("residual").and_then(Value::as_array).into_iter().flatten() {
+            let Some(mut row) = residual.as_table().and_then(of_table) else { continue };
+            row[0] = format!("{}: {}", part.name, row[0]);
+            rows.push(row);
+        }
+    }
+    sheet.table("Residuals as stated by each part", HEAD, rows);
 }
 
 fn named<'a>(names: impl Iterator<Item = &'a str>) -> String {
@@ -61,18 +70,29 @@ fn named<'a>(names: impl Iterator<Item = &'a str>) -> String {
 /// Columns of a table of residuals.
 pub(super) const HEAD: [&str; 3] = ["", "rms", "peak to peak"];
 
-/// A residual as a row.
+/// A residual of the document.
 pub(super) fn of_residual(residual: &Residual) -> Vec<String> {
     let measure = match residual.measure {
         Measure::DegPerH => "°/h",
         Measure::MetresPerSecondSquared => "m/s²",
     };
-    let sample = if residual.sample == Sample::In { "in sample" } else { "out of sample" };
-    let pair = |before: f64, after: f64| format!("{} → {}", short(before), short(after));
-    let peaks = residual.peak_to_peak_before.zip(residual.peak_to_peak_after);
-    vec![
-        format!("{}, {measure}, {sample}", residual.of),
-        pair(residual.rms_before, residual.rms_after),
-        or_dash(peaks.map(|(before, after)| pair(before, after))),
-    ]
+    let peaks = residual.peak_to_peak_before.zip(residual.peak_to_peak_after).map(|(a, b)| [a, b]);
+    let rms = [residual.rms_before, residual.rms_after];
+    row(&residual.of, measure, residual.sample == Sample::In, rms, peaks)
+}
+
+/// The same as a part's origin keeps it.
+fn of_table(residual: &Table) -> Option<Vec<String>> {
+    let number = |key: &str| residual.get(key).and_then(Value::as_float);
+    let measure = if residual.get("measure")?.as_str()? == "deg/h" { "°/h" } else { "m/s²" };
+    let inside = residual.get("sample")?.as_str()? == "in";
+    let peaks = number("peak_to_peak_before").zip(number("peak_to_peak_after")).map(|(a, b)| [a, b]);
+    let rms = [number("rms_before")?, number("rms_after")?];
+    Some(row(residual.get("of")?.as_str()?, measure, inside, rms, peaks))
+}
+
+fn row(of: &str, measure: &str, inside: bool, rms: [f64; 2], peaks: Option<[f64; 2]>) -> Vec<String> {
+    let pair = |[before, after]: [f64; 2]| format!("{} → {}", short(before), short(after));
+    let sample = if inside { "in sample" } else { "out of sample" };
+    vec![format!("{of}, {measure}, {sample}"), pair(rms), or_dash(peaks.map(pair))]
 }
