@@ -20,8 +20,8 @@ pub(crate) fn noise() -> impl FnMut() -> f64 {
     }
 }
 
-/// A scenario as a run in memory; `each` sees every step with its truth.
-pub(crate) fn simulated(scenario: &Scenario, mut each: impl FnMut(&Step)) -> Run {
+/// What a scenario's unit reads; `each` sees every step with its truth.
+pub(crate) fn events_seen(scenario: &Scenario, mut each: impl FnMut(&Step)) -> Vec<LogEvent> {
     let output = scenario.instrument.gyros.output_kind();
     let accel_output = scenario.instrument.accel_output_kind();
     let mut events = Vec::new();
@@ -33,5 +33,16 @@ pub(crate) fn simulated(scenario: &Scenario, mut each: impl FnMut(&Step)) -> Run
         }
         events.push(LogEvent::Gyro { output, tick: step.gyro });
     }
-    Run::of_events(format!("{} simulated", scenario.unit), unit_id(&scenario.unit).unwrap(), events)
+    events
+}
+
+/// What a scenario's unit reads.
+pub(crate) fn events(scenario: &Scenario) -> Vec<LogEvent> {
+    events_seen(scenario, |_| ())
+}
+
+/// A scenario as a run in memory; `each` sees every step with its truth.
+pub(crate) fn simulated(scenario: &Scenario, each: impl FnMut(&Step)) -> Run {
+    let (name, unit) = (format!("{} simulated", scenario.unit), unit_id(&scenario.unit).unwrap());
+    Run::of_events(name, unit, events_seen(scenario, each))
 }

@@ -8,6 +8,9 @@ pub fn real(count: impl AsPrimitive<f64>) -> f64 {
     count.as_()
 }
 
+/// ″ in one radian.
+pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
+
 /// Nanoseconds in seconds.
 pub fn seconds(ns: i64) -> f64 {
     real(ns) * 1e-9

@@ -31,10 +31,10 @@ use serde_json::{Value, json};
 
 pub use batch::{Batch, in_parallel, of_unit};
 pub use curve::{Curve, Judged, Rest, judge, output_unit};
-pub use figures::{alike, counted, fixed, per_deg_c, short, six, superscript, table, within};
+pub use figures::{alike, counted, fixed, or_dash, per_deg_c, short, six, superscript, table, within};
 pub(crate) use page::bars;
 pub use sigma::Sigmas;
-pub use verdict::{FLAT, Figure, SAME_SHARE, Verdict, residuals};
+pub use verdict::{FLAT, SAME_SHARE, Verdict, residuals};
 
 pub(crate) use words::{grouped, gyros, of_logs, together};
 
@@ -54,13 +54,6 @@ pub struct Coefficient {
     pub value: f64,
     /// Its standard error, where the fit knows one.
     pub sigma: Option<f64>,
-}
-
-impl Coefficient {
-    /// A coefficient with its standard error.
-    pub fn new(name: impl Into<String>, unit: impl Into<String>, value: f64, sigma: Option<f64>) -> Self {
-        Self { name: name.into(), unit: unit.into(), value, sigma }
-    }
 }
 
 /// What a command has to say; lists that do not apply stay empty.
@@ -120,7 +113,8 @@ impl Report {
         value: f64,
         sigma: impl Into<Option<f64>>,
     ) {
-        self.coefficients.push(Coefficient::new(name, unit, value, sigma.into()));
+        let (name, unit, sigma) = (name.into(), unit.into(), sigma.into());
+        self.coefficients.push(Coefficient { name, unit, value, sigma });
     }
 
     /// Adds a table unless it has no rows.
@@ -179,10 +173,12 @@ impl Report {
         self.verdicts.iter().all(|verdict| verdict.accepted)
     }
 
-    /// The refusals, for the end of a command.
-    pub fn refusals(&self) -> Vec<String> {
+    /// What is refused, for the end of a command, which has printed why.
+    pub fn refusals(&self) -> Option<String> {
         let refused = self.verdicts.iter().filter(|verdict| !verdict.accepted);
-        refused.map(|verdict| format!("{}: {}: {}", self.unit, verdict.of, verdict.reason)).collect()
+        let refused: Vec<&str> = refused.map(|verdict| verdict.of.as_str()).collect();
+        (!refused.is_empty())
+            .then(|| format!("{}: {}: refused, for the reasons above", self.unit, refused.join(", ")))
     }
 
     /// What an engineer decides by, as the lines of a terminal.
@@ -236,13 +232,12 @@ impl Report {
             let Coefficient { name, unit, value, sigma } = coefficient;
             let known = sigma.filter(|sigma| sigma.is_finite());
             let ratio = known.filter(|sigma| *sigma > 0.0).map(|sigma| value.abs() / sigma);
-            let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
             vec![
                 (index + 1).to_string(),
                 name.clone(),
                 stated(*value, known),
-                or_dash(known),
-                or_dash(ratio),
+                or_dash(known.map(short)),
+                or_dash(ratio.map(short)),
                 unit.clone(),
             ]
         };

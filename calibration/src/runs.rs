@@ -21,10 +21,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::sample::{CorrectedTick, GyroTick};
-use isotherm_correction::unit::{MAX_TICK_DURATION, Unit, UnitSettings};
-use isotherm_log::message::{Message, Topic};
-use isotherm_log::offline::{Loaded, Offline};
+use isotherm_correction::sample::GyroTick;
+use isotherm_correction::unit::MAX_TICK_DURATION;
+use isotherm_log::message::Topic;
+use isotherm_log::offline::Offline;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
 use isotherm_log::source::Log;
@@ -61,25 +61,11 @@ enum Source {
     Events(Arc<[LogEvent]>),
 }
 
-/// A piece of what a run has.
-enum Piece<'a> {
-    Event(&'a LogEvent),
-    Message(&'a Message),
-}
-
-impl Piece<'_> {
-    fn put_into(&self, series: &mut Series) -> Result<(), Error> {
-        match self {
-            Self::Event(event) => series.take_event(event),
-            Self::Message(message) => series.take_message(message),
-        }
-    }
-}
-
-/// What a correction is fed with.
+/// A piece of what a run has, as a correction is fed with it: ticks one by one, for behind a whole frame the unit, and its temperatures,
+/// would stand at the frame's end.
 enum Fed<'a> {
     Event(&'a LogEvent),
-    /// A frame that is no readings one by one.
+    /// A frame without ticks, or that cannot be read.
     Frame(RawStream, &'a [u8]),
 }
 
@@ -163,10 +149,10 @@ impl Run {
     /// Its readings as columns.
     ///
     /// # Errors
-    /// [`Error::Log`]; as [`Series::take_message`]; [`Error::Refused`] where it has no ticks, or ticks too long to be corrected.
+    /// [`Error::Log`]; as [`Series::take`]; [`Error::Refused`] where it has no ticks, or ticks too long to be corrected.
     pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
-        self.walk(watch, |piece| piece.put_into(&mut series))?;
+        self.walk(watch, |fed| series.take(&fed))?;
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
             let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
             if usual_s > longest_s {
@@ -185,61 +171,6 @@ impl Run {
         Ok(series)
     }
 
-    /// Corrects the run with a calibration, as `isotherm-replay correct --ignore-journal` does; `each` sees every
-    /// corrected tick, and the unit as it stands behind it.
-    ///
-    /// # Errors
-    /// [`Error::Log`] where the log cannot be read; [`Error::Refused`] where nothing comes out.
-    pub fn correct(
-        &self,
-        loaded: &Loaded,
-        watch: impl Watch,
-        each: impl FnMut(&CorrectedTick, &Unit),
-    ) -> Result<Troubles, Error> {
-        self.correct_beside(loaded, watch, |_| (), each)
-    }
-
-    /// The same, and its readings as columns beside, from one reading of the log. The columns end where [`Run::series`] would refuse
-    /// them; the correction says what is wrong with the log.
-    ///
-    /// # Errors
-    /// As [`Run::correct`]; the columns are there all the same.
-    pub fn correct_with_series(
-        &self,
-        loaded: &Loaded,
-        watch: impl Watch,
-        each: impl FnMut(&CorrectedTick, &Unit),
-    ) -> (Series, Result<Troubles, Error>) {
-        let (mut series, mut takes) = (Series::empty(self.unit.clone()), true);
-        let beside = |piece: &Piece<'_>| takes = takes && piece.put_into(&mut series).is_ok();
-        let troubles = self.correct_beside(loaded, watch, beside, each);
-        (series, troubles)
-    }
-
-    fn correct_beside(
-        &self,
-        loaded: &Loaded,
-        watch: impl Watch,
-        beside: impl FnMut(&Piece<'_>),
-        mut each: impl FnMut(&CorrectedTick, &Unit),
-    ) -> Result<Troubles, Error> {
-        let mut unit = Offline::new(loaded, UnitSettings::default());
-        let mut count = 0_u64;
-        let mut give_out = |unit: &mut Offline| {
-            for tick in &unit.take() {
-                count += 1;
-                each(tick, unit.unit());
-            }
-        };
-        self.feed(&loaded.calibration, watch, beside, |fed| {
-            fed.give(&mut unit);
-            give_out(&mut unit);
-        })?;
-        unit.finish();
-        give_out(&mut unit);
-        self.judge_troubles(count, unit.troubles())
-    }
-
     /// That its recording was cut short, and where, once that was found by reading it.
     pub fn cut_short(&self) -> Option<&str> {
         self.cut.words()
@@ -254,15 +185,21 @@ impl Run {
     fn walk(
         &self,
         mut watch: impl Watch,
-        mut each: impl FnMut(Piece<'_>) -> Result<(), Error>,
+        mut each: impl FnMut(Fed<'_>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         match &self.source {
-            Source::Events(events) => events.iter().try_for_each(|event| each(Piece::Event(event))),
+            Source::Events(events) => events.iter().try_for_each(|event| each(Fed::Event(event))),
             Source::Files { files, part } => {
                 let mut messages = files.open(part)?;
                 watch.begin(messages.progress());
                 while let Some(message) = messages.next_message()? {
-                    each(Piece::Message(&message))?;
+                    if let Topic::Raw(_, input) = message.topic {
+                        let has_ticks = matches!(input, RawStream::Gyro | RawStream::Accel);
+                        match has_ticks.then(|| readings(input, &message.frame)).flatten() {
+                            Some(events) => events.iter().try_for_each(|event| each(Fed::Event(event)))?,
+                            None => each(Fed::Frame(input, &message.frame))?,
+                        }
+                    }
                     watch.step();
                 }
                 watch.end();
@@ -272,34 +209,22 @@ impl Run {
         }
     }
 
-    /// Goes through what a correction is fed with, tick by tick: behind a whole frame the unit, and its temperatures, would stand at
-    /// the frame's end.
+    /// Feeds a correction.
     fn feed(
         &self,
         calibration: &Calibration,
         watch: impl Watch,
-        mut beside: impl FnMut(&Piece<'_>),
+        mut beside: impl FnMut(&Fed<'_>),
         mut to_unit: impl FnMut(Fed<'_>),
     ) -> Result<(), Error> {
         // A document of gyros alone is asked about gyros: their log may well have accelerometers.
         let has_accelerometers = calibration.accel_count() > 0;
-        let mut each = |fed: Fed<'_>| {
-            if has_accelerometers || !fed.is_accel() {
-                to_unit(fed);
-            }
-        };
-        self.walk(watch, |piece| {
-            beside(&piece);
-            match piece {
-                Piece::Event(event) => each(Fed::Event(&self.taken(event))),
-                Piece::Message(message) => {
-                    let Topic::Raw(_, input) = message.topic else { return Ok(()) };
-                    let has_ticks = matches!(input, RawStream::Gyro | RawStream::Accel);
-                    match has_ticks.then(|| readings(input, &message.frame)).flatten() {
-                        Some(events) => events.iter().for_each(|event| each(Fed::Event(&self.taken(event)))),
-                        None => each(Fed::Frame(input, &message.frame)),
-                    }
-                }
+        self.walk(watch, |fed| {
+            beside(&fed);
+            match fed {
+                fed if !has_accelerometers && fed.is_accel() => {}
+                Fed::Event(event) => to_unit(Fed::Event(&self.taken(event))),
+                Fed::Frame(input, frame) => to_unit(Fed::Frame(input, frame)),
             }
             Ok(())
         })

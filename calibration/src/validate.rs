@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::judging;
 use crate::numbers::{Size, is_white, norm, real};
-use crate::report::{Curve, FLAT, Figure, Report, Rest, SAME_SHARE, Verdict, short};
+use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
 use crate::runs::swapped::{Shown, force_at_rest};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
@@ -103,7 +103,8 @@ pub fn validate(
         report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
         if log.known {
             report.warnings.push(format!(
-                "{} is one of the logs that the document was made from: it is in sample",
+                "{} is one of the logs that the document was made from: it counts as in sample, whichever part of it was \
+                 fitted",
                 run.name
             ));
         }
@@ -115,10 +116,7 @@ pub fn validate(
         );
         return Err(Error::Refused([vec![deaf], report.warnings].concat()));
     }
-    report.verdicts = Curve::verdicts(&report.residuals)
-        .into_iter()
-        .map(|verdict| verdict.stated_as(Figure::Rms))
-        .collect();
+    report.verdicts = Curve::verdicts(&report.residuals);
     let liveliest = |of: &Verdict| {
         let alike = report.verdicts.iter().filter(|verdict| verdict.measure == of.measure);
         alike.map(|verdict| verdict.deciding()[0].deviation).fold(0.0, f64::max)

@@ -93,7 +93,8 @@ impl<'a> Task<'a> {
             let report = written(&Job { work: &work, among: None })?;
             emit(files.json, || report.to_json(), || report.to_text())?;
             files.say_written(report.verdicts.iter().any(|verdict| verdict.accepted));
-            return Error::end(refusals(&report, self.accept_partial), work.cuts());
+            let refused = refusals(&report, self.accept_partial);
+            return Error::end(refused.into_iter().collect(), work.cuts());
         }
         units.iter().try_for_each(|(unit, _)| files.check_unit(unit.as_str()))?;
         let bar = Bar::counting("units done", units.len());
@@ -140,9 +141,9 @@ impl<'a> Task<'a> {
 }
 
 /// What was refused of a unit. A part of the sensors is no failure where that is accepted; all of them are.
-fn refusals(report: &Report, accept_partial: bool) -> Vec<String> {
+fn refusals(report: &Report, accept_partial: bool) -> Option<String> {
     let partial = accept_partial && report.verdicts.iter().any(|verdict| verdict.accepted);
-    if partial { Vec::new() } else { report.refusals() }
+    report.refusals().filter(|_| !partial)
 }
 
 /// Prints what a command came to, as text or as one JSON object.

@@ -2,7 +2,6 @@
 
 use clap::Args;
 use isotherm_correction::earth::Place;
-use isotherm_correction::reversal::MAX_TRANSITION_TICKS;
 
 use super::driver::{Job, Task};
 use super::output::OutputArgs;
@@ -14,7 +13,6 @@ use crate::error::Error;
 use crate::fits::modes::document::{details, sigmas};
 use crate::fits::modes::fit::{Wanted, make};
 use crate::fits::modes::model::Asked;
-use crate::limits::within;
 use crate::numbers::hull;
 
 /// Magnetic and non-magnetic drift over temperature, slow meander and switch parameters of a mode-reversed laser gyro
@@ -35,15 +33,6 @@ pub(super) struct ModesArgs {
     place: PlaceArgs,
     #[command(flatten)]
     asked: Asked,
-    /// Ticks lost by a switch, 1…32 (default: found in the log)
-    #[arg(long, hide_short_help = true, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_TRANSITION_TICKS)))]
-    transition_ticks: Option<u8>,
-    /// Time to leave out after every switch (s) (default: the servo's transient)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", value_parser = within(0.0, 3600.0))]
-    settle: Option<f64>,
-    /// Reference temperature of the polynomials (°C) (default: the document's, else 20)
-    #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true)]
-    reference: Option<f64>,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -67,16 +56,7 @@ impl ModesArgs {
         let work = job.work;
         let base = work.base()?;
         let made = make(
-            &Wanted {
-                runs: &work.runs,
-                judge: &work.judges,
-                base: &base.document,
-                place,
-                asked: self.asked,
-                transition_ticks: self.transition_ticks,
-                settle_s: self.settle,
-                reference_deg_c: self.reference,
-            },
+            &Wanted { runs: &work.runs, judge: &work.judges, base: &base.document, place, asked: self.asked },
             &mut job.bar(),
         )?;
         let ranges = made.gyros.iter().flatten().map(|fit| fit.range_deg_c);

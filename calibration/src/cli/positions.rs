@@ -12,7 +12,7 @@ use super::units::Logs;
 use crate::document::{About, Fitted, Written};
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
-use crate::fits::positions::budget::{ARCSEC_PER_RAD, Budget};
+use crate::fits::positions::budget::Budget;
 use crate::fits::positions::document::{complete, range};
 use crate::fits::positions::fit::{Analysis, Settings, analyse, positions};
 use crate::fits::positions::judged::{Judgement, judge};
@@ -24,6 +24,7 @@ use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
 use crate::limits::{above_0, from_0};
+use crate::numbers::ARCSEC_PER_RAD;
 use crate::runs::{Run, Watch};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
@@ -62,21 +63,8 @@ pub(super) struct PositionsArgs {
     /// Level error of the stand (″, one sigma)
     #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 60.0, value_parser = above_0)]
     levelling: f64,
-    /// Window of the search for still poses (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
-    window: f64,
-    /// Largest variance of a still window, relative to the log's quietest fifth
-    #[arg(long, hide_short_help = true, value_name = "FACTOR", default_value_t = 4.0, value_parser = above_0)]
-    threshold: f64,
-    /// Rate above which the unit turns (°/s)
-    #[arg(long, hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 0.2, value_parser = above_0)]
-    still_rate: f64,
-    /// Time to leave out at the beginning of each pose (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 2.0, value_parser = from_0)]
-    settle: f64,
-    /// Shortest pose (s)
-    #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = above_0)]
-    least: f64,
+    #[command(flatten)]
+    limits: StillLimits,
     /// Temperature channels that the axes follow by their mean (default: the document's, else the accelerometers')
     #[arg(long, value_name = "CHANNEL")]
     channel: Vec<String>,
@@ -123,13 +111,7 @@ impl PositionsArgs {
         let settings = Settings {
             plan,
             gravity,
-            limits: StillLimits {
-                window_s: self.window,
-                factor: self.threshold,
-                rate_deg_per_s: self.still_rate,
-                least_s: self.least,
-                settle_s: self.settle,
-            },
+            limits: self.limits,
             times: self.times.as_deref().map(Times::read).transpose()?,
             positioning_rad: self.positioning.hypot(self.run_out) / ARCSEC_PER_RAD,
             levelling_rad: self.levelling / ARCSEC_PER_RAD,
@@ -157,9 +139,7 @@ impl PositionsArgs {
         let document = complete(&base.document, &analysis, settings.gravity);
         let before = Written::of(&before(&base.document, &analysis, settings.gravity, work.base.is_some()))?;
         let after = Written::of(&document)?;
-        let inside: Vec<(Pose, usize)> =
-            analysis.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
-        let inside = judged(settings, &analysis, &inside, runs, [&before, &after], watch)?;
+        let inside = judged(settings, &analysis, &analysis.poses, runs, [&before, &after], watch)?;
         let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], watch)?;
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });

@@ -1,7 +1,7 @@
 //! The arguments that name logs, the same for every command.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use isotherm_correction::units::Span;
@@ -12,7 +12,7 @@ use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
 use super::bar;
-use crate::document::recordings_in;
+use crate::document::{name_of, recordings_in};
 use crate::error::Error;
 use crate::runs::{Run, units_of};
 
@@ -208,9 +208,5 @@ fn seconds(text: &str) -> Result<Span, String> {
 
 /// Names of files, as a run is called.
 fn names(paths: &[PathBuf]) -> String {
-    let name = |path: &PathBuf| -> String {
-        let name = Path::new(path).file_name();
-        name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
-    };
-    paths.iter().map(name).collect::<Vec<_>>().join(" + ")
+    paths.iter().map(|path| name_of(path)).collect::<Vec<_>>().join(" + ")
 }

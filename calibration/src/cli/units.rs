@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::key::UnitId;
 
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
-use crate::document::{Written, files_of};
+use crate::document::{Written, files_of, name_of};
 use crate::error::Error;
 use crate::numbers::once_each;
 use crate::runs::Run;
@@ -226,10 +226,9 @@ impl<'a> Logs<'a> {
 /// named after it counts.
 fn of_folder(folder: &Path) -> Result<BTreeMap<UnitId, Written>, Error> {
     let mut paths = files_of(folder)?;
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     paths.retain(|path| {
         path.extension().is_some_and(|extension| extension == "toml")
-            && !name(path).ends_with(".mapping.toml")
+            && !name_of(path).ends_with(".mapping.toml")
     });
     paths.sort();
     let mut documents: BTreeMap<UnitId, Written> = BTreeMap::new();
@@ -237,13 +236,13 @@ fn of_folder(folder: &Path) -> Result<BTreeMap<UnitId, Written>, Error> {
         let written = Written::read(path)?;
         let unit = written.loaded.unit.clone();
         let own = format!("{unit}.toml");
-        let other = documents.get(&unit).map(|other| name(Path::new(&other.name)));
+        let other = documents.get(&unit).map(|other| name_of(Path::new(&other.name)));
         match other {
             Some(other) if other == own => {}
-            Some(other) if name(path) != own => {
+            Some(other) if name_of(path) != own => {
                 return Err(Error::refused(format!(
                     "{other} and {} are both for unit {unit}: name the one to take {own}",
-                    name(path)
+                    name_of(path)
                 )));
             }
             _ => drop(documents.insert(unit, written)),

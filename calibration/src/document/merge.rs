@@ -23,7 +23,7 @@ use crate::document::show::terms::tree;
 use crate::error::Error;
 use crate::report::Report;
 use check::{check, same_unit};
-use sections::{Sections, build, group, sections};
+use sections::{Sections, group, sections, with};
 
 /// Which part decides over keys that begin so.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,7 +76,7 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
     let words = |found: Vec<isotherm_protocol::document::Problem>| {
         Error::Document(found.iter().map(ToString::to_string).collect())
     };
-    let tree = build(&tree(&base.document)?, &sections);
+    let tree = with(tree(&base.document)?, &old, &sections);
     let mut document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
     document.origin = Some(origin::origin(base, parts, &from)?);
     let taken = from.into_iter().filter(|(key, _)| sections.contains_key(key)).collect();
@@ -107,40 +107,36 @@ impl Picked {
             inside.map(|(key, value)| (key.clone(), value.clone())).collect()
         };
         let before = mine(old);
-        // Of each part, what it has made of the group: new values, and what it does without.
-        let mut made: Vec<(&Written, Sections, Vec<String>)> = Vec::new();
+        // By part: what it has made differently, and what it does without.
+        let mut made: Vec<(&str, BTreeMap<String, Option<Value>>)> = Vec::new();
         for (part, sections) in parts.iter().zip(new) {
-            let after = mine(sections);
-            let changed: Sections =
-                after.iter().filter(|(key, value)| before.get(*key) != Some(*value)).map(own).collect();
-            let without: Vec<String> =
-                before.keys().filter(|key| !after.contains_key(*key)).cloned().collect();
-            if !changed.is_empty() {
-                made.push((part, changed, without));
-            } else if !without.is_empty() {
+            let mut after = mine(sections);
+            let gone: Vec<String> = before.keys().filter(|key| !after.contains_key(*key)).cloned().collect();
+            after.retain(|key, value| before.get(key) != Some(value));
+            if !after.is_empty() {
+                let changed = after.into_iter().map(|(key, value)| (key, Some(value)));
+                made.push((
+                    part.name.as_str(),
+                    changed.chain(gone.into_iter().map(|key| (key, None))).collect(),
+                ));
+            } else if !gone.is_empty() {
                 self.warnings.push(format!(
                     "{} lacks {}: kept as in {}",
                     part.name,
-                    without.join(", "),
+                    gone.join(", "),
                     base.name
                 ));
             }
         }
-        let keys: BTreeSet<&String> =
-            made.iter().flat_map(|(_, changed, without)| changed.keys().chain(without)).collect();
+        let keys: BTreeSet<&String> = made.iter().flat_map(|(_, changed)| changed.keys()).collect();
         for key in keys {
-            let says = |(part, changed, without): &(&Written, Sections, Vec<String>)| {
-                let touched = changed.contains_key(key) || without.contains(key);
-                touched.then(|| (part.name.clone(), changed.get(key).cloned()))
-            };
-            let said: Vec<(String, Option<Value>)> = made.iter().filter_map(says).collect();
+            let said: Vec<(&str, &Option<Value>)> =
+                made.iter().filter_map(|(name, changed)| Some((*name, changed.get(key)?))).collect();
             let chosen = take.iter().rev().find(|take| covers(&take.key, key));
-            let Some((first, value)) = said.first() else { continue };
             let decided = match chosen {
                 Some(take) if take.from == base.name => continue,
-                Some(take) => said.iter().find(|(name, _)| *name == take.from).map(|(n, v)| (n, v)),
-                None if said.iter().all(|(_, other)| other == value) => Some((first, value)),
-                None => None,
+                Some(take) => said.iter().find(|(name, _)| *name == take.from),
+                None => said.first().filter(|(_, value)| said.iter().all(|(_, other)| other == value)),
             };
             let Some((name, value)) = decided else {
                 conflicts.push(conflict(key, &said, chosen));
@@ -194,30 +190,21 @@ impl Picked {
     }
 }
 
-fn own((key, value): (&String, &Value)) -> (String, Value) {
-    (key.clone(), value.clone())
-}
-
 /// Whether a choice is about a key.
 fn covers(choice: &str, key: &str) -> bool {
     key.strip_prefix(choice).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
-fn conflict(key: &str, said: &[(String, Option<Value>)], chosen: Option<&Take>) -> String {
-    let names: Vec<String> = said
-        .iter()
-        .map(|(name, value)| if value.is_some() { name.clone() } else { format!("{name} (does without it)") })
-        .collect();
-    match chosen {
-        Some(take) => {
-            format!("{key}: --take names {}, but only {} changed it", take.from, names.join(" and "))
-        }
-        None => format!(
-            "{key}: made differently by {}; choose with --take {key}={}",
-            names.join(" and "),
-            said.first().map_or("", |(name, _)| name)
-        ),
+fn conflict(key: &str, said: &[(&str, &Option<Value>)], chosen: Option<&Take>) -> String {
+    let named = |(name, value): &(&str, &Option<Value>)| {
+        if value.is_some() { (*name).to_owned() } else { format!("{name} (does without it)") }
+    };
+    let parts = said.iter().map(named).collect::<Vec<_>>().join(" and ");
+    if let Some(take) = chosen {
+        return format!("{key}: --take names {}, but only {parts} changed it", take.from);
     }
+    let first = said.first().map_or("", |(name, _)| name);
+    format!("{key}: made differently by {parts}; choose with --take {key}={first}")
 }
 
 impl Merged {

@@ -27,9 +27,7 @@ pub fn origin(logs: &[PathBuf], command: &str) -> Result<Origin, Error> {
 /// Name and SHA-256 of a log; of a folder that of its files.
 fn log_of(path: &Path) -> Result<Log, Error> {
     let digest = if path.is_dir() { of_folder(path)? } else { of_file(path)? };
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let name = name.unwrap_or_else(|| path.display().to_string());
-    Ok(Log { name, sha256: digest.to_string() })
+    Ok(Log { name: name_of(path), sha256: digest.to_string() })
 }
 
 fn of_file(path: &Path) -> Result<Digest, Error> {
@@ -52,7 +50,7 @@ fn of_folder(folder: &Path) -> Result<Digest, Error> {
     let mut files = recordings_in(folder)?;
     if files.is_empty() {
         let beside = |path: &PathBuf| {
-            let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+            let hidden = name_of(path).starts_with('.');
             hidden || path.extension().is_some_and(|end| end == "toml" || end == "html")
         };
         files = files_of(folder)?;

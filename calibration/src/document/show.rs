@@ -49,7 +49,7 @@ pub fn show(written: &Written) -> Result<Report, Error> {
     });
     sheet.table("Terms", ["term", "formula", "unit", "fitted over"], formulas);
     over_temperature(&mut sheet, &terms, range);
-    sums(&mut sheet, written, range);
+    sums_table(&mut sheet, written, range);
     charts::charts(&mut sheet, written, &terms, range);
     sheet.figures = Map::from_iter([
         ("document".to_owned(), serde_json::to_value(&tree).map_err(|error| Error::document(&error))?),
@@ -128,31 +128,46 @@ pub(crate) fn steady(written: &Written, temperature: f64, ramp_deg_c_per_min: f6
     calibration.steady(|name| known(name).then_some(state), None)
 }
 
-/// The sums of all terms.
-fn sums(sheet: &mut Report, written: &Written, range: [f64; 2]) {
-    let at = places(range, COLUMNS);
-    let mut rows = Vec::new();
-    let mut row = |name: String, of: &dyn Fn(f64) -> Option<f64>| {
-        let values: Vec<f64> = at.iter().map(|x| of(*x).unwrap_or(f64::NAN)).collect();
-        let cells = alike(&values, RANGE_DIGITS).into_iter().zip(&values);
-        let cells = cells.map(|(word, value)| if value.is_nan() { "–".to_owned() } else { word });
-        rows.push(std::iter::once(name).chain(cells).collect::<Vec<_>>());
+/// A sensor's bias in all.
+pub(crate) struct Sum {
+    pub(crate) name: String,
+    pub(crate) unit: &'static str,
+    /// By ramp (°C/min): the bias at each temperature; no number where it is not known.
+    pub(crate) ramps: Vec<(f64, Vec<f64>)>,
+}
+
+/// The sums of all terms at some temperatures.
+pub(crate) fn sums(written: &Written, at: &[f64]) -> Vec<Sum> {
+    let over = |ramp: f64, of: &dyn Fn(&Steady) -> Option<f64>| {
+        let values = at.iter().map(|x| of(&steady(written, *x, ramp)).unwrap_or(f64::NAN));
+        (ramp, values.collect::<Vec<f64>>())
     };
-    for (index, gyro) in written.document.gyro.sensor.iter().enumerate() {
-        for ramp in RAMPS {
-            let words = ramp_words(ramp);
-            row(format!("gyro {}, °/h, {words}", gyro.name), &|x| {
-                let bias = *steady(written, x, ramp).gyro_bias.get(index)?;
-                Some(AngularRate::from_rad_per_s(bias).as_deg_per_h())
-            });
-        }
-    }
-    for (index, accel) in accelerometers(&written.document).iter().enumerate() {
-        row(format!("accelerometer {}, mg", accel.name), &|x| {
-            let bias = *steady(written, x, 0.0).accel_bias.get(index)?;
-            Some(SpecificForce::from_m_per_s2(bias).as_g() * 1e3)
-        });
-    }
+    let gyros = written.document.gyro.sensor.iter().enumerate().map(|(index, gyro)| {
+        let deg_per_h = |steady: &Steady| {
+            steady.gyro_bias.get(index).map(|bias| AngularRate::from_rad_per_s(*bias).as_deg_per_h())
+        };
+        let ramps = RAMPS.map(|ramp| over(ramp, &deg_per_h)).to_vec();
+        Sum { name: format!("gyro {}", gyro.name), unit: "°/h", ramps }
+    });
+    let accels = accelerometers(&written.document).iter().enumerate().map(|(index, accel)| {
+        let milli_g = |steady: &Steady| {
+            steady.accel_bias.get(index).map(|bias| SpecificForce::from_m_per_s2(*bias).as_g() * 1e3)
+        };
+        Sum { name: format!("accelerometer {}", accel.name), unit: "mg", ramps: vec![over(0.0, &milli_g)] }
+    });
+    gyros.chain(accels).collect()
+}
+
+fn sums_table(sheet: &mut Report, written: &Written, range: [f64; 2]) {
+    let at = places(range, COLUMNS);
+    let row = |sum: &Sum, (ramp, values): &(f64, Vec<f64>)| {
+        let words = if sum.ramps.len() > 1 { format!(", {}", ramp_words(*ramp)) } else { String::new() };
+        let cells = alike(values, RANGE_DIGITS).into_iter().zip(values);
+        let cells = cells.map(|(word, value)| if value.is_nan() { "–".to_owned() } else { word });
+        std::iter::once(format!("{}, {}{words}", sum.name, sum.unit)).chain(cells).collect::<Vec<_>>()
+    };
+    let sums = sums(written, &at);
+    let rows = sums.iter().flat_map(|sum| sum.ramps.iter().map(move |ramp| row(sum, ramp)));
     sheet.table(&format!("Bias in all, lags settled{}", lasing_mode(written)), heads(&at, "°C"), rows);
 }
 

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{AccelOutput, Document, Sample};
 
 use super::verdict::Verdict;
 use crate::axes::output_name;
+use crate::document::Written;
 use crate::error::Error;
-use crate::numbers::{Size, real};
+use crate::numbers::{Size, once_each, real};
 use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Troubles, Watch};
 
@@ -47,34 +47,44 @@ pub struct Rest {
     pub levels: Option<[[f64; 2]; 6]>,
 }
 
-/// A run, corrected before and after.
+/// Runs, corrected before and after.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Judged {
-    /// By axis: gyros first, then accelerometers; an axis without any good window is not there.
+    /// By run and axis: gyros first, then accelerometers; an axis without any good window is not there.
     pub curves: Vec<Curve>,
-    /// What the corrections passed over.
+    /// What the corrections passed over, behind the name of the run.
     pub troubles: Troubles,
 }
 
-/// Corrects a run with two calibrations and lays the outputs side by side along the case axes, averaged over windows.
+/// What a run's unit would put out without error, the run's windows, and which of its curves count: those of what begins so, "gyro",
+/// "accelerometer" or "" for all.
+pub type Judging = (Rest, Rows, &'static str);
+
+/// Corrects runs of the fit, and others that it has not seen, with two documents, and lays the outputs side by side along the case axes,
+/// averaged over windows. `of_run` is told the run's number among all.
 ///
 /// # Errors
-/// As [`Run::correct`].
+/// As [`Run::correct_together`].
 pub fn judge(
-    run: &Run,
-    sample: Sample,
-    (before, after): (&Loaded, &Loaded),
-    (document, rest): (&Document, &Rest),
-    rows: Rows,
-    watch: impl Watch,
+    (runs, unseen): (&[Run], &[Run]),
+    [before, after]: [&Written; 2],
+    of_run: impl Fn(usize, &Run) -> Result<Judging, Error>,
+    mut watch: impl Watch,
 ) -> Result<Judged, Error> {
-    let mut tables = Table::together(run, &[after.clone(), before.clone()], rows, watch)?.into_iter();
-    let mut next = || tables.next().unwrap_or_default();
-    let (after, before) = (next(), next());
-    let mut troubles = after.troubles.clone();
-    troubles.extend(before.troubles.iter().filter(|words| !after.troubles.contains(words)).cloned());
-    let curves = Curve::of_tables(&run.name, sample, [&before, &after], document, rest);
-    Ok(Judged { curves, troubles })
+    let mut judged = Judged::default();
+    let loaded = [after.loaded.clone(), before.loaded.clone()];
+    for (index, run) in runs.iter().chain(unseen).enumerate() {
+        let (rest, rows, counts) = of_run(index, run)?;
+        let sample = if index < runs.len() { Sample::In } else { Sample::Out };
+        let mut tables = Table::together(run, &loaded, rows, &mut watch)?.into_iter();
+        let mut next = || tables.next().unwrap_or_default();
+        let (of_after, of_before) = (next(), next());
+        let curves = Curve::of_tables(&run.name, sample, [&of_before, &of_after], &after.document, &rest);
+        judged.curves.extend(curves.into_iter().filter(|curve| curve.of.starts_with(counts)));
+        let passed_over = once_each([of_after.troubles, of_before.troubles].concat());
+        judged.troubles.extend(passed_over.iter().map(|words| format!("{}: {words}", run.name)));
+    }
+    Ok(judged)
 }
 
 impl Curve {

@@ -65,6 +65,11 @@ pub fn alike(values: &[f64], digits: f64) -> Vec<String> {
     values.iter().map(word).collect()
 }
 
+/// A cell of a table; a dash where nothing is known.
+pub fn or_dash(cell: Option<String>) -> String {
+    cell.unwrap_or_else(|| "–".to_owned())
+}
+
 /// A count and what is counted: "1 gap", "3 gaps".
 pub fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })

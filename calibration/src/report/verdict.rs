@@ -7,38 +7,6 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use crate::numbers::{Size, real};
 use crate::report::short;
 
-/// Which figure of a [`Size`] the sentence states.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Figure {
-    /// Largest less smallest, as the papers state it.
-    #[default]
-    PeakToPeak,
-    /// Root mean square.
-    Rms,
-    /// Standard deviation about the mean.
-    Deviation,
-}
-
-impl Figure {
-    /// The figure of a size.
-    pub fn of(self, size: &Size) -> f64 {
-        match self {
-            Self::PeakToPeak => size.peak_to_peak,
-            Self::Rms => size.rms,
-            Self::Deviation => size.deviation,
-        }
-    }
-
-    /// Its name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::PeakToPeak => "peak to peak",
-            Self::Rms => "rms",
-            Self::Deviation => "standard deviation",
-        }
-    }
-}
-
 /// What came of one sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
@@ -46,8 +14,6 @@ pub struct Verdict {
     pub of: String,
     /// Symbol of the unit of measure, such as "°/h".
     pub measure: String,
-    /// Which figure the sentence states.
-    pub figure: Figure,
     /// Before and after over what the fit saw. Both are zero where the fit saw nothing of it.
     pub in_sample: [Size; 2],
     /// Before and after over what it did not see.
@@ -61,12 +27,11 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// An accepted sensor, its sentence in peak to peak.
+    /// An accepted sensor.
     pub fn new(of: impl Into<String>, measure: impl Into<String>, in_sample: [Size; 2]) -> Self {
         Self {
             of: of.into(),
             measure: measure.into(),
-            figure: Figure::default(),
             in_sample,
             out_of_sample: None,
             accepted: true,
@@ -128,12 +93,6 @@ impl Verdict {
         self
     }
 
-    /// With another figure in its sentence.
-    pub fn stated_as(mut self, figure: Figure) -> Self {
-        self.figure = figure;
-        self
-    }
-
     /// With a remark.
     pub fn remark(mut self, reason: impl Into<String>) -> Self {
         self.reason = reason.into();
@@ -179,7 +138,7 @@ impl Verdict {
         }
     }
 
-    /// Its sentence without the reason and without a full stop: "gyro x: 1.68 → 0.170 °/h peak to peak out of sample; accepted".
+    /// Its sentence without the reason and without a full stop: "gyro x: 1.68 → 0.170 °/h rms out of sample; accepted".
     pub fn sentence(&self) -> String {
         let [before, after] = self.deciding();
         let state = self.state();
@@ -191,10 +150,8 @@ impl Verdict {
             };
         }
         let sample = if self.out_of_sample.is_some() { "out of sample" } else { "in sample" };
-        let of = |size: &Size| short(self.figure.of(size));
-        let (before, after) = (of(&before), of(&after));
-        let (measure, figure) = (&self.measure, self.figure.name());
-        format!("{}: {before} → {after} {measure} {figure} {sample}; {state}", self.of)
+        let [before, after] = [before, after].map(|size| short(size.rms));
+        format!("{}: {before} → {after} {} rms {sample}; {state}", self.of, self.measure)
     }
 }
 

@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
-use isotherm_log::message::{Message, Topic};
+use isotherm_correction::sample::OutputKind;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::key::UnitId;
 
-use super::readings;
+use super::{Fed, readings};
 
 use crate::error::Error;
 use crate::numbers::seconds;
@@ -15,8 +14,6 @@ use crate::numbers::seconds;
 /// Ticks of one kind of sensor, as columns of equal length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ticks {
-    /// Sequence numbers.
-    pub sequence: Vec<u64>,
     /// Ends (ns on the producer's clock).
     pub end_ns: Vec<i64>,
     /// Durations (s).
@@ -52,8 +49,6 @@ pub struct Series {
     pub unit: UnitId,
     /// Gyro ticks.
     pub gyros: Ticks,
-    /// Lasing mode by gyro tick: +1, −1, or 0 where the producer states none.
-    pub mode: Vec<i8>,
     /// Accelerometer ticks.
     pub accels: Ticks,
     /// Temperature channels by name.
@@ -68,59 +63,41 @@ impl Series {
         Self {
             unit,
             gyros: Ticks::default(),
-            mode: Vec::new(),
             accels: Ticks::default(),
             temperatures: BTreeMap::new(),
             bad_frames: 0,
         }
     }
 
-    /// Takes what a message has of raw readings; a frame that cannot be read is counted.
+    /// Takes an event, or the readings of a frame; a frame that cannot be read is counted.
     ///
     /// # Errors
     /// [`Error::Refused`] where ticks are of another instrument than those before.
-    pub fn take_message(&mut self, message: &Message) -> Result<(), Error> {
-        let Topic::Raw(_, stream) = &message.topic else { return Ok(()) };
-        let Some(readings) = readings(*stream, &message.frame) else {
-            self.bad_frames += 1;
-            return Ok(());
+    pub(super) fn take(&mut self, fed: &Fed<'_>) -> Result<(), Error> {
+        let event = match fed {
+            Fed::Event(event) => event,
+            Fed::Frame(stream, frame) => {
+                let events = readings(*stream, frame);
+                self.bad_frames += u64::from(events.is_none());
+                return events.iter().flatten().try_for_each(|event| self.take(&Fed::Event(event)));
+            }
         };
-        readings.iter().try_for_each(|event| self.take_event(event))
-    }
-
-    /// Takes one event.
-    ///
-    /// # Errors
-    /// As [`Series::take_message`].
-    pub fn take_event(&mut self, event: &LogEvent) -> Result<(), Error> {
         match event {
-            LogEvent::Gyro { output, tick } => self.gyro(*output, tick)?,
-            LogEvent::Accel { output, tick } => self.accel(*output, tick)?,
-            LogEvent::Temperature(reading) => self.temperature(reading),
+            LogEvent::Gyro { output, tick } => {
+                let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
+                self.gyros.push(*output, tick.sequence, lasts, &tick.readings)?;
+            }
+            LogEvent::Accel { output, tick } => {
+                let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
+                self.accels.push(*output, tick.sequence, lasts, &tick.readings)?;
+            }
+            LogEvent::Temperature(reading) => {
+                let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
+                channel.time_ns.push(reading.time.as_ns());
+                channel.raw.push(reading.raw);
+            }
         }
         Ok(())
-    }
-
-    fn gyro(&mut self, output: OutputKind, tick: &GyroTick) -> Result<(), Error> {
-        let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
-        self.gyros.push(output, tick.sequence, (end, duration), &tick.readings)?;
-        self.mode.push(match tick.mode {
-            Some(LasingMode::Plus) => 1,
-            Some(LasingMode::Minus) => -1,
-            None => 0,
-        });
-        Ok(())
-    }
-
-    fn accel(&mut self, output: OutputKind, tick: &AccelTick) -> Result<(), Error> {
-        let (end, duration) = (tick.end_time.as_ns(), tick.duration.as_s());
-        self.accels.push(output, tick.sequence, (end, duration), &tick.readings)
-    }
-
-    fn temperature(&mut self, reading: &TemperatureReading) {
-        let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
-        channel.time_ns.push(reading.time.as_ns());
-        channel.raw.push(reading.raw);
     }
 }
 
@@ -162,7 +139,6 @@ impl Ticks {
                 self.output.unwrap_or(output),
             )));
         }
-        self.sequence.push(sequence);
         self.end_ns.push(end_ns);
         self.duration_s.push(duration_s);
         self.readings.iter_mut().zip(readings).for_each(|(column, reading)| column.push(*reading));

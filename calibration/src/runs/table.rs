@@ -159,7 +159,7 @@ impl Table {
     /// Corrects a run and averages what comes out. A row without a valid tick of a kind of sensor, or with a gap, has no number there.
     ///
     /// # Errors
-    /// As [`Run::correct`].
+    /// As [`Run::correct_together`].
     pub fn of(run: &Run, loaded: &Loaded, window_s: f64, watch: impl Watch) -> Result<Self, Error> {
         Self::of_rows(run, loaded, Rows::valid(window_s), watch)
     }
@@ -167,7 +167,7 @@ impl Table {
     /// The same with rows of any kind.
     ///
     /// # Errors
-    /// As [`Run::correct`].
+    /// As [`Run::correct_together`].
     pub fn of_rows(run: &Run, loaded: &Loaded, rows: Rows, watch: impl Watch) -> Result<Self, Error> {
         Ok(Self::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default())
     }
@@ -175,7 +175,7 @@ impl Table {
     /// Corrects a run with several calibrations of the same channels and sensors at once: a table for each, with the same rows.
     ///
     /// # Errors
-    /// As [`Run::correct`].
+    /// As [`Run::correct_together`].
     pub fn together(
         run: &Run,
         loaded: &[Loaded],

@@ -1,15 +1,15 @@
 //! One run through several calibrations at once, each corrected tick beside the raw one.
 
 use std::collections::VecDeque;
+use std::slice;
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick, OutputKind};
 use isotherm_correction::unit::{Unit, UnitSettings};
-use isotherm_log::message::Topic;
 use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::key::RawStream;
 
-use super::{Fed, Piece, Run, Troubles, Watch, readings};
+use super::series::Series;
+use super::{Fed, Run, Troubles, Watch};
 use crate::error::Error;
 
 impl Run {
@@ -22,37 +22,57 @@ impl Run {
         watch: impl Watch,
         mut each: impl FnMut(OutputKind, &GyroTick),
     ) -> Result<(), Error> {
-        self.walk(watch, |piece| {
-            match piece {
-                Piece::Event(LogEvent::Gyro { output, tick }) => each(*output, tick),
-                Piece::Message(message) if matches!(message.topic, Topic::Raw(_, RawStream::Gyro)) => {
-                    for event in readings(RawStream::Gyro, &message.frame).iter().flatten() {
-                        if let LogEvent::Gyro { output, tick } = event {
-                            each(*output, tick);
-                        }
-                    }
-                }
-                Piece::Event(_) | Piece::Message(_) => {}
+        self.walk(watch, |fed| {
+            if let Fed::Event(LogEvent::Gyro { output, tick }) = fed {
+                each(*output, tick);
             }
             Ok(())
         })
     }
 
-    /// Corrects the run with several calibrations of the same channels and sensors at once. `each` sees every raw gyro
-    /// tick that was corrected, what each calibration made of it, and the unit of the first as it stands behind it. What each passed
-    /// over comes back.
+    /// Corrects the run with several calibrations of the same channels and sensors at once, as `isotherm-replay correct --ignore-journal`
+    /// does with each. `each` sees every raw gyro tick that was corrected, what each calibration made of it, and the unit of the first as
+    /// it stands behind it. What each passed over comes back.
     ///
     /// # Errors
-    /// As [`Run::correct`].
+    /// [`Error::Log`] where the log cannot be read; [`Error::Refused`] where nothing comes out.
     pub fn correct_together(
         &self,
         loaded: &[Loaded],
         watch: impl Watch,
         each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
     ) -> Result<Vec<Troubles>, Error> {
+        self.correct_beside(loaded, watch, |_| (), each)
+    }
+
+    /// Corrects the run with a calibration, and gives its readings as columns beside, from one reading of the log. The columns end where
+    /// [`Run::series`] would refuse them; the correction says what is wrong with the log.
+    ///
+    /// # Errors
+    /// As [`Run::correct_together`]; the columns are there all the same.
+    pub fn correct_with_series(
+        &self,
+        loaded: &Loaded,
+        watch: impl Watch,
+        mut each: impl FnMut(&CorrectedTick),
+    ) -> (Series, Result<Troubles, Error>) {
+        let (mut series, mut takes) = (Series::empty(self.unit.clone()), true);
+        let beside = |fed: &Fed<'_>| takes = takes && series.take(fed).is_ok();
+        let ticks = |_: &GyroTick, ticks: &[CorrectedTick], _: &Unit| ticks.iter().for_each(&mut each);
+        let troubles = self.correct_beside(slice::from_ref(loaded), watch, beside, ticks);
+        (series, troubles.map(|troubles| troubles.concat()))
+    }
+
+    fn correct_beside(
+        &self,
+        loaded: &[Loaded],
+        watch: impl Watch,
+        beside: impl FnMut(&Fed<'_>),
+        each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
+    ) -> Result<Vec<Troubles>, Error> {
         let Some(first) = loaded.first() else { return Ok(Vec::new()) };
         let mut units = Together::new(loaded, each);
-        self.feed(&first.calibration, watch, |_| (), |fed| units.take(&fed))?;
+        self.feed(&first.calibration, watch, beside, |fed| units.take(&fed))?;
         units.units.iter_mut().for_each(Offline::finish);
         units.give_out();
         units.units.iter().map(|unit| self.judge_troubles(units.count, unit.troubles())).collect()

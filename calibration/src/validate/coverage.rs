@@ -1,12 +1,14 @@
 //! What of the fitted range of temperature the logs cover, and how often it was left.
 
+use std::slice;
+
 use isotherm_correction::sample::SensorFlags;
 use isotherm_pages::Table;
 
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::real;
-use crate::report::short;
+use crate::report::{or_dash, short};
 use crate::runs::{Run, Watch};
 
 /// Share of the fitted range that a judgement should cover.
@@ -73,7 +75,8 @@ impl Coverage {
     /// Goes through a run tick by tick.
     pub(super) fn count(&mut self, run: &Run, written: &Written, watch: impl Watch) -> Result<(), Error> {
         let (channels, gyros, accels) = (&mut self.channels, &mut self.gyros, &mut self.accels);
-        run.correct(&written.loaded, watch, |tick, unit| {
+        run.correct_together(slice::from_ref(&written.loaded), watch, |_, ticks, unit| {
+            let Some(tick) = ticks.first() else { return };
             let flagged = gyros.iter_mut().zip(&tick.gyro_flags);
             for (sensor, flags) in flagged.chain(accels.iter_mut().zip(&tick.accel_flags)) {
                 sensor.ticks += 1;
@@ -140,7 +143,7 @@ impl Coverage {
     /// Ranges, and shares of flagged ticks.
     pub(super) fn tables(&self) -> Vec<(String, Table)> {
         let range = |range: Option<[f64; 2]>, digits: usize| {
-            range.map_or_else(|| "–".to_owned(), |[low, high]| format!("{low:.digits$}…{high:.digits$}"))
+            or_dash(range.map(|[low, high]| format!("{low:.digits$}…{high:.digits$}")))
         };
         let channel = |channel: &ChannelRange| {
             let rate = channel.rate.map(|rate| rate.map(|rate| rate * 60.0));
@@ -148,7 +151,7 @@ impl Coverage {
                 channel.name.clone(),
                 range(channel.seen, 1),
                 range(channel.fitted, 1),
-                channel.covered().map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", share * 100.0)),
+                or_dash(channel.covered().map(|share| format!("{:.0} %", share * 100.0))),
                 range(rate, 2),
             ]
         };

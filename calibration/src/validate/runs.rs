@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::document::Document;
 use toml::Value;
 
-use crate::document::{files_of, origin};
+use crate::document::{files_of, name_of, origin};
 use crate::error::Error;
 use crate::runs::Run;
 
@@ -49,8 +49,8 @@ fn around(run: &Run, named: &BTreeMap<String, String>) -> Result<BTreeSet<PathBu
         // The digest of a folder takes all of its files, so only where the document has one of this name.
         let folder = path.canonicalize().ok().and_then(|path| path.parent().map(Path::to_path_buf));
         let is_named = |folder: &PathBuf| {
-            let name = folder.file_name().map(|name| name.to_string_lossy());
-            name.is_some_and(|name| named.values().any(|other| *other == name))
+            let name = name_of(folder);
+            named.values().any(|other| *other == name)
         };
         paths.extend(folder.filter(is_named));
     }

@@ -5,9 +5,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use isotherm_calibration::document::Written;
-use isotherm_calibration::fits::positions::budget::ARCSEC_PER_RAD;
 use isotherm_calibration::fits::positions::plan::Plan;
-use isotherm_calibration::numbers::Size;
+use isotherm_calibration::numbers::{ARCSEC_PER_RAD, Size};
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_protocol::document::{Document, Residual, Sample};
 use isotherm_simulator::Scenario;

@@ -7,16 +7,14 @@ use isotherm_calibration::fits::board::{Wanted, fit};
 use isotherm_calibration::fits::thermal::{Site, Stand};
 use isotherm_calibration::runs::Run;
 use isotherm_correction::thermal::Feature;
-use isotherm_log::offline::unit_id;
-use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::presets::mems_chamber;
-use isotherm_simulator::{Scenario, Simulation};
 use serde_json::Value;
 
 use crate::command::{fails, shipped, succeeds};
-use crate::simulated_logs::record_events;
+use crate::simulated_logs::{events, record_events, run};
 
 /// Gravity alike on all three axes, and the opposite (pitch and roll, °).
 const DIAGONAL: [[f64; 2]; 2] = [[35.264_389_682_754_654, -135.0], [-35.264_389_682_754_654, 45.0]];
@@ -41,18 +39,6 @@ fn scenario(seed: u64, [pitch_deg, roll_deg]: [f64; 2], thermostat: bool) -> Sce
         }
     }
     scenario
-}
-
-fn events(scenario: &Scenario) -> Vec<LogEvent> {
-    let (output, accel_output) =
-        (scenario.instrument.gyros.output_kind(), scenario.instrument.accel_output_kind().unwrap());
-    let mut events = Vec::new();
-    for step in Simulation::new(scenario).unwrap() {
-        events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
-        events.extend(step.accel.map(|tick| LogEvent::Accel { output: accel_output, tick }));
-        events.push(LogEvent::Gyro { output, tick: step.gyro });
-    }
-    events
 }
 
 /// The shipped document with the scale that is true at 25 °C, and the channel of the board.
@@ -136,7 +122,7 @@ fn logs_that_do_not_tell_the_ratio_are_refused_by_kind() {
             .enumerate()
             .map(|(number, attitude)| {
                 let events = events(&scenario(20 + number as u64, attitude, thermostat));
-                Run::of_events(format!("log {number}"), unit_id("MEMS-0001").unwrap(), events)
+                run(&format!("log {number}"), "MEMS-0001", events)
             })
             .collect();
         let stands = attitudes.map(|tilt| Stand::from(Site::at(55.75, 30.0, Some(tilt), None).unwrap()));

@@ -12,7 +12,7 @@ use isotherm_calibration::fits::impact::scenario::Care;
 use isotherm_protocol::document::Document;
 use serde_json::Value;
 
-use crate::command::{calibrate, data, json, root};
+use crate::command::{calibrate, data, json, root, words};
 use crate::drift_generator::{Markov, Normal, recording};
 use crate::impact::{VOYAGE, parts};
 
@@ -358,15 +358,15 @@ fn what_a_log_does_not_allow_is_refused_in_words() {
         recording(Path::new(&path(name)), "U-1", columns, 10_000_000, keep);
     };
     let refusal = |arguments: &[&str]| {
-        let output = calibrate(arguments);
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        let (code, results, errors) = words(&calibrate(arguments));
+        (code, results + &errors)
     };
     write("dead.mcap", &[good.clone(), constant.clone(), bad], &|_| true);
     let (code, words) = refusal(&["drift", &path("dead.mcap")]);
     assert_eq!(code, Some(1));
     assert!(
-        words.contains("gyro y: every reading is 0: the sensor is dead")
-            && words.contains("gyro z: 200 of 2000"),
+        words.contains("gyro y: refused: every reading is 0: the sensor is dead")
+            && words.contains("gyro z: refused: 200 of 2000"),
         "{words}"
     );
     write("short.mcap", &[good.clone(), good.clone(), good.clone()], &|index| index < 50);

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{Document, Sample};
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path as Movement;
 use isotherm_simulator::presets::{mems_chamber, zeeman_rest};
-use isotherm_simulator::{Scenario, Simulation};
 use serde_json::Value;
 
 use crate::command::{calibrate, fails, shipped, succeeds, words};
-use crate::simulated_logs::record_events;
+use crate::simulated_logs::{events_after, record_events};
 
 /// Scenarios one after the other, as one recording; each starts where the last one ended.
 pub(crate) fn record(path: &Path, scenarios: &[Scenario]) {
@@ -22,22 +22,12 @@ pub(crate) fn record(path: &Path, scenarios: &[Scenario]) {
 
 /// What the unit reads through scenarios one after the other.
 pub(crate) fn events(scenarios: &[Scenario]) -> Vec<LogEvent> {
-    let (mut events, mut offset) = (Vec::new(), 0);
+    let (mut all, mut ticks) = (Vec::new(), 0);
     for scenario in scenarios {
-        let mut next = offset;
-        for mut step in Simulation::new(scenario).unwrap() {
-            events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
-            step.gyro.sequence += offset;
-            next = step.gyro.sequence + 1;
-            if let (Some(output), Some(mut tick)) = (scenario.instrument.accel_output_kind(), step.accel) {
-                tick.sequence += offset;
-                events.push(LogEvent::Accel { output, tick });
-            }
-            events.push(LogEvent::Gyro { output: scenario.instrument.gyros.output_kind(), tick: step.gyro });
-        }
-        offset = next;
+        all.extend(events_after(scenario, ticks));
+        ticks = all.iter().filter(|event| matches!(event, LogEvent::Gyro { .. })).count() as u64;
     }
-    events
+    all
 }
 
 /// The Zeeman unit through a chamber programme at ten ticks a second, with its accelerometers.
@@ -293,9 +283,11 @@ fn rates_are_judged_on_steps_that_the_fit_has_not_seen() {
 
     // What makes the judging steps worse is refused, and the gyro keeps what it had.
     let (code, report, errors) = words(&calibrate(&refs(&fit(&other, &bad))));
-    assert!(code == Some(1) && errors.contains("gyro z: the errors of its steps grow"), "{errors}");
+    assert!(code == Some(1) && errors.contains("gyro z: refused"), "{errors}");
     let report: Value = serde_json::from_str(&report).unwrap();
-    assert_eq!(report["verdicts"][2]["accepted"], false);
+    let refused = &report["verdicts"][2];
+    assert_eq!(refused["accepted"], false);
+    assert!(refused["reason"].as_str().unwrap().contains("the errors of its steps grow"), "{refused}");
     let kept = document(&bad).gyro.sensor[2].increment_weight_rad_per_rad;
     assert_eq!(kept, Some(1.0), "the nominal weight");
     assert_ne!(made.gyro.sensor[2].increment_weight_rad_per_rad, kept);

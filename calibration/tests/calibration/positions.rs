@@ -173,7 +173,7 @@ fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
         let found =
             analyse(&tracks(&runs, &document), &document.document, &settings(plan.clone(), None)).unwrap();
         assert_eq!(found.poses.len(), count, "{name}");
-        for ((pose, position, _), (span, planned)) in found.poses.iter().zip(&held) {
+        for ((pose, position), (span, planned)) in found.poses.iter().zip(&held) {
             assert_eq!(position, planned, "{name}: {:?}", pose.span_s);
             assert!(
                 pose.span_s[0] > span[0] && pose.span_s[1] < span[1] + 1e-6,
@@ -208,10 +208,9 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
     let found = analyse(&tracks(&runs, &base), &base.document, &exact).unwrap();
     let document = complete(&base.document, &found, GRAVITY);
     let written = Written::of(&document).unwrap();
-    let poses: Vec<_> = found.poses.iter().map(|(pose, position, _)| (pose.clone(), *position)).collect();
     let errors = found.fit.stand.map(|(error, _)| error);
     let (before, after) = (tracks(&runs, &base), tracks(&runs, &written));
-    let judged = judge(&plan, errors, GRAVITY, &poses, [&before, &after], &found.channels);
+    let judged = judge(&plan, errors, GRAVITY, &found.poses, [&before, &after], &found.channels);
     assert_eq!(judged.len(), 36);
     for judgement in &judged {
         // Noise of a mean over ten seconds is 1e-5 m/s², and what positions do not know of the stand is nothing.
@@ -220,7 +219,7 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
         assert!(judgement.length[1].abs() < 1e-4, "{judgement:?}");
     }
     // The same through the corrector once more, tick by tick.
-    for (judgement, (pose, position)) in judged.iter().zip(&poses) {
+    for (judgement, (pose, position)) in judged.iter().zip(&found.poses) {
         let mut unit = Offline::new(&written.loaded, UnitSettings::default());
         let mut ticks = Vec::new();
         for event in &logs[pose.run] {

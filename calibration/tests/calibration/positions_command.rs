@@ -198,6 +198,6 @@ fn a_judging_log_in_another_unit_of_measure_is_refused() {
     ];
     let done = within(folder.path(), &call);
     assert_eq!(done.status.code(), Some(1));
-    let errors = text(&done.stderr);
-    assert!(errors.contains("% of g remain in the log that judges, at most 2 % is accepted"), "{errors}");
+    let report = text(&done.stdout);
+    assert!(report.contains("% of g remain in the log that judges, at most 2 % is accepted"), "{report}");
 }

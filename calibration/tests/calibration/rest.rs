@@ -66,7 +66,7 @@ fn drift_states_nothing_beyond_what_a_document_allows() {
     let output = crate::command::calibrate(&["drift", &turned]);
     let (code, told, words) = crate::command::words(&output);
     assert_eq!(code, Some(1));
-    assert!(words.contains("gyro x: ") && words.contains("a document allows"), "{words}");
+    assert!(words.contains("gyro x: refused") && told.contains("a document allows"), "{words} {told}");
     assert!(told.contains("gyro x: 100 readings between"), "{told}");
     let (_, json, _) = crate::command::words(&crate::command::calibrate(&["drift", &turned, "--json"]));
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();

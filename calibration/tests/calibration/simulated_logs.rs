@@ -4,6 +4,7 @@ use std::borrow::Borrow;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use isotherm_calibration::runs::Run;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::unit_id;
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
@@ -28,7 +29,7 @@ pub(crate) fn record(path: &Path, scenario: &Scenario) {
 }
 
 /// What a scenario's unit reads.
-pub(crate) fn events(scenario: &Scenario) -> impl Iterator<Item = LogEvent> {
+pub(crate) fn events(scenario: &Scenario) -> impl Iterator<Item = LogEvent> + use<> {
     let output = scenario.instrument.gyros.output_kind();
     let accel_output = scenario.instrument.accel_output_kind();
     Simulation::new(scenario).unwrap().flat_map(move |step| {
@@ -38,6 +39,23 @@ pub(crate) fn events(scenario: &Scenario) -> impl Iterator<Item = LogEvent> {
             temperatures.chain(accel).chain([LogEvent::Gyro { output, tick: step.gyro }]).collect();
         events
     })
+}
+
+/// The same of a run that goes on after so many ticks.
+pub(crate) fn events_after(scenario: &Scenario, ticks: u64) -> impl Iterator<Item = LogEvent> {
+    events(scenario).map(move |mut event| {
+        match &mut event {
+            LogEvent::Gyro { tick, .. } => tick.sequence += ticks,
+            LogEvent::Accel { tick, .. } => tick.sequence += ticks,
+            LogEvent::Temperature(_) => {}
+        }
+        event
+    })
+}
+
+/// A run in memory.
+pub(crate) fn run(name: &str, unit: &str, events: impl IntoIterator<Item = LogEvent>) -> Run {
+    Run::of_events(name.to_owned(), unit_id(unit).unwrap(), events.into_iter().collect())
 }
 
 /// Writes what a unit read as a recording, 256 ticks a message.

@@ -11,16 +11,17 @@ use isotherm_calibration::document::Written;
 use isotherm_calibration::fits::positions::plan::{Attitude, Plan};
 use isotherm_calibration::runs::Run;
 use isotherm_correction::thermal::Feature;
-use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{AccelOutput, Curve, Document, Shape};
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Instrument;
 use isotherm_simulator::motion::{Motion, Path};
 use isotherm_simulator::orientation::Orientation;
 use isotherm_simulator::presets::{mems_chamber, zeeman_rest};
-use isotherm_simulator::{Scenario, Simulation};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use crate::simulated_logs::{self, events_after};
 
 /// Gravity of the stand (m/s²).
 pub(crate) const GRAVITY: f64 = 9.8154;
@@ -194,21 +195,9 @@ pub(crate) fn through(
             instrument: instrument.clone(),
             ..mems_chamber(0)
         };
-        for mut step in Simulation::new(&scenario).unwrap() {
-            let first = segment > 0;
-            let readings = step.temperatures.into_iter();
-            events.extend(
-                readings
-                    .filter(|reading| !first || reading.time.as_ns() > time_ns)
-                    .map(LogEvent::Temperature),
-            );
-            step.gyro.sequence += sequence;
-            if let (Some(output), Some(mut tick)) = (instrument.accel_output_kind(), step.accel) {
-                tick.sequence += sequence;
-                events.push(LogEvent::Accel { output, tick });
-            }
-            events.push(LogEvent::Gyro { output: instrument.gyros.output_kind(), tick: step.gyro });
-        }
+        let is_read_before = |event: &LogEvent| matches!(event, LogEvent::Temperature(reading) if reading.time.as_ns() <= time_ns);
+        let first = segment == 0;
+        events.extend(events_after(&scenario, sequence).filter(|event| first || !is_read_before(event)));
         let begin = time_ns as f64 * 1e-9;
         sequence += ticks.unsigned_abs();
         time_ns += ticks * stand.tick_ns;
@@ -237,7 +226,7 @@ pub(crate) fn through(
 
 /// The log as a run.
 pub(crate) fn run(name: &str, events: Vec<LogEvent>) -> Run {
-    Run::of_events(name.to_owned(), unit_id("MEMS-0001").unwrap(), events)
+    simulated_logs::run(name, "MEMS-0001", events)
 }
 
 /// A random attitude.

@@ -23,24 +23,20 @@ use isotherm_calibration::report::Report;
 use isotherm_calibration::runs::Run;
 use isotherm_correction::earth::Place;
 use isotherm_correction::thermal::Feature;
-use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::Document;
+use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training_profile};
-use isotherm_simulator::{Scenario, Simulation};
+
+use crate::simulated_logs::{self, events};
 
 /// Length of a simulated tick (ns).
 const TICK_NS: i64 = 500_000_000;
 
 /// A run of the simulator's gyros and thermometers in memory.
 fn run(scenario: &Scenario) -> Run {
-    let output = scenario.instrument.gyros.output_kind();
-    let mut events = Vec::new();
-    for step in Simulation::new(scenario).unwrap() {
-        events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
-        events.push(LogEvent::Gyro { output, tick: step.gyro });
-    }
-    Run::of_events("simulated".to_owned(), unit_id(&scenario.unit).unwrap(), events)
+    let events = events(scenario).filter(|event| !matches!(event, LogEvent::Accel { .. }));
+    simulated_logs::run("simulated", &scenario.unit, events)
 }
 
 /// The shipped document of the fibre-optic unit without accelerometers: scale and axes are those of the simulated instrument.

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, json};
 
+use super::sheet::{plus_minus, tenths};
 use super::{BEYOND, Changes, changes};
 use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::once_each;
-use crate::report::{Report, short};
+use crate::report::{Report, or_dash, short};
 
 /// The changes from each document to the next, and from the first to the last.
 #[derive(Debug, Clone)]
@@ -55,15 +56,11 @@ impl Series {
         let columns: Vec<String> =
             self.columns().map(|step| format!("{} → {}", step.names[0], step.names[1])).collect();
         let head = |first: &str| [vec![first.to_owned()], columns.clone()].concat();
-        let with_sigma = |value: f64, sigma: Option<f64>, digits: fn(f64) -> String| {
-            sigma.map_or_else(|| digits(value), |sigma| format!("{} ± {}", digits(value), digits(sigma)))
-        };
-        let tenths = |value: f64| format!("{value:.1}");
         let axes = self.whole.axes.iter().map(|axis| {
             let turned = |step: &Changes| {
                 let own = step.axes.iter().find(|other| other.of == axis.of)?;
                 let beyond = own.significance.is_some_and(|sigmas| sigmas > BEYOND);
-                let words = with_sigma(own.turned_arcsec, own.turned_sigma_arcsec, tenths);
+                let words = plus_minus(own.turned_arcsec, own.turned_sigma_arcsec, tenths);
                 Some(if beyond { words + " *" } else { words })
             };
             row(&axis.of, self.columns().map(turned))
@@ -77,7 +74,7 @@ impl Series {
         let values = kinds.into_iter().map(|(of, unit)| {
             let changed = |step: &Changes| {
                 let own = step.values.iter().find(|value| value.of == *of)?;
-                Some(with_sigma(own.at_reference, own.sigma, short))
+                Some(plus_minus(own.at_reference, own.sigma, short))
             };
             row(&format!("{of}, {unit}"), self.columns().map(changed))
         });
@@ -92,8 +89,7 @@ impl Series {
 
 /// A row of a table; what did not change is a dash.
 fn row(of: &str, cells: impl Iterator<Item = Option<String>>) -> Vec<String> {
-    let cells = cells.map(|cell| cell.unwrap_or_else(|| "–".to_owned()));
-    std::iter::once(of.to_owned()).chain(cells).collect()
+    std::iter::once(of.to_owned()).chain(cells.map(or_dash)).collect()
 }
 
 #[cfg(test)]

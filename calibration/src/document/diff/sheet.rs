@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
-use crate::report::{Report, short};
+use crate::report::{Report, or_dash, short};
 
 /// Entries of an origin that are shown one by one.
 const MOST_ABOUT: usize = 12;
@@ -50,7 +50,11 @@ impl Changes {
                 } else {
                     format!("beyond {BEYOND} σ: {}", names.join(", "))
                 };
-                format!("axes turn by up to {} ({}); {judged}", plus_minus(axis), axis.of)
+                format!(
+                    "axes turn by up to {} ″ ({}); {judged}",
+                    plus_minus(axis.turned_arcsec, axis.turned_sigma_arcsec, tenths),
+                    axis.of
+                )
             }
             _ => "no axis turns".to_owned(),
         };
@@ -104,12 +108,9 @@ impl Changes {
             };
             let mut cells = vec![axis.of.clone()];
             cells.extend(axis.change_arcsec.into_iter().zip(axis.sigma_arcsec).map(cosine));
-            cells.push(match axis.turned_sigma_arcsec {
-                Some(sigma) => format!("{:.1} ± {sigma:.1}", axis.turned_arcsec),
-                None => format!("{:.1}", axis.turned_arcsec),
-            });
-            cells.push(axis.significance.map_or_else(|| "–".to_owned(), |sigmas| format!("{sigmas:.1}")));
-            cells.push(format!("{:.1}", axis.largest_arcsec));
+            cells.push(plus_minus(axis.turned_arcsec, axis.turned_sigma_arcsec, tenths));
+            cells.push(or_dash(axis.significance.map(tenths)));
+            cells.push(tenths(axis.largest_arcsec));
             cells.push(
                 match axis.significance {
                     _ if axis.turned_arcsec <= 0.0 => "as it was",
@@ -136,10 +137,7 @@ impl Changes {
         let row = |value: &ValueChange| {
             let mut cells = vec![format!("{}, {}", value.of, value.unit)];
             cells.extend(at.iter().filter_map(|index| value.change.get(*index)).map(|change| short(*change)));
-            cells.push(match value.sigma {
-                Some(sigma) => format!("{} ± {}", short(value.at_reference), short(sigma)),
-                None => short(value.at_reference),
-            });
+            cells.push(plus_minus(value.at_reference, value.sigma, short));
             cells
         };
         sheet.table("Changes of biases and scale factors", head, self.values.iter().map(row));
@@ -147,9 +145,8 @@ impl Changes {
 
     fn entries_table(&self, sheet: &mut Report) {
         let about = |key: &str| ["origin", "note", "created"].iter().any(|about| key.starts_with(about));
-        let or_dash = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
         let row = |entry: &isotherm_protocol::control::DocumentChange| {
-            vec![entry.key.clone(), or_dash(&entry.before), or_dash(&entry.after)]
+            vec![entry.key.clone(), or_dash(entry.before.clone()), or_dash(entry.after.clone())]
         };
         let matter = self.entries.iter().filter(|entry| !about(&entry.key)).map(row);
         sheet.table("Entries that differ", ["key", "before", "after"], matter);
@@ -178,11 +175,14 @@ impl Changes {
     }
 }
 
-fn plus_minus(axis: &AxisChange) -> String {
-    match axis.turned_sigma_arcsec {
-        Some(sigma) => format!("{:.1} ± {sigma:.1} ″", axis.turned_arcsec),
-        None => format!("{:.1} ″", axis.turned_arcsec),
-    }
+/// A number with its standard error, where it has one.
+pub(super) fn plus_minus(value: f64, sigma: Option<f64>, digits: fn(f64) -> String) -> String {
+    let sigma = sigma.map_or_else(String::new, |sigma| format!(" ± {}", digits(sigma)));
+    digits(value) + &sigma
+}
+
+pub(super) fn tenths(value: f64) -> String {
+    format!("{value:.1}")
 }
 
 fn largest_of(value: &ValueChange) -> f64 {

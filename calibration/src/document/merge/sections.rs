@@ -10,6 +10,9 @@ pub(super) type Sections = BTreeMap<String, Value>;
 
 /// Keys that say nothing about the correction.
 const ABOUT: [&str; 4] = ["schema", "created", "note", "origin"];
+/// Lists whose entries have names.
+const LISTS: [&str; 3] = ["temperature.channel", "gyro.sensor", "accel.sensor"];
+
 /// Whether a key is that of a term of a sensor's bias, all of which one fit makes together.
 fn is_bias(terms: &[Term], key: &str) -> bool {
     terms.iter().any(|term| term.key == key && term.makes == Makes::Bias)
@@ -90,76 +93,62 @@ fn named(list: &[Value]) -> impl Iterator<Item = (&str, &Table)> {
     tables.map(|table| (table.get("name").and_then(Value::as_str).unwrap_or_default(), table))
 }
 
-/// Sections back as a document; sensors and channels in the order of `base`, new ones behind.
-pub(super) fn build(base: &Table, sections: &Sections) -> Table {
-    let mut tree: Table = base
-        .iter()
-        .filter(|(key, _)| is_about(key))
-        .map(|(key, value)| (key.clone(), value.clone()))
-        .collect();
-    let mut lists: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-    for (list, path) in [
-        ("temperature.channel", ["temperature", "channel"]),
-        ("gyro.sensor", ["gyro", "sensor"]),
-        ("accel.sensor", ["accel", "sensor"]),
-    ] {
-        let [first, second] = path;
-        let entries = base.get(first).and_then(|kind| kind.get(second)?.as_array());
-        let names = entries.into_iter().flat_map(|entries| named(entries)).map(|(name, _)| name.to_owned());
-        lists.insert(list, names.collect());
-    }
-    let mut entries: BTreeMap<&str, BTreeMap<String, Table>> = BTreeMap::new();
-    for (key, value) in sections {
-        let list = lists
-            .keys()
-            .copied()
-            .find(|list| key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')));
-        let Some((list, rest)) =
-            list.and_then(|list| Some((list, key.strip_prefix(list)?.strip_prefix('.')?)))
-        else {
-            insert(&mut tree, key, value.clone());
-            continue;
-        };
-        // The name of a channel may hold a dot; that of a term never does.
-        let (name, inner) = match value {
-            Value::Table(table) if list == "temperature.channel" => (rest, Some(table)),
-            _ => (rest.rsplit_once('.').map_or(rest, |(name, _)| name), None),
-        };
-        if let Some(names) = lists.get_mut(list).filter(|names| names.iter().all(|known| known != name)) {
-            names.push(name.to_owned());
-        }
-        let entry = entries.entry(list).or_default().entry(name.to_owned()).or_default();
-        entry.insert("name".to_owned(), Value::String(name.to_owned()));
-        match (inner, rest.rsplit_once('.')) {
-            (Some(table), _) => entry.extend(table.clone()),
-            (None, Some((_, term))) => {
-                entry.insert(term.to_owned(), value.clone());
-            }
-            (None, None) => {}
-        }
-    }
-    for (list, names) in &lists {
-        let mut of_list = entries.remove(list).unwrap_or_default();
-        let tables: Vec<Value> =
-            names.iter().filter_map(|name| of_list.remove(name)).map(Value::Table).collect();
-        if !tables.is_empty() {
-            insert(&mut tree, list, Value::Array(tables));
-        }
+/// A document's tree with other sections in the place of its own; new sensors and channels stand behind the others.
+pub(super) fn with(mut tree: Table, own: &Sections, other: &Sections) -> Table {
+    let gone = own.keys().filter(|key| !other.contains_key(*key)).map(|key| (key, None));
+    let new = other.iter().filter(|(key, value)| own.get(*key) != Some(*value));
+    for (key, value) in gone.chain(new.map(|(key, value)| (key, Some(value.clone())))) {
+        put(&mut tree, key, value);
     }
     tree
 }
 
-/// Sets the value at a path of keys without names in them.
-fn insert(tree: &mut Table, path: &str, value: Value) {
-    match path.split_once('.') {
-        None => {
-            tree.insert(path.to_owned(), value);
+/// Sets a section, or takes it out.
+fn put(tree: &mut Table, key: &str, value: Option<Value>) {
+    let parts = |list: &'static str| {
+        let (kind, own) = list.split_once('.')?;
+        Some((kind, own, key.strip_prefix(list)?.strip_prefix('.')?))
+    };
+    let Some((kind, own, rest)) = LISTS.into_iter().find_map(parts) else {
+        let (path, last) = key.rsplit_once('.').unwrap_or(("", key));
+        if let Some(table) = table_at(tree, path) {
+            set(table, last, value);
         }
-        Some((first, rest)) => {
-            let inner = tree.entry(first.to_owned()).or_insert_with(|| Value::Table(Table::new()));
-            if let Some(table) = inner.as_table_mut() {
-                insert(table, rest, value);
+        return;
+    };
+    let list = table_at(tree, kind).map(|table| table.entry(own).or_insert_with(|| Value::Array(Vec::new())));
+    let Some(Value::Array(entries)) = list else { return };
+    let (name, term) = match rest.rsplit_once('.') {
+        Some((name, term)) if own == "sensor" => (name, Some(term)),
+        _ => (rest, None),
+    };
+    let known = named(entries).position(|(other, _)| other == name);
+    let at = known.unwrap_or_else(|| {
+        entries.push(Value::Table(Table::from_iter([("name".to_owned(), name.into())])));
+        entries.len() - 1
+    });
+    match (term, value) {
+        (Some(term), value) => {
+            if let Value::Table(entry) = &mut entries[at] {
+                set(entry, term, value);
             }
         }
+        (None, Some(value)) => entries[at] = value,
+        (None, None) => drop(entries.remove(at)),
     }
+}
+
+/// The table at a path of keys without names in them; a new one where there is none.
+fn table_at<'a>(tree: &'a mut Table, path: &str) -> Option<&'a mut Table> {
+    let mut keys = path.split('.').filter(|key| !key.is_empty());
+    keys.try_fold(tree, |table, key| {
+        table.entry(key).or_insert_with(|| Value::Table(Table::new())).as_table_mut()
+    })
+}
+
+fn set(table: &mut Table, key: &str, value: Option<Value>) {
+    drop(match value {
+        Some(value) => table.insert(key.to_owned(), value),
+        None => table.remove(key),
+    });
 }

@@ -67,6 +67,8 @@ fn parts_made_from_one_base_go_together() {
     let origin = document.origin.as_ref().unwrap();
     let parts = origin.details.as_ref().unwrap()["parts"].as_table().unwrap();
     assert_eq!(parts["thermal.toml"]["method"].as_str(), Some("joint"));
+    let created = &parts["thermal.toml"]["created"];
+    assert!(created.is_datetime() && created.to_string() == thermal.document.created.unwrap().to_string());
     assert_eq!(parts.len(), 3);
     // Standard errors follow what was taken, and nothing else.
     let sigmas = Sigmas::of(document);

@@ -5,10 +5,8 @@ use isotherm_protocol::document::{Document, Orientation};
 use super::parts;
 use super::terms::Term;
 use crate::document::accelerometers;
-use crate::report::{Report, short};
-
-/// Seconds of arc in a radian.
-pub(crate) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
+use crate::numbers::ARCSEC_PER_RAD;
+use crate::report::{Report, or_dash, short};
 
 /// Unit, sensors, and how good it is by its own account.
 pub(super) fn words(document: &Document) -> String {
@@ -65,7 +63,6 @@ pub(super) fn notes(document: &Document, terms: &[Term]) -> Vec<String> {
 
 /// Sensors, axes, channels, drift, residuals.
 pub(super) fn tables(sheet: &mut Report, document: &Document) {
-    let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
     let channels = document.temperature.channel.iter().map(|channel| {
         let [low, high] = channel.range_deg_c;
         let conversion: Vec<String> = channel.conversion_deg_c.iter().map(ToString::to_string).collect();
@@ -113,9 +110,9 @@ fn axes<P>(names: Vec<String>, orientation: &Orientation<P>) -> Vec<Vec<String>>
         let norm = libm::sqrt(x * x + y * y + z * z);
         let rest = libm::sqrt((norm * norm - largest * largest).max(0.0));
         let slopes = orientation.thermal.as_ref().and_then(|t| t.slopes_arcsec_per_deg_c.get(index));
-        let slope = slopes.map_or_else(|| "–".to_owned(), |slope| slope.map(short).join(", "));
+        let slope = or_dash(slopes.map(|slope| slope.map(short).join(", ")));
         // Off by more than 10° it stands askew on purpose.
-        let angle = libm::atan2(rest, largest) * ARCSEC;
+        let angle = libm::atan2(rest, largest) * ARCSEC_PER_RAD;
         let off = if angle < 36_000.0 { format!("{angle:.1}") } else { format!("{:.2}°", angle / 3600.0) };
         let mut cells = vec![name];
         cells.extend(row.iter().map(|part| format!("{part:.7}")));

@@ -1,13 +1,11 @@
 //! The terms of a document as curves.
 
-use isotherm_correction::units::{AngularRate, SpecificForce};
-use isotherm_pages::{Axis, Chart, Content, Ink, Panel, Samples, Series};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
-use super::about::ARCSEC;
 use super::terms::Term;
-use super::{RAMPS, lasing_mode, places, ramp_words, spoken, steady};
-use crate::document::{Written, accelerometers};
-use crate::numbers::{Size, once_each};
+use super::{Sum, lasing_mode, places, ramp_words, spoken, steady, sums};
+use crate::document::Written;
+use crate::numbers::{ARCSEC_PER_RAD, Size, once_each};
 use crate::report::Report;
 
 /// Points of a curve.
@@ -17,7 +15,7 @@ pub(crate) const HEIGHT: u32 = 150;
 
 /// Adds them all.
 pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], range: [f64; 2]) {
-    let sums = sums(written, range);
+    let sums = sum_panels(written, range);
     let caption =
         format!("All terms together, lags settled{}, all channels at one temperature.", lasing_mode(written));
     add(sheet, "Bias in all", &caption, "°C", sums);
@@ -62,35 +60,18 @@ fn add(sheet: &mut Report, heading: &str, caption: &str, unit: &str, panels: Vec
     sheet.chart(heading, Chart::of(caption, Axis::of(label, unit), panels));
 }
 
-fn sums(written: &Written, range: [f64; 2]) -> Vec<Panel> {
+/// Biases in all; those that are constant stand in the table.
+fn sum_panels(written: &Written, range: [f64; 2]) -> Vec<Panel> {
     let at = places(range, POINTS);
-    let gyros = written.document.gyro.sensor.iter().enumerate().map(|(index, gyro)| {
-        let curves = RAMPS.into_iter().zip(Ink::several()).map(|(ramp, ink)| {
-            let bias = |x: &f64| {
-                let bias = steady(written, *x, ramp).gyro_bias.get(index).copied().unwrap_or(f64::NAN);
-                (*x, AngularRate::from_rad_per_s(bias).as_deg_per_h())
-            };
-            Series::line(ramp_words(ramp), ink, at.iter().map(bias))
-        });
-        Panel::of(format!("gyro {}", gyro.name), "°/h", HEIGHT, curves.collect())
-    });
-    let accels = accelerometers(&written.document).iter().enumerate().map(|(index, accel)| {
-        let bias = |x: &f64| {
-            let bias = steady(written, *x, 0.0).accel_bias.get(index).copied().unwrap_or(f64::NAN);
-            (*x, SpecificForce::from_m_per_s2(bias).as_g() * 1e3)
-        };
-        let curve = Series::line("steady", Ink::First, at.iter().map(bias));
-        Panel::of(format!("accelerometer {}", accel.name), "mg", HEIGHT, vec![curve])
-    });
-    // What is constant stands in the table.
-    let varies = |panel: &Panel| match &panel.content {
-        Content::Series(curves) => curves.iter().any(|curve| match &curve.samples {
-            Samples::Points { y, .. } => Size::of(y).peak_to_peak > 0.0,
-            Samples::Bins { .. } => true,
-        }),
-        Content::Lanes(_) => true,
+    let varies = |sum: &Sum| sum.ramps.iter().any(|(_, values)| Size::of(values).peak_to_peak > 0.0);
+    let panel = |sum: Sum| {
+        let curves =
+            sum.ramps.into_iter().zip(Ink::several()).map(|((ramp, values), ink)| {
+                Series::line(ramp_words(ramp), ink, at.iter().copied().zip(values))
+            });
+        Panel::of(sum.name, sum.unit, HEIGHT, curves.collect())
     };
-    gyros.chain(accels).filter(varies).collect()
+    sums(written, &at).into_iter().filter(varies).map(panel).collect()
 }
 
 fn axes(written: &Written, range: [f64; 2]) -> Vec<Panel> {
@@ -104,7 +85,7 @@ fn axes(written: &Written, range: [f64; 2]) -> Vec<Panel> {
                 let row = rows(*x).get(index).copied().unwrap_or([f64::NAN; 3]);
                 let from = centre.get(index).copied().unwrap_or([f64::NAN; 3]);
                 let squares = row.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-                (*x, libm::sqrt(squares) * ARCSEC)
+                (*x, libm::sqrt(squares) * ARCSEC_PER_RAD)
             };
             Series::line(name, ink, at.iter().map(turned))
         });

@@ -3,7 +3,7 @@
 use isotherm_protocol::document::{Document, Measure, Residual, Sample};
 use toml::{Table, Value};
 
-use crate::report::{Report, short};
+use crate::report::{Report, or_dash, short};
 
 /// Most entries of a list that are named.
 const NAMED: usize = 4;
@@ -40,7 +40,7 @@ pub(super) fn tables(sheet: &mut Report, document: &Document) {
         vec![
             part.name.clone(),
             text("method"),
-            text("created"),
+            or_dash(part.about.get("created").map(Value::to_string)),
             named(taken.filter_map(Value::as_str)),
             named(logs),
         ]
@@ -94,5 +94,5 @@ fn of_table(residual: &Table) -> Option<Vec<String>> {
 fn row(of: &str, measure: &str, inside: bool, rms: [f64; 2], peaks: Option<[f64; 2]>) -> Vec<String> {
     let pair = |[before, after]: [f64; 2]| format!("{} → {}", short(before), short(after));
     let sample = if inside { "in sample" } else { "out of sample" };
-    vec![format!("{of}, {measure}, {sample}"), pair(rms), peaks.map_or_else(|| "–".to_owned(), pair)]
+    vec![format!("{of}, {measure}, {sample}"), pair(rms), or_dash(peaks.map(pair))]
 }

@@ -1,7 +1,7 @@
 //! From runs to a document with the ratio of the board, and its report.
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
-use isotherm_protocol::document::{AccelSensor, Document, Sample};
+use isotherm_protocol::document::{AccelSensor, Document};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
@@ -11,8 +11,8 @@ use crate::finding::AccelKind;
 use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
-use crate::numbers::{dot, hull};
-use crate::report::{Curve, Figure, Judged, Report, Rest, Sigmas, fixed, judge, per_deg_c, short};
+use crate::numbers::{dot, hull, once_each};
+use crate::report::{Curve, Judged, Report, Rest, Sigmas, fixed, judge, per_deg_c, short};
 use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
@@ -83,8 +83,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     }
     let given = Written::of(wanted.base)?;
     let mut written = Written::of(&with(wanted.base, &found))?;
-    let mut troubled = Vec::new();
-    let mut curves = judged(wanted, [&given, &written], &mut troubled, &mut watch)?;
+    let Judged { mut curves, mut troubles } = judged(wanted, [&given, &written], &mut watch)?;
     let mains: Vec<usize> =
         wanted.base.accel.iter().flat_map(|accel| accel.orientation.rows.iter().map(main_axis)).collect();
     let mut verdicts = Curve::verdicts(&curves);
@@ -102,7 +101,8 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
             }
         }
         written = Written::of(&with(wanted.base, &found))?;
-        curves = judged(wanted, [&given, &written], &mut troubled, &mut watch)?;
+        let again = judged(wanted, [&given, &written], &mut watch)?;
+        (curves, troubles) = (again.curves, once_each([troubles, again.troubles].concat()));
         verdicts = Curve::verdicts(&curves);
         for verdict in &mut verdicts {
             if let Some(refused) = kept.iter().find(|kept| kept.of == verdict.of) {
@@ -113,8 +113,8 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     let mut report =
         Report::new("Ratio of the accelerometers' board over its temperature", &wanted.base.unit);
     report.residuals = curves;
-    report.verdicts = verdicts.into_iter().map(|verdict| verdict.stated_as(Figure::Rms)).collect();
-    report.warnings = troubled;
+    report.verdicts = verdicts;
+    report.warnings = troubles;
     tell(&mut report, (wanted, sensors, &mains), &found);
     Ok(Made { written, found, report })
 }
@@ -164,25 +164,9 @@ fn with(base: &Document, found: &[Result<Ratio, AccelKind>]) -> Document {
 }
 
 /// Forces along the case axes before and after, each run less its mean, which the ratio does not know.
-fn judged(
-    wanted: &Wanted<'_>,
-    [before, after]: [&Written; 2],
-    troubled: &mut Vec<String>,
-    mut watch: impl Watch,
-) -> Result<Vec<Curve>, Error> {
-    let mut curves = Vec::new();
-    let inside = wanted.runs.iter().map(|run| (run, Sample::In));
-    for (run, sample) in inside.chain(wanted.judges.iter().map(|run| (run, Sample::Out))) {
-        let documents = (&before.loaded, &after.loaded);
-        let about = (&after.document, &Rest::default());
-        let Judged { curves: of_run, troubles } =
-            judge(run, sample, documents, about, Windows::valid(wanted.window_s), &mut watch)?;
-        curves.extend(of_run.into_iter().filter(|curve| curve.of.starts_with("accelerometer")));
-        let words = troubles.iter().map(|words| format!("{}: {words}", run.name));
-        let new: Vec<String> = words.filter(|words| !troubled.contains(words)).collect();
-        troubled.extend(new);
-    }
-    Ok(curves)
+fn judged(wanted: &Wanted<'_>, documents: [&Written; 2], watch: impl Watch) -> Result<Judged, Error> {
+    let of_run = |_, _: &Run| Ok((Rest::default(), Windows::valid(wanted.window_s), "accelerometer"));
+    judge((wanted.runs, wanted.judges), documents, of_run, watch)
 }
 
 /// Puts into the report what was found of each accelerometer.

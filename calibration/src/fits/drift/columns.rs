@@ -73,9 +73,6 @@ pub fn unnamed() -> Result<UnitId, Error> {
     Ok(unit_id("unnamed")?)
 }
 
-/// ″ per count and s in °/h: 1 ″/s is 1 °/h.
-const DEG_PER_H_IN_ARCSEC_PER_S: f64 = 1.0;
-
 impl Columns {
     /// From raw ticks of a kind; counts of gyros need the angle that one stands for (″).
     ///
@@ -101,7 +98,8 @@ impl Columns {
                     "the {sensor} readings are counts: give {weight}a calibration document with --calibration"
                 )));
             }
-            (Some(OutputKind::Counts), weight) => weight.map(|weight| weight * DEG_PER_H_IN_ARCSEC_PER_S),
+            // ″ per count and s are °/h: 1 ″/s is 1 °/h.
+            (Some(OutputKind::Counts), weight) => weight,
             (Some(OutputKind::Mean), _) => None,
         };
         let names: Vec<String> =
@@ -125,10 +123,10 @@ impl Columns {
     /// The raw readings decide first: behind a correction a dead sensor still shows a little of the others.
     ///
     /// # Errors
-    /// As [`Run::correct`] and [`checks::raw`].
+    /// As [`Run::correct_together`] and [`checks::raw`].
     pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
         let mut columns = Self::empty(loaded.unit.clone(), kind);
-        let (series, troubles) = run.correct_with_series(loaded, watch, |tick, _| columns.push(tick));
+        let (series, troubles) = run.correct_with_series(loaded, watch, |tick| columns.push(tick));
         columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
         columns.notes = troubles?;
         if run.unit != loaded.unit {

@@ -13,6 +13,7 @@ mod likelihood;
 use nalgebra::{DMatrix, DVector};
 
 use super::slow::Slow;
+use crate::lsq::correlated::Noise;
 use crate::lsq::linear;
 use crate::report::{short, within};
 use likelihood::{Problem, Solution, noise};
@@ -37,16 +38,8 @@ pub struct Beside {
     pub periods_h: Vec<u32>,
 }
 
-/// Size of the noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// τ (h).
-    pub correlation_time_h: f64,
-    /// Variance of the white part of a bin over that of the Markov part.
-    pub white_ratio: f64,
-    /// Whether there is a Markov part.
-    pub markov: bool,
-}
+/// Noise without a Markov part.
+pub const WHITE: Noise = Noise { white: 1.0, markov: None };
 
 /// A fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,13 +56,11 @@ pub struct Fit {
     pub beta: Vec<f64>,
     /// Covariance of β.
     pub covariance: DMatrix<f64>,
-    /// −2·ln of the restricted likelihood, up to a constant of the columns.
-    pub minus_two_log: f64,
     /// −2·ln of the plain likelihood, which fits with other things beside the noise can be compared by.
     pub minus_two_log_of_readings: f64,
     /// Middle and half length of the log (h).
     pub span_h: [f64; 2],
-    /// Size of the noise.
+    /// Noise by bins, its times in h: the Markov part has the variance one, the white part its share of that.
     pub noise: Noise,
 }
 
@@ -122,21 +113,20 @@ impl Fit {
             return None;
         }
         let problem = Problem::new(slow, beside);
-        let white = Noise { correlation_time_h: 0.0, white_ratio: 1.0, markov: false };
-        let without = problem.solve(&white)?;
+        let without = problem.solve(WHITE)?;
         let found = noise(problem.best());
-        let with = problem.solve(&found)?;
+        let with = problem.solve(found)?;
         if without.minus_two_log() - with.minus_two_log() > LEAST_GAIN {
             Some(Self::build(&problem, beside, found, &with))
         } else {
-            Some(Self::build(&problem, beside, white, &without))
+            Some(Self::build(&problem, beside, WHITE, &without))
         }
     }
 
     /// With the noise of another fit.
     pub fn with_noise(slow: &Slow, beside: &Beside, noise: Noise) -> Option<Self> {
         let problem = Problem::new(slow, beside);
-        let solution = problem.solve(&noise)?;
+        let solution = problem.solve(noise)?;
         Some(Self::build(&problem, beside, noise, &solution))
     }
 
@@ -159,27 +149,24 @@ impl Fit {
     }
 
     fn build(problem: &Problem<'_>, beside: &Beside, noise: Noise, solution: &Solution) -> Self {
-        let variance = solution.squares / solution.degrees;
+        let variance = solution.of.chi_square / solution.degrees;
         let (mut sigma, mut correlation_time_h) = (None, None);
-        if noise.markov {
-            let tau = noise.correlation_time_h;
+        if let Some([_, tau]) = noise.markov {
             let value = (variance / share_of_mean(problem.slow.width_h / tau)).sqrt();
-            let sigmas = problem.sigmas(&noise, variance);
+            let sigmas = problem.sigmas(noise, variance);
             let around = |value: f64, at: usize| {
                 let factor = sigmas.and_then(|sigmas| sigmas.get(at).map(|s| libm::exp(1.96 * s)));
                 Estimate { value, interval: factor.map(|factor| [value / factor, value * factor]) }
             };
             (sigma, correlation_time_h) = (Some(around(value, 0)), Some(around(tau, 1)));
         }
-        let white = (variance * if noise.markov { noise.white_ratio } else { 1.0 }).sqrt();
         Self {
             beside: beside.clone(),
             sigma,
             correlation_time_h,
-            white,
-            beta: solution.beta.iter().copied().collect(),
-            covariance: &solution.inverse * variance,
-            minus_two_log: solution.minus_two_log(),
+            white: (variance * noise.white).sqrt(),
+            beta: solution.of.coefficients.iter().copied().collect(),
+            covariance: &solution.of.covariance * variance,
             minus_two_log_of_readings: solution.minus_two_log_of_readings(),
             span_h: problem.span_h,
             noise,

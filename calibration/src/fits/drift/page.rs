@@ -1,10 +1,11 @@
-//! The HTML report of a log's noise and drift.
+//! Charts of a log's noise and drift.
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
 use super::fit::Analysis;
-use super::markov::{Fit, Noise};
+use super::markov::Fit;
 use super::report::Found;
+use crate::lsq::correlated::Noise;
 
 /// Most points of a spectrum in the page.
 const SPECTRUM_POINTS: usize = 4096;
@@ -92,9 +93,7 @@ fn autocorrelation(found: &Found) -> Chart {
         let auto = sensor.autocorrelation.as_ref()?;
         let points = auto.lag_h.iter().copied().zip(auto.correlation.iter().copied());
         let mut curves = vec![Series::line("of the slow part", Ink::Raw, points)];
-        if let Some((Fit { noise: Noise { correlation_time_h: time_h, markov: true, .. }, .. }, _)) =
-            &sensor.markov
-        {
+        if let Some((Fit { noise: Noise { markov: Some([_, time_h]), .. }, .. }, _)) = &sensor.markov {
             let model = auto.lag_h.iter().map(|lag| (*lag, libm::exp(-lag / time_h)));
             curves.push(Series::line("Markov part", Ink::Second, model));
         }

@@ -11,7 +11,7 @@ use super::fit::{Analysis, Deviation, Deviations};
 use super::page;
 use super::pieces::Grid;
 use crate::fits::drift::allan::{Coefficient, Term};
-use crate::report::{Report, Verdict, short, within};
+use crate::report::{Report, Verdict, or_dash, short, within};
 
 /// What was found in a log.
 #[derive(Debug, Clone)]
@@ -163,8 +163,7 @@ impl Found {
             }
         }
         let longest = self.sensors.iter().map(|sensor| sensor.allan.len()).max().unwrap_or(0);
-        let cell =
-            |deviation: Option<Deviation>| deviation.map_or_else(|| "–".to_owned(), |d| short(d.value));
+        let cell = |deviation: Option<Deviation>| or_dash(deviation.map(|deviation| short(deviation.value)));
         let row = |index: usize| {
             let tau = self.sensors.iter().find_map(|sensor| sensor.allan.get(index)).map_or(0.0, |d| d.tau_s);
             let cells = self.sensors.iter().flat_map(|sensor| {
@@ -209,19 +208,17 @@ impl Found {
         let mut row = |name: String, of: &dyn Fn(&Analysis) -> String| {
             rows.push(std::iter::once(name).chain(self.sensors.iter().map(of)).collect());
         };
-        let none = || "–".to_owned();
-        let power = |value: Option<(f64, f64)>| {
-            value.map_or_else(none, |(v, e)| format!("{} ± {}", short(v), short(e)))
-        };
+        let power =
+            |value: Option<(f64, f64)>| or_dash(value.map(|(v, e)| format!("{} ± {}", short(v), short(e))));
         row(format!("mean, {measure}"), &|a| short(a.mean));
         row(format!("standard deviation, {measure}"), &|a| short(a.deviation));
         row(format!("of the slow part, {measure}"), &|a| short(a.slow_deviation));
         row(format!("σ of the Markov part, {measure}"), &|a| {
             a.slow_drift().map_or_else(|| "none seen".to_owned(), |(s, _)| s.words())
         });
-        row("its correlation time, h".to_owned(), &|a| a.slow_drift().map_or_else(none, |(_, t)| t.words()));
+        row("its correlation time, h".to_owned(), &|a| or_dash(a.slow_drift().map(|(_, t)| t.words())));
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
-            a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map_or_else(none, short)
+            or_dash(a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map(short))
         });
         row(format!("trend, {}", self.kind.over_hours(1)), &|a| power(a.slope));
         row(format!("second order, {}", self.kind.over_hours(2)), &|a| {

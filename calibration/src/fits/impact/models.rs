@@ -15,7 +15,7 @@ use super::estimate::TICK_S;
 use super::scenario::{Drift, Voyage};
 use crate::axes::AXES;
 use crate::fits::drift::DEG_PER_H_IN_RAD_PER_S;
-use crate::fits::drift::markov::{Beside, Fit, Noise};
+use crate::fits::drift::markov::{Beside, Fit, WHITE};
 use crate::fits::drift::slow::Slow;
 use crate::numbers::real;
 use crate::report::short;
@@ -54,8 +54,7 @@ impl Choice {
         let per_parameter = libm::log(real(slow.mean.len()));
         let beside = |degree| Beside { degree, periods_h: Vec::new() };
         let level = Fit::of(slow, &beside(0))?;
-        let white = Noise { correlation_time_h: 0.0, white_ratio: 1.0, markov: false };
-        let trend = Fit::with_noise(slow, &beside(1), white)?;
+        let trend = Fit::with_noise(slow, &beside(1), WHITE)?;
         let markov = level.sigma.zip(level.correlation_time_h).map(|(sigma, time)| [sigma.value, time.value]);
         // Constant and white noise; σ and τ, or the slope.
         let parameters = if markov.is_some() { 4.0 } else { 2.0 };

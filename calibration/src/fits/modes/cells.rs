@@ -94,6 +94,13 @@ pub struct Cut {
     pub reference_deg_c: f64,
 }
 
+/// Three gyros at a time; the last three where the number is no multiple.
+pub(crate) fn groups(sensors: usize) -> Vec<[usize; 3]> {
+    let starts = (0..sensors / 3).map(|group| 3 * group);
+    let last = (!sensors.is_multiple_of(3)).then(|| sensors.saturating_sub(3));
+    starts.chain(last).map(|start| [start, start + 1, start + 2]).collect()
+}
+
 /// The document of three gyros along their own input axes, for a run that has no others ([`Run::of_gyros`]).
 pub(crate) fn along_input_axes(document: &Document, group: [usize; 3]) -> Document {
     let mut own = document.clone();

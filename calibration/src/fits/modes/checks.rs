@@ -91,21 +91,19 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
              document"
         ));
     }
-    let name = |sensor: &usize| document.gyro.sensor.get(*sensor).map_or("?", |sensor| sensor.name.as_str());
-    for dead in switches.dead.iter().map(name) {
+    let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("?", |sensor| sensor.name.as_str());
+    let seen = || switches.seen.iter().enumerate().map(|(sensor, seen)| (name(sensor), seen));
+    for (dead, _) in seen().filter(|(_, seen)| seen.is_dead()) {
         reasons.push(format!(
             "gyro {dead} has a constant reading, or no number, in all {} ticks: it is dead, or its column is wrong",
             switches.ticks
         ));
     }
-    for (sensor, seen) in
-        switches.seen.iter().enumerate().filter(|(sensor, _)| !switches.dead.contains(sensor))
-    {
+    for (name, seen) in seen() {
         if let Some(Stay { reading, from_s, to_s, .. }) = seen.frozen(switches.period_s()) {
             reasons.push(format!(
-                "gyro {} gives the same reading, {}, from {from_s:.0} s to {to_s:.0} s, but varies elsewhere: it \
+                "gyro {name} gives the same reading, {}, from {from_s:.0} s to {to_s:.0} s, but varies elsewhere: it \
                  failed, or its output was lost; cut the log to the valid part with --start and --duration",
-                name(&sensor),
                 six(reading + 0.0)
             ));
         }

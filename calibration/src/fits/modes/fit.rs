@@ -1,15 +1,15 @@
 //! The whole procedure: look at the switches, gather, fit, write, judge.
 
 use isotherm_correction::earth::Place;
-use isotherm_protocol::document::{Document, Sample};
+use isotherm_protocol::document::Document;
 
-use super::cells::{Cut, gather};
+use super::cells::{Cut, gather, groups};
 use super::checks;
 use super::dither;
 use super::document::{self, base_constant, reference_of};
 
 use super::model::{Asked, Given, GyroFit, fit};
-use super::prepare::{check, earth_of, earth_rate, gaps, groups, provisional, transition_ticks, window_s};
+use super::prepare::{check, earth_of, earth_rate, gaps, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
 use super::switches::Switches;
 use super::{temperatures, units};
@@ -40,14 +40,8 @@ pub struct Wanted<'a> {
     pub base: &'a Document,
     /// Where the unit stands; `None` where that is not known: then the static constant stays as it is.
     pub place: Option<Place>,
-    /// Orders.
+    /// What is not to be found.
     pub asked: Asked,
-    /// Ticks that a switch loses, where that is known.
-    pub transition_ticks: Option<u8>,
-    /// Time behind a switch that is left out (s), where the servo's own is not to be taken.
-    pub settle_s: Option<f64>,
-    /// `T_ref` (°C), where the document's own is not to be taken.
-    pub reference_deg_c: Option<f64>,
 }
 
 /// Servo of one gyro.
@@ -92,7 +86,7 @@ pub struct Made {
 /// [`Error::Refused`] with every reason why the log does not allow it; [`Error::Log`], [`Error::Document`].
 pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     let switches = Switches::of(wanted.runs, watch)?;
-    let reasons = checks::before(&switches, wanted.base, wanted.transition_ticks);
+    let reasons = checks::before(&switches, wanted.base, wanted.asked.transition_ticks);
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
@@ -104,13 +98,13 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     let provisional = transients.iter().map(|found| found.as_ref().ok().map(provisional)).collect::<Vec<_>>();
     let bare = document::bare(wanted.base, transition_ticks, &provisional);
     let known = bare.gyro.sensor.iter().all(|sensor| sensor.servo.is_some());
-    let reference_deg_c = wanted.reference_deg_c.unwrap_or_else(|| reference_of(wanted.base));
+    let reference_deg_c = wanted.asked.reference_deg_c.unwrap_or_else(|| reference_of(wanted.base));
     let length_s = real(switches.ticks) * switches.tick_s;
     // A switch loses its ticks, and the transient is over one tick later at the least.
     let settle_s = SETTLE_S.max((f64::from(transition_ticks) + 1.5) * switches.tick_s);
     let cut = Cut {
         cell_s: (length_s / CELLS).max(SHORTEST_S),
-        settle_s: wanted.settle_s.unwrap_or(if known { 0.0 } else { settle_s }),
+        settle_s: wanted.asked.settle_s.unwrap_or(if known { 0.0 } else { settle_s }),
         reference_deg_c,
     };
     let mut gyros: Vec<Option<Result<GyroFit, String>>> = vec![None; switches.sensors];
@@ -239,16 +233,10 @@ impl Made {
         watch: &mut dyn Watch,
     ) -> Result<Vec<Residual>, Error> {
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
-        let about = (&self.written.document, &Rest { rate_deg_per_h, ..Rest::default() });
-        let documents = (&self.before.loaded, &self.written.loaded);
+        let rest = Rest { rate_deg_per_h, ..Rest::default() };
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };
-        let runs = wanted.runs.iter().map(|run| (run, Sample::In));
-        let runs = runs.chain(wanted.judge.iter().map(|run| (run, Sample::Out)));
-        let mut residuals = Vec::new();
-        for (run, sample) in runs {
-            let curves = judge(run, sample, documents, about, rows, &mut *watch)?.curves;
-            residuals.extend(curves.into_iter().filter(|curve| curve.of.starts_with("gyro")));
-        }
-        Ok(residuals)
+        let documents = [&self.before, &self.written];
+        let of_run = |_, _: &Run| Ok((rest, rows, "gyro"));
+        Ok(judge((wanted.runs, wanted.judge), documents, of_run, watch)?.curves)
     }
 }

@@ -2,11 +2,13 @@
 
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
+use isotherm_correction::reversal::MAX_TRANSITION_TICKS;
 use isotherm_correction::units::AngularRate;
 use nalgebra::DMatrix;
 
 use super::cells::{Cell, MAX_POWER};
 use super::orders::{self, Folds, Model, Score};
+use crate::limits::within;
 use crate::lsq::correlated::{Data, Noise};
 use crate::numbers::{ends, real};
 
@@ -45,7 +47,7 @@ impl Term {
     }
 }
 
-/// Orders as they were asked for; those that were not are chosen by cross-validation.
+/// What was asked for; what was not is found in the log or the document.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Args)]
 pub struct Asked {
     /// Order of the static polynomial, 0…3 (default: by cross-validation)
@@ -57,6 +59,15 @@ pub struct Asked {
     /// Order of the slow meander, 0 or 1 (default: by cross-validation)
     #[arg(long, hide_short_help = true, value_name = "ORDER", value_parser = RangedU64ValueParser::<usize>::new().range(0..=1))]
     pub meander_order: Option<usize>,
+    /// Ticks lost by a switch, 1…32 (default: found in the log)
+    #[arg(long, hide_short_help = true, value_name = "TICKS", value_parser = clap::value_parser!(u8).range(1..=i64::from(MAX_TRANSITION_TICKS)))]
+    pub transition_ticks: Option<u8>,
+    /// Time to leave out after every switch (s) (default: the servo's transient)
+    #[arg(long = "settle", hide_short_help = true, value_name = "SECONDS", value_parser = within(0.0, 3600.0))]
+    pub settle_s: Option<f64>,
+    /// Reference temperature of the polynomials (°C) (default: the document's, else 20)
+    #[arg(long = "reference", hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true)]
+    pub reference_deg_c: Option<f64>,
 }
 
 /// One coefficient.

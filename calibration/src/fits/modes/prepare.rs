@@ -23,17 +23,10 @@ pub(super) fn window_s(switches: &Switches, length_s: f64) -> f64 {
     pair_s * libm::ceil(wanted_s / pair_s).max(1.0)
 }
 
-/// Three gyros at a time; the last three where the number is no multiple.
-pub(super) fn groups(sensors: usize) -> Vec<[usize; 3]> {
-    let starts = (0..sensors / 3).map(|group| 3 * group);
-    let last = (!sensors.is_multiple_of(3)).then(|| sensors.saturating_sub(3));
-    starts.chain(last).map(|start| [start, start + 1, start + 2]).collect()
-}
-
 pub(super) fn transition_ticks(wanted: &Wanted<'_>, switches: &Switches, warnings: &mut Vec<String>) -> u8 {
     let tick = Span::from_s(switches.tick_s);
     let stated = wanted.base.mode_reversal.as_ref().map(|reversal| reversal.ticks(tick));
-    if let Some(given) = wanted.transition_ticks {
+    if let Some(given) = wanted.asked.transition_ticks {
         return given;
     }
     let seen = u8::try_from(switches.transition_ticks()).unwrap_or(u8::MAX);

@@ -6,7 +6,7 @@ use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, Term};
 use crate::axes::{main_axis, output_name};
 use crate::numbers::real;
-use crate::report::{Curve, Figure, Report, counted, fixed, per_deg_c, short, together};
+use crate::report::{Curve, Report, counted, fixed, or_dash, per_deg_c, short, together};
 
 /// Models of the cross-validation that the report lists for each gyro.
 const MODELS: usize = 5;
@@ -18,8 +18,7 @@ impl Made {
         let unit = made.written.document.unit.clone();
         let mut report =
             Report::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
-        let verdicts = Curve::verdicts(&made.residuals).into_iter();
-        report.verdicts = verdicts.map(|verdict| verdict.stated_as(Figure::Rms)).collect();
+        report.verdicts = Curve::verdicts(&made.residuals);
         report.residuals.clone_from(&made.residuals);
         report.warnings.clone_from(&made.warnings);
         notes(made, &mut report);
@@ -115,7 +114,7 @@ fn gyro(
             name.to_owned(),
             score.model.static_order.to_string(),
             score.model.magnetic_order.to_string(),
-            score.model.meander_order.map_or_else(|| "–".to_owned(), |order| order.to_string()),
+            or_dash(score.model.meander_order.map(|order| order.to_string())),
             format!("{each:.4}"),
             if score.model == fit.model { "taken" } else { "" }.to_owned(),
         ]);

@@ -101,6 +101,11 @@ impl Seen {
         Some(middle.iter().sum::<f64>() / real(middle.len()))
     }
 
+    /// Whether its reading is the same in each run, or no number.
+    pub fn is_dead(&self) -> bool {
+        self.changes <= 0.0
+    }
+
     /// Whether there are half-period counts, and all are zero.
     pub fn has_dead_halves(&self) -> bool {
         matches!(self.halves, (1.., false))

@@ -60,8 +60,6 @@ pub struct Switches {
     pub between_s: Vec<f64>,
     /// What is behind each.
     pub behind: Vec<Behind>,
-    /// Gyros whose reading never changed.
-    pub dead: Vec<usize>,
     /// What each gyro's readings are like.
     pub seen: Vec<Seen>,
     /// By how much each change of the mode comes behind the switch command that is nearest to it (s); empty without commands.
@@ -76,8 +74,6 @@ impl Switches {
     pub fn of(runs: &[Run], watch: &mut dyn Watch) -> Result<Self, Error> {
         let mut found = Self { whole: true, ..Self::default() };
         let mut length_s = 0.0;
-        let mut first: Option<Vec<f64>> = None;
-        let mut changed: Vec<bool> = Vec::new();
         for run in runs {
             let mut eye = Eye::default();
             found.seen.iter_mut().for_each(Seen::begin);
@@ -92,11 +88,6 @@ impl Switches {
                 found.sensors = found.sensors.max(tick.readings.len());
                 found.ticks += 1;
                 length_s += tick.duration.as_s();
-                let first = first.get_or_insert_with(|| tick.readings.to_vec());
-                changed.resize(first.len(), false);
-                for (changed, (first, now)) in changed.iter_mut().zip(first.iter().zip(&tick.readings)) {
-                    *changed |= now.is_finite() && first.total_cmp(now).is_ne();
-                }
                 let now = tick.end_time.as_ns();
                 let since_s = seconds(now.saturating_sub(*begin.get_or_insert(now)));
                 found.seen.resize(found.sensors, Seen::default());
@@ -109,8 +100,6 @@ impl Switches {
             eye.end(&mut found);
         }
         found.tick_s = if found.ticks == 0 { 0.0 } else { length_s / real(found.ticks) };
-        found.dead =
-            (0..changed.len()).filter(|&sensor| !changed.get(sensor).is_some_and(|is| *is)).collect();
         Ok(found)
     }
 

@@ -10,11 +10,8 @@ use super::plan::Plan;
 use super::solve::{Positions, Weights, guesses};
 use crate::document::by_name;
 use crate::limits::{above_0, from_0};
-use crate::numbers::{norm, real};
+use crate::numbers::{ARCSEC_PER_RAD, norm, real};
 use crate::report::{Report, counted, short};
-
-/// ″ in one radian.
-pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
 
 /// What is planned; the defaults are the example of 004, with quartz accelerometers.
 #[derive(Debug, Clone, PartialEq, Args)]

@@ -2,11 +2,11 @@
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
-use super::budget::ARCSEC_PER_RAD;
 use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
 use crate::axes::{AXES, main_axis};
+use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::bars;
 
 /// Points of a curve over temperature.

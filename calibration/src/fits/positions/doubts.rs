@@ -9,11 +9,11 @@ use super::plan::Plan;
 use super::sense::{Beside, elsewhere};
 use super::solve::Fit;
 use super::temperature::Temperatures;
-use super::{budget, measure, model};
+use super::{measure, model};
 use crate::axes::{AXES, sensor_name, several};
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
-use crate::numbers::real;
+use crate::numbers::{ARCSEC_PER_RAD, real};
 use crate::report::{counted, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
@@ -93,7 +93,7 @@ pub(super) fn few(
             "{} not separate the stand's level from the axes, {GOOD_POSITIONS} or more do: the standard errors of C \
              include --levelling ({:.0}″)",
             if different == 1 { "1 position does".to_owned() } else { format!("{different} different positions do") },
-            settings.levelling_rad * budget::ARCSEC_PER_RAD
+            settings.levelling_rad * ARCSEC_PER_RAD
         ));
     }
 }

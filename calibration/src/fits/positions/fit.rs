@@ -46,8 +46,8 @@ pub struct Settings {
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
-    /// All poses that are positions, with the position's number and the level's.
-    pub poses: Vec<(Pose, usize, usize)>,
+    /// All poses that are positions, with the position's number.
+    pub poses: Vec<(Pose, usize)>,
     /// The positions as the fit had them.
     pub taken: Vec<Taken>,
     /// Mean temperature of each level (°C); one that is no number where nothing measures it.
@@ -152,9 +152,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     turned(best, document, settings.gravity, &mut warnings);
     warnings.extend(measures(best, document, settings, &own));
     let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
-    let poses: Vec<(Pose, usize, usize)> =
-        poses.into_iter().zip(&level_of).map(|((pose, position), level)| (pose, position, *level)).collect();
-    let returns = returns(&all, &poses, &found, &levels_deg_c);
+    let returns = returns(&all, &plain, &found, &levels_deg_c);
     let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
     for (sensor, kind) in returns.iter().filter_map(|back| back.finding(&names)) {
         let own = accelerometers(document).get(sensor);

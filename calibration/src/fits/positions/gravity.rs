@@ -1,9 +1,9 @@
 //! Gravity at the place of a calibration: every scale factor of an accelerometer is relative to it.
 
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
+
 use crate::report::{short, six};
 
-/// Standard gravity (m/s²).
-pub const STANDARD_M_PER_S2: f64 = 9.806_65;
 /// Decrease of gravity with height (1/s²).
 const PER_METRE: f64 = 3.086e-6;
 
@@ -23,10 +23,10 @@ pub fn stated(gravity: Option<f64>, latitude_deg: Option<f64>, height_m: f64) ->
         (None, Some(latitude)) => (normal(latitude, height_m), radians(latitude)),
         (None, None) => {
             let assumed = format!(
-                "gravity is assumed as {STANDARD_M_PER_S2} m/s²; at your place it, and all scale factors, may differ by up \
+                "gravity is assumed as {STANDARD_GRAVITY_M_PER_S2} m/s²; at your place it, and all scale factors, may differ by up \
                  to 0.3 %: state --gravity, or --latitude and --height"
             );
-            (STANDARD_M_PER_S2, Some(assumed))
+            (STANDARD_GRAVITY_M_PER_S2, Some(assumed))
         }
     }
 }

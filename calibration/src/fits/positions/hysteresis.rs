@@ -2,14 +2,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::budget::ARCSEC_PER_RAD;
 use super::doubts::{ACCIDENT, survival};
 use super::model::{Degrees, SMALL, Taken};
 use super::pose::Pose;
 use super::solve::{Fit, Positions};
 use crate::finding::AccelKind;
 use crate::lsq::linear;
-use crate::numbers::real;
+use crate::numbers::{ARCSEC_PER_RAD, real};
 
 /// The axes at one temperature, before and after others were visited.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,21 +49,16 @@ struct Visit {
     taken: Vec<Taken>,
 }
 
-/// Every return to a temperature that was left; `poses` are those of `all.taken`, with position and level, in the order of logs and time.
-pub(super) fn returns(
-    all: &Positions<'_>,
-    poses: &[(Pose, usize, usize)],
-    fit: &Fit,
-    levels_deg_c: &[f64],
-) -> Vec<Return> {
+/// Every return to a temperature that was left; `poses` are those of `all.taken`, in the order of logs and time.
+pub(super) fn returns(all: &Positions<'_>, poses: &[Pose], fit: &Fit, levels_deg_c: &[f64]) -> Vec<Return> {
     let mut order: Vec<usize> = (0..poses.len()).collect();
-    order.sort_by_key(|index| (poses[*index].0.run, poses[*index].0.interval.first));
+    order.sort_by_key(|index| (poses[*index].run, poses[*index].interval.first));
     let mut visits: Vec<Visit> = Vec::new();
     for index in order {
-        let ((pose, _, level), taken) = (&poses[index], all.taken[index].clone());
-        match visits.last_mut().filter(|visit| visit.level == *level) {
+        let taken = all.taken[index].clone();
+        match visits.last_mut().filter(|visit| visit.level == taken.level) {
             Some(visit) => visit.taken.push(taken),
-            None => visits.push(Visit { run: pose.run, level: *level, taken: vec![taken] }),
+            None => visits.push(Visit { run: poses[index].run, level: taken.level, taken: vec![taken] }),
         }
     }
     let found: Vec<(&Visit, Fit)> = visits

@@ -1,5 +1,6 @@
 //! Readings in another unit of measure than the mapping or the document says: scale factors that are found tell.
 
+use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2 as G;
 use isotherm_protocol::document::AccelOutput;
 
 use crate::axes::sensor_name;
@@ -13,8 +14,6 @@ const LARGEST_RATIO: f64 = 1.5;
 const NEAR: f64 = 0.35;
 /// How near one a scale factor is that is no more than an error (a share).
 const NEAR_ONE: f64 = 0.25;
-/// g in m/s², which names the units of accelerometers.
-const G: f64 = 9.806_65;
 /// Degrees in a radian, which names those of gyros.
 const DEG: f64 = 180.0 / std::f64::consts::PI;
 

@@ -3,12 +3,11 @@
 use isotherm_protocol::document::{Document, Shape};
 use serde_json::{Value, json};
 
-use super::budget::ARCSEC_PER_RAD;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::model::SMALL;
 use crate::document::{rows, tidy};
-use crate::numbers::real;
+use crate::numbers::{ARCSEC_PER_RAD, real};
 use crate::report::Sigmas;
 
 /// The document that "before" stands for: the one that was given, or else one scale factor for all accelerometers, no bias, axes

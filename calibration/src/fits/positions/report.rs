@@ -3,7 +3,6 @@
 use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::budget::ARCSEC_PER_RAD;
 use super::charts::{across, axes_chart, bend, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
@@ -13,7 +12,8 @@ use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
 use crate::document::accelerometers;
-use crate::report::{Curve, Figure, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six};
+use crate::numbers::ARCSEC_PER_RAD;
+use crate::report::{Curve, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six};
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ pub fn report(
         Some(words) => length.refused(words),
         None => length,
     });
-    report.verdicts = as_a_whole(report.verdicts).into_iter().map(|v| v.stated_as(Figure::Rms)).collect();
+    report.verdicts = as_a_whole(report.verdicts);
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(document, analysis, settings);
     let names = names(document, analysis.fit.guess.len());

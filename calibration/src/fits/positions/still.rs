@@ -4,22 +4,30 @@
 //! 2014), and the rates are near those of the still ticks: accelerometers do not feel a turn about the vertical. The window
 //! keeps half its length away from every motion.
 
+use clap::Args;
+
 use super::track::{Track, quantile};
+use crate::limits::{above_0, from_0};
 use crate::numbers::real;
 
-/// What counts as still.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What counts as still; the defaults are those of a stand.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct StillLimits {
-    /// Length of the window (s); eight ticks at least.
+    /// Window of the search for still poses (s)
+    #[arg(long = "window", hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
     pub window_s: f64,
-    /// Variance over a window that is still, relative to that of the quietest fifth of the run, or of the given rest.
+    /// Largest variance of a still window, relative to the log's quietest fifth
+    #[arg(long = "threshold", hide_short_help = true, value_name = "FACTOR", default_value_t = 4.0, value_parser = above_0)]
     pub factor: f64,
-    /// Rate above which the unit turns (°/s), unless noise asks for more.
+    /// Rate above which the unit turns (°/s)
+    #[arg(long = "still-rate", hide_short_help = true, value_name = "DEG_PER_S", default_value_t = 0.2, value_parser = above_0)]
     pub rate_deg_per_s: f64,
-    /// Shortest interval that counts (s), after `settle_s` was taken off its beginning.
-    pub least_s: f64,
-    /// Taken off the beginning of an interval (s).
+    /// Time to leave out at the beginning of each pose (s)
+    #[arg(long = "settle", hide_short_help = true, value_name = "SECONDS", default_value_t = 2.0, value_parser = from_0)]
     pub settle_s: f64,
+    /// Shortest pose (s)
+    #[arg(long = "least", hide_short_help = true, value_name = "SECONDS", default_value_t = 10.0, value_parser = above_0)]
+    pub least_s: f64,
 }
 
 /// An interval of ticks, `first..end`.

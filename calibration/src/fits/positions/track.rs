@@ -28,8 +28,6 @@ pub struct Track {
     pub duration_s: Vec<f64>,
     /// Output of each accelerometer: counts/s, V, m/s², or whatever the log's unit is.
     pub outputs: Vec<Vec<f64>>,
-    /// Whether the outputs come from counts.
-    pub counts: bool,
     /// Output of each gyro: rad/s, or counts/s.
     pub gyros: Vec<Vec<f64>>,
     /// Whether the gyros put out counts.
@@ -46,7 +44,7 @@ impl Track {
     /// Reads a run, once as it stands and once through the service's own code.
     ///
     /// # Errors
-    /// As [`Run::series`] and [`Run::correct`]; [`Error::Refused`] without accelerometers.
+    /// As [`Run::series`] and [`Run::correct_together`]; [`Error::Refused`] without accelerometers.
     pub fn of(run: &Run, loaded: &Loaded, mut watch: impl Watch) -> Result<Self, Error> {
         let series = run.series(&mut watch)?;
         let accels = &series.accels;
@@ -76,7 +74,6 @@ impl Track {
         Ok(Self {
             run: run.name.clone(),
             outputs: per_second(&accels.readings, &accels.duration_s, accels.output),
-            counts: accels.output == Some(OutputKind::Counts),
             gyros: gyros.iter().map(of_own).collect(),
             gyro_counts: series.gyros.output == Some(OutputKind::Counts),
             rate_deg_per_s: table

@@ -7,7 +7,7 @@ use isotherm_protocol::document::{Document, OrientationThermal};
 
 use crate::document::Written;
 use crate::error::Error;
-use crate::fits::modes::cells::{along_input_axes, temperature};
+use crate::fits::modes::cells::{along_input_axes, groups, temperature};
 use crate::runs::table::{Rows, Table, Takes};
 use crate::runs::{Run, Troubles, Watch};
 
@@ -52,21 +52,15 @@ pub struct Binned {
 /// Bins a run.
 ///
 /// # Errors
-/// As [`Run::correct`].
+/// As [`Run::correct_together`].
 pub fn binned(run: &Run, document: &Document, watch: &mut dyn Watch) -> Result<Binned, Error> {
     let sensors = document.gyro.sensor.len();
     let mut whole = Binned::default();
-    let starts = (0..sensors).step_by(3).map(|start| start.min(sensors.saturating_sub(3)));
-    for start in starts {
-        let group = [start, start + 1, start + 2];
+    for group in groups(sensors) {
         let part = of_group(run, document, group, &mut *watch)?;
         if whole.bins.is_empty() {
             whole = part;
             whole.bins.iter_mut().for_each(|bin| bin.rate.resize(sensors, f64::NAN));
-            for bin in &mut whole.bins {
-                let own = [bin.rate[0], bin.rate[1], bin.rate[2]];
-                group.into_iter().zip(own).for_each(|(sensor, rate)| bin.rate[sensor] = rate);
-            }
         } else {
             for (bin, of) in whole.bins.iter_mut().zip(&part.bins) {
                 group.into_iter().zip(&of.rate).for_each(|(sensor, rate)| bin.rate[sensor] = *rate);
@@ -130,7 +124,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// in them.
 ///
 /// # Errors
-/// As [`Run::correct`].
+/// As [`Run::correct_together`].
 pub fn means_within(
     run: &Run,
     loaded: &Loaded,

@@ -6,7 +6,6 @@
 use super::bins::Bin;
 use crate::numbers::{dot, norm};
 
-const RAD_PER_DEG: f64 = core::f64::consts::PI / 180.0;
 /// Angle below which a turn is none (rad).
 const NONE_RAD: f64 = 1e-12;
 
@@ -53,7 +52,7 @@ fn means_of(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin, [f64; 3]) -> [
 /// A vector that is fixed to the Earth, in a case that turns for some seconds: at their end, and its mean over them.
 fn turned(vector: [f64; 3], rate_deg_per_h: [f64; 3], seconds: f64) -> ([f64; 3], [f64; 3]) {
     let size = norm(rate_deg_per_h);
-    let angle = size / 3600.0 * RAD_PER_DEG * seconds;
+    let angle = (size / 3600.0).to_radians() * seconds;
     if angle < NONE_RAD {
         return (vector, vector);
     }

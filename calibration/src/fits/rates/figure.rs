@@ -6,7 +6,7 @@ use isotherm_protocol::document::Document;
 use super::over_temperature::{Level, OverTemperature};
 use crate::axes::{AXES, main_axis};
 use crate::document::accelerometers;
-use crate::fits::positions::budget::ARCSEC_PER_RAD;
+use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Sigmas, bars, fixed};
 
 /// Height of a panel (CSS pixels).

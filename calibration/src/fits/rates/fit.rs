@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
 use crate::numbers::{Size, hull, median};
-use crate::report::{Figure, Verdict, of_logs};
+use crate::report::{Verdict, of_logs};
 use crate::runs::{Run, Watch};
 
 /// Rounds in which the Earth's turning and the fit settle.
@@ -107,7 +107,10 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         }
         gyros = (0..sensors)
             .map(|sensor| {
-                solve(&points(wanted, &runs, &rates, sensor, walk[sensor]), axes_of(wanted.base, sensor))
+                solve(
+                    &points(wanted, &runs, &rates, sensor, walk[sensor]),
+                    row(wanted.base, sensor, f64::NAN),
+                )
             })
             .collect();
         for (sensor, found) in gyros.iter().enumerate() {
@@ -130,7 +133,7 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     if let Some(over) = &over_temperature {
         for (sensor, found) in gyros.iter_mut().enumerate() {
             let points = over.at_reference(wanted, (&runs, &rates), sensor, &walk);
-            *found = solve(&points, axes_of(wanted.base, sensor));
+            *found = solve(&points, row(wanted.base, sensor, f64::NAN));
         }
     }
     let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
@@ -288,10 +291,6 @@ impl Made {
     }
 }
 
-fn axes_of(base: &Document, sensor: usize) -> [f64; 3] {
-    row(base, sensor, f64::NAN)
-}
-
 /// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.
 fn errors(
     (number, run): (usize, &Run),
@@ -328,7 +327,6 @@ fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
             let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
             let outside = (!judged.is_empty()).then(|| both(judged));
             let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
-            let verdict = verdict.stated_as(Figure::Rms);
             if verdict.accepted {
                 return verdict;
             }

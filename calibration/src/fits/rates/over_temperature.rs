@@ -13,12 +13,11 @@ use super::read::Turned;
 use crate::document::tidy;
 use crate::finding::Kind;
 use crate::fits::modes::document::row;
-use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::fits::positions::model::Guess;
 use crate::fits::positions::temperature::{levels, reference};
 use crate::fits::thermal::scale::{Holds, put};
 use crate::lsq::linear::{self, Weak};
-use crate::numbers::{dot, ends, mean, norm, once_each, real};
+use crate::numbers::{ARCSEC_PER_RAD, dot, ends, mean, norm, once_each, real};
 
 /// Smallest share of the largest singular value of a line.
 const SINGULAR: f64 = 1e-9;

@@ -18,6 +18,7 @@ use super::steps::{Step, listed};
 use crate::document::plain;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
+use crate::fixture;
 use crate::runs::Run;
 
 /// Rates of the table (°/s): whole turns in ten seconds, so that every step begins as the run did.
@@ -66,21 +67,21 @@ fn run_of(
         if rate != 0.0 {
             scenario.motion.path = Path::ConstantRate { axis, rate_deg_per_s: rate };
         }
-        let mut last = 0;
-        for step in Simulation::new(&scenario).unwrap() {
-            let readings = step.temperatures.into_iter();
-            events.extend(
-                readings
-                    .filter(|reading| number == 0 || reading.time.as_ns() > scenario.start_ns)
-                    .map(LogEvent::Temperature),
-            );
-            let mut tick = step.gyro;
-            last = tick.sequence + 1;
-            tick.sequence += offset;
-            tick.readings.iter_mut().for_each(|reading| *reading = distort(*reading));
-            events.push(LogEvent::Gyro { output: scenario.instrument.gyros.output_kind(), tick });
+        let mut ticks = 0;
+        for mut event in fixture::events(&scenario) {
+            match &mut event {
+                LogEvent::Temperature(reading) if number == 0 || reading.time.as_ns() > scenario.start_ns => {
+                }
+                LogEvent::Temperature(_) | LogEvent::Accel { .. } => continue,
+                LogEvent::Gyro { tick, .. } => {
+                    tick.sequence += offset;
+                    tick.readings.iter_mut().for_each(|reading| *reading = distort(*reading));
+                    ticks += 1;
+                }
+            }
+            events.push(event);
         }
-        offset += last;
+        offset += ticks;
     }
     Run::of_events(name.to_owned(), unit_id("MEMS-0001").unwrap(), events)
 }

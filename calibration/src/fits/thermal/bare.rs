@@ -109,7 +109,7 @@ pub fn filter(step_s: f64) -> Filter {
 
 /// Has a document carry readings that are so far apart (s): without a grid between them, and with spike limits beyond what a ramp does
 /// from one to the next. Gives the step of the grid that it had, and of the one that it has now; `None` where it can carry them.
-pub fn carry(document: &mut Document, runs: &[&Series], step_s: f64) -> Option<[f64; 2]> {
+pub fn carry(document: &mut Document, runs: &[Series], step_s: f64) -> Option<[f64; 2]> {
     let stated = document.temperature.filter.as_ref()?;
     let stated_s = stated.grid_step_s;
     if step_s <= FINEST_GRID * stated_s && FRESH_READINGS * step_s <= stated.stale_after_s {

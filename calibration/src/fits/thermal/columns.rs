@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::iter;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{
@@ -38,19 +39,40 @@ pub enum Branch {
     Braking,
 }
 
-/// A term with one coefficient, in powers of the distance from a reference temperature.
+/// What a term follows beside the temperature's level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Term {
-    /// (T − reference)ʲ.
-    Static(usize),
-    /// (T − reference)ʲ·Ṫ.
-    Rate(Branch, usize),
-    /// (T − reference)ʲ·T̈.
-    Acceleration(Branch, usize),
-    /// `(T − reference)ʲ·(T − L_τ)/τ`, τ in milliseconds.
-    Lag(u64, usize),
-    /// (T − reference)ʲ times what the sensor feels, in ppm of its scale factor: a column of each sensor's own.
-    Scale(usize),
+pub enum Effect {
+    /// Nothing.
+    Static,
+    /// Ṫ.
+    Rate(Branch),
+    /// T̈.
+    Acceleration(Branch),
+    /// `(T − L_τ)/τ`, τ in milliseconds.
+    Lag(u64),
+    /// What the sensor feels, in ppm of its scale factor: a column of each sensor's own.
+    Scale,
+}
+
+/// A term with one coefficient: its effect times (T − reference)ʲ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Term {
+    /// What it follows.
+    pub effect: Effect,
+    /// j.
+    pub power: usize,
+}
+
+impl Effect {
+    /// Its term with a power of temperature.
+    pub const fn power(self, power: usize) -> Term {
+        Term { effect: self, power }
+    }
+
+    /// Its terms with some powers of temperature.
+    pub fn powers(self, powers: RangeInclusive<usize>) -> impl Iterator<Item = Term> {
+        powers.map(move |power| self.power(power))
+    }
 }
 
 /// Time constant in the form that terms are told apart by.
@@ -101,18 +123,19 @@ impl Basis {
 
     /// A term with the coefficient one (°/h and so on).
     fn parts(&self, term: Term) -> Vec<TermParts> {
-        let branched = |feature, branch, power| {
-            let [run_up, braking] = [Branch::Braking, Branch::RunUp]
-                .map(|other| self.power(power, f64::from(u8::from(branch != other))));
+        let power = |value: f64| self.power(term.power, value);
+        let branched = |feature, branch| {
+            let [run_up, braking] =
+                [Branch::Braking, Branch::RunUp].map(|other| power(f64::from(u8::from(branch != other))));
             let argument = BranchArgument::Temperature;
             TermParts::branched(feature, BranchedParts { argument, run_up, braking })
         };
-        vec![match term {
-            Term::Scale(_) => return Vec::new(),
-            Term::Static(power) => TermParts::new(Feature::One, self.power(power, 1.0)),
-            Term::Rate(branch, power) => branched(Feature::ThermalRate, branch, power),
-            Term::Acceleration(branch, power) => branched(Feature::ThermalAcceleration, branch, power),
-            Term::Lag(tau, power) => TermParts::lag(tau_s(tau), self.power(power, 1.0)),
+        vec![match term.effect {
+            Effect::Scale => return Vec::new(),
+            Effect::Static => TermParts::new(Feature::One, power(1.0)),
+            Effect::Rate(branch) => branched(Feature::ThermalRate, branch),
+            Effect::Acceleration(branch) => branched(Feature::ThermalAcceleration, branch),
+            Effect::Lag(tau) => TermParts::lag(tau_s(tau), power(1.0)),
         }]
     }
 
@@ -139,7 +162,7 @@ impl Basis {
     /// What up to eight terms subtract over the windows of a run (°/h).
     pub(super) fn drive(&self, run: &Samples, terms: &[Term]) -> Result<Vec<Vec<f64>>, Error> {
         // A unit has three gyros at least.
-        let padding = iter::repeat_n(Term::Static(0), MIN_SENSORS.saturating_sub(terms.len()));
+        let padding = iter::repeat_n(Effect::Static.power(0), MIN_SENSORS.saturating_sub(terms.len()));
         let padded: Vec<Term> = terms.iter().copied().chain(padding).collect();
         let loaded = self.unit(&padded)?;
         let mut unit = Offline::new(&loaded, UnitSettings::default());
@@ -244,7 +267,7 @@ impl<'a> Columns<'a> {
     /// # Errors
     /// [`Error::Document`].
     pub fn make(&mut self, terms: &[Term]) -> Result<(), Error> {
-        let of_all = |term: &&Term| !self.known.contains_key(*term) && !matches!(term, Term::Scale(_));
+        let of_all = |term: &&Term| !self.known.contains_key(*term) && term.effect != Effect::Scale;
         let mut wanted: Vec<Term> = terms.iter().filter(of_all).copied().collect();
         wanted.sort_unstable();
         wanted.dedup();
@@ -274,7 +297,7 @@ impl<'a> Columns<'a> {
     /// # Errors
     /// As [`Columns::make`].
     pub fn temperature(&mut self) -> Result<(Vec<f64>, Vec<f64>), Error> {
-        let (level, rate) = (Term::Static(1), Term::Rate(Branch::Both, 0));
+        let (level, rate) = (Effect::Static.power(1), Effect::Rate(Branch::Both).power(0));
         self.make(&[level, rate])?;
         let level = self.get(level).iter().map(|away| away + self.basis.reference_deg_c).collect();
         Ok((level, self.get(rate).to_vec()))

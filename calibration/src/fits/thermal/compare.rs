@@ -12,7 +12,7 @@ use crate::axes::output_name;
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::{real, scatter_of_steps};
-use crate::report::{Curve, Rest, short};
+use crate::report::{Curve, Rest, or_dash, short};
 use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
 
@@ -120,10 +120,9 @@ impl Compared {
             let mine: Vec<&Curve> = curves.iter().filter(deciding).collect();
             let Some(first) = mine.first() else { continue };
             let white = mine.iter().map(|curve| scatter_of_steps(&curve.after)).fold(f64::INFINITY, f64::min);
-            let or_dash = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
             let mut row = vec![format!("{of}, {}", first.measure), short(white)];
-            row.push(or_dash(outcome.passed_on(axis)));
-            row.extend((0..HEAD.len()).map(|line| or_dash(rms.map(|rms| rms[line]))));
+            row.push(or_dash(outcome.passed_on(axis).map(short)));
+            row.extend((0..HEAD.len()).map(|line| or_dash(rms.map(|rms| short(rms[line])))));
             rows.push(row);
         }
         let head = ["", "white noise", "from the thermometer"].into_iter().chain(HEAD);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use isotherm_protocol::document::{Document, Filter};
 
-use super::columns::{Branch, Columns, Term};
+use super::columns::{Branch, Columns, Effect};
 use super::fit::Sensor;
 use super::joint::Joint;
 use super::known::{Known, channel};
@@ -54,7 +54,8 @@ pub(super) fn choose_filter(
         let (mut cost, mut dead_band) = (0.0, 0.0_f64);
         for (name, known) in histories {
             let mut columns = Columns::new(known.basis(channel(bare, name)?, &trial), samples);
-            let (rate, acceleration) = (Term::Rate(Branch::Both, 0), Term::Acceleration(Branch::Both, 0));
+            let [rate, acceleration] =
+                [Effect::Rate, Effect::Acceleration].map(|of| of(Branch::Both).power(0));
             columns.make(&[rate, acceleration])?;
             dead_band = dead_band.max(usual_product(columns.get(rate), columns.get(acceleration)));
             let alive = sensors.iter().zip(targets).filter(|(sensor, _)| sensor.follows(name));

@@ -4,7 +4,7 @@ use isotherm_protocol::document::Document;
 
 use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
-use super::columns::{Columns, Term};
+use super::columns::{Columns, Effect};
 use super::filter::{choose_filter, longest_run_s};
 use super::joint::{CUBIC, Found, Joint, rivals};
 use super::known::{Known, channel, histories};
@@ -19,7 +19,6 @@ use super::target::{rest, target};
 use crate::document::{Fitted, accelerometers};
 use crate::error::Error;
 use crate::report::{Rest, six};
-use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
 use crate::runs::{Run, Watch};
 
@@ -54,20 +53,20 @@ pub fn fit(
     let mut warnings = Vec::new();
     let (mut refusals, mut dead) = (Vec::new(), Vec::new());
     let mut series = Vec::new();
-    let stands: Vec<Stand> = (0..runs.len()).map(|run| settings.stand(run)).collect();
-    for (run, stand) in runs.iter().zip(&stands) {
+    let stands: Vec<Stand> = (0..runs.len() + judges.len()).map(|run| settings.stand(run)).collect();
+    let all =
+        || runs.iter().chain(judges).zip(&stands).enumerate().map(|(index, of)| (index < runs.len(), of));
+    for (is_fitted, (run, stand)) in all() {
         let of_run = run.series(&mut watch)?;
-        let found = checks::raw(&run.name, &of_run, stand);
-        refusals.extend(found.refusals);
-        warnings.extend(found.warnings);
-        dead.extend(found.dead);
+        if is_fitted {
+            let found = checks::raw(&run.name, &of_run, stand);
+            refusals.extend(found.refusals);
+            warnings.extend(found.warnings);
+            dead.extend(found.dead);
+        } else {
+            warnings.extend(checks::judging(&run.name, &of_run, stand));
+        }
         series.push(of_run);
-    }
-    let mut judging = Vec::new();
-    for (index, run) in judges.iter().enumerate() {
-        let (stand, series) = (settings.stand(runs.len() + index), run.series(&mut watch)?);
-        warnings.extend(checks::judging(&run.name, &series, &stand));
-        judging.push((series, stand));
     }
     let first = series.first().ok_or_else(|| Error::refused("there is no run to fit to"))?;
     if !refusals.is_empty() {
@@ -83,10 +82,9 @@ pub fn fit(
             "the document has no temperature channel: a thermal fit needs one; add [[temperature.channel]]",
         ));
     }
-    let all: Vec<&Series> = series.iter().chain(judging.iter().map(|(series, _)| series)).collect();
-    let channels = all.iter().flat_map(|series| series.temperatures.values());
+    let channels = series.iter().flat_map(|series| series.temperatures.values());
     let step_s = channels.map(|channel| checks::median_step_s(&channel.time_ns)).fold(0.0, f64::max);
-    if let Some(grids_s) = carry(&mut plain, &all, step_s) {
+    if let Some(grids_s) = carry(&mut plain, &series, step_s) {
         let [stated_s, carried_s] = grids_s.map(six);
         warnings.push(format!(
             "temperature readings come every {} s: the document's grid of {stated_s} s is too fine, and is replaced \
@@ -100,19 +98,17 @@ pub fn fit(
         &Settings { fit_window_s: settings.fit_window_s.max(libm::ceil(step_s)), ..settings.clone() };
     let mut samples = Vec::new();
     let mut rests = Vec::new();
-    for ((run, series), stand) in runs.iter().zip(&series).zip(&stands) {
+    for ((is_fitted, (run, stand)), series) in all().zip(&series) {
         let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
         let (of_rest, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
-        rests.extend(of_rest);
-        refusals.extend(found.refusals);
-        warnings.extend(found.warnings);
-        samples.push(of_run);
-    }
-    for (run, (series, stand)) in judges.iter().zip(&judging) {
-        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
-        let (_, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
-        // What can be judged is judged.
-        warnings.extend(found.refusals);
+        if is_fitted {
+            rests.extend(of_rest);
+            refusals.extend(found.refusals);
+            samples.push(of_run);
+        } else {
+            // What can be judged is judged.
+            warnings.extend(found.refusals);
+        }
         warnings.extend(found.warnings);
     }
     if !refusals.is_empty() {
@@ -226,7 +222,8 @@ fn step_by_step(
     } else {
         vec![lags(&[(3.0 * grid).max(10.0)], 0).terms]
     };
-    columns.make(&(0..=sequential::degree(history).max(CUBIC)).map(Term::Static).collect::<Vec<_>>())?;
+    let degree = sequential::degree(history).max(CUBIC);
+    columns.make(&Effect::Static.powers(0..=degree).collect::<Vec<_>>())?;
     for terms in &steps {
         columns.make(terms)?;
     }

@@ -2,7 +2,7 @@
 //! method.
 
 use super::branches::History;
-use super::columns::{Branch, Columns, Term};
+use super::columns::{Branch, Columns, Effect, Term};
 use super::compare::Rivals;
 use super::fit::Sensor;
 use super::known::Known;
@@ -43,7 +43,7 @@ impl<'a> Joint<'a> {
         let history = &known.history;
         let plans = Plan::all(history, columns.basis().filter.grid_step_s, longest_s);
         let any_gyro = sensors.iter().any(|(sensor, _)| sensor.gyro);
-        let mut terms: Vec<Term> = (0..=HIGHEST).map(Term::Static).collect();
+        let mut terms: Vec<Term> = Effect::Static.powers(0..=HIGHEST).collect();
         terms.extend(plans.iter().flat_map(|plan| plan.spec(any_gyro, None, 0.0).dynamics.terms));
         columns.make(&terms)?;
         let noise = Noise::of(columns.basis(), samples, &terms)?;
@@ -127,7 +127,7 @@ pub(super) fn rivals(
     scale: Option<usize>,
 ) -> Result<Rivals, Error> {
     let rate = if sensor.gyro {
-        vec![Term::Rate(Branch::Both, 0)]
+        vec![Effect::Rate(Branch::Both).power(0)]
     } else {
         lags(&[(3.0 * columns.basis().filter.grid_step_s).max(2.0)], 0).terms
     };
@@ -138,7 +138,7 @@ pub(super) fn rivals(
         let spec =
             Spec { degree, dynamics: Dynamics { terms, ..Dynamics::default() }, scale, ..Spec::default() };
         let solution = plain.solve(columns, &spec, true);
-        solution.map_or_else(Vec::new, |solution| Found::terms_of(&spec, &solution, target.level))
+        solution.map_or_else(Vec::new, |solution| spec.found(&solution, target.level))
     };
     Ok(Rivals {
         mean: solved(0, Vec::new()),
@@ -161,7 +161,7 @@ fn doubt_of_passes(
     if history.tells_dynamics() || !history.both_directions() {
         return None;
     }
-    let terms: Vec<Term> = (0..=CUBIC).map(Term::Static).collect();
+    let terms: Vec<Term> = Effect::Static.powers(0..=CUBIC).collect();
     let trials = Trials::of(target, columns, &terms, &Noise::default(), (&history.ramp, temperature));
     let left =
         |degree: usize| trials.score(&Spec { degree, scale: target.widest_scale(), ..Spec::default() });
@@ -208,17 +208,14 @@ impl Found {
         Self { dead: true, ..Self::refused(why) }
     }
 
-    /// Coefficients of a solution with their standard errors.
-    pub(super) fn terms_of(spec: &Spec, solution: &Solution, level: bool) -> Vec<(Term, f64, f64)> {
-        let terms = spec.terms(level).into_iter().zip(solution.coefficients.iter().zip(&solution.sigmas));
-        terms.map(|(term, (value, sigma))| (term, *value, *sigma)).collect()
-    }
-
     /// A sensor that temperature does nothing to; where its level is known, that is its bias.
     pub(super) fn flat(level: &Solution, known: bool) -> Self {
         let constant = level.coefficients.first().zip(level.sigmas.first()).filter(|_| known);
         Self {
-            terms: constant.map(|(value, sigma)| (Term::Static(0), *value, *sigma)).into_iter().collect(),
+            terms: constant
+                .map(|(value, sigma)| (Effect::Static.power(0), *value, *sigma))
+                .into_iter()
+                .collect(),
             words: "constant".to_owned(),
             flat: true,
             ..Self::default()
@@ -228,11 +225,11 @@ impl Found {
     pub(super) fn sequential(terms: Vec<(Term, f64, f64)>, left: f64, mean: f64) -> Self {
         if left <= WORTH_IT * mean {
             let mut words = "plateaus".to_owned();
-            let has = |is: fn(Term) -> bool| terms.iter().any(|(term, ..)| is(*term));
+            let has = |is: fn(Effect) -> bool| terms.iter().any(|(term, ..)| is(term.effect));
             let steps = [
-                (", then Ṫ±", has(|term| matches!(term, Term::Rate(..)))),
-                (", then T̈±", has(|term| matches!(term, Term::Acceleration(..)))),
-                (", then a lag", has(|term| matches!(term, Term::Lag(..)))),
+                (", then Ṫ±", has(|effect| matches!(effect, Effect::Rate(_)))),
+                (", then T̈±", has(|effect| matches!(effect, Effect::Acceleration(_)))),
+                (", then a lag", has(|effect| matches!(effect, Effect::Lag(_)))),
             ];
             steps.iter().filter(|(_, has)| *has).for_each(|(step, _)| words.push_str(step));
             return Self { terms, words, ..Self::default() };
@@ -253,7 +250,7 @@ impl Found {
             ));
         }
         Self {
-            terms: Self::terms_of(spec, solution, level),
+            terms: spec.found(solution, level),
             words: spec.words(),
             choice: Some(choice),
             remarks,
@@ -312,7 +309,7 @@ mod tests {
         let known =
             Known { history: History::of(&[(&cycle[1..], WINDOW_S)]), temperature: cycle[1..].to_vec() };
         let mut columns = Columns::new(known.basis(channel, &filter), &samples);
-        let (lag, led) = (Term::Lag(30_000, 0), Term::Acceleration(Branch::Both, 0));
+        let (lag, led) = (Effect::Lag(30_000).power(0), Effect::Acceleration(Branch::Both).power(0));
         columns.make(&[lag, led]).unwrap();
         let mut noise = noise();
         let parts = columns.get(lag).iter().zip(columns.get(led));

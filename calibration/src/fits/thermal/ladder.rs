@@ -4,7 +4,7 @@
 //! that is close enough serves every coil. How much of each rung is believed is a matter of shrinking, not of searching.
 
 use super::branches::History;
-use super::columns::{Branch, Term, millis};
+use super::columns::{Branch, Effect, millis};
 use super::model::{Dynamics, Spec};
 
 /// Time constants (s).
@@ -65,7 +65,7 @@ impl Plan {
         let mut dynamics = lags(&self.taus_s, self.gain_degree);
         if self.leads && gyro {
             dynamics.name.push_str(", T̈");
-            dynamics.terms.push(Term::Acceleration(Branch::Both, 0));
+            dynamics.terms.push(Effect::Acceleration(Branch::Both).power(0));
         }
         Spec { degree: self.degree, dynamics, scale, shrink }
     }
@@ -91,7 +91,7 @@ pub fn lags(taus_s: &[f64], gain_degree: usize) -> Dynamics {
         1 => ", gains linear in T".to_owned(),
         degree => format!(", gains of degree {degree} in T"),
     };
-    let terms = taus_s.iter().flat_map(|tau| (0..=gain_degree).map(|power| Term::Lag(millis(*tau), power)));
+    let terms = taus_s.iter().flat_map(|tau| Effect::Lag(millis(*tau)).powers(0..=gain_degree));
     Dynamics { name: format!("{plural} of {} s{gain}", list.join(", ")), terms: terms.collect() }
 }
 

@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{AccelSensor, Curve, GyroSensor, Shape, StatedTerm};
 
-use super::columns::{Basis, Branch, Term, tau_s};
+use super::columns::{Basis, Branch, Effect, Term, tau_s};
 use super::scale::{Holds, put};
 use crate::document::tidy;
+use crate::lsq::weighted::Solution;
 use crate::report::per_deg_c;
 
 /// The dynamic part of a model.
@@ -36,9 +37,15 @@ impl Spec {
     /// All terms. The constant is one of them only where the level is known.
     pub fn terms(&self, level: bool) -> Vec<Term> {
         let first = usize::from(!level);
-        let scale = self.scale.into_iter().flat_map(|highest| (first..=highest).map(Term::Scale));
-        let statics = (first..=self.degree).map(Term::Static);
+        let scale = self.scale.into_iter().flat_map(|highest| Effect::Scale.powers(first..=highest));
+        let statics = Effect::Static.powers(first..=self.degree);
         statics.chain(self.dynamics.terms.iter().copied()).chain(scale).collect()
+    }
+
+    /// Its terms with the coefficients of a solution and their standard errors.
+    pub fn found(&self, solution: &Solution, level: bool) -> Vec<(Term, f64, f64)> {
+        let terms = self.terms(level).into_iter().zip(solution.coefficients.iter().zip(&solution.sigmas));
+        terms.map(|(term, (value, sigma))| (term, *value, *sigma)).collect()
     }
 
     /// In words.
@@ -63,90 +70,62 @@ impl Spec {
 
 /// Name and unit of a term's coefficient.
 pub fn described(term: Term, output: &str) -> (String, String) {
-    let power = |j: usize| per_deg_c("", j);
     let branch = |branch: Branch| match branch {
         Branch::Both => "",
         Branch::RunUp => ", run-up",
         Branch::Braking => ", braking",
     };
-    match term {
-        Term::Static(j) => (format!("static bias, power {j}"), format!("{output}{}", power(j))),
-        Term::Rate(on, j) => {
-            (format!("thermal rate{}, power {j}", branch(on)), format!("({output})/(°C/s){}", power(j)))
+    let (name, unit) = match term.effect {
+        Effect::Static => ("static bias".to_owned(), output.to_owned()),
+        Effect::Rate(on) => (format!("thermal rate{}", branch(on)), format!("({output})/(°C/s)")),
+        Effect::Acceleration(on) => {
+            (format!("thermal acceleration{}", branch(on)), format!("({output})/(°C/s²)"))
         }
-        Term::Acceleration(on, j) => (
-            format!("thermal acceleration{}, power {j}", branch(on)),
-            format!("({output})/(°C/s²){}", power(j)),
-        ),
-        Term::Scale(j) => (format!("scale factor error, power {j}"), format!("ppm{}", power(j))),
-        Term::Lag(tau, j) => {
-            (format!("lag of {} s, power {j}", tau_s(tau)), format!("({output})/(°C/s){}", power(j)))
-        }
-    }
+        Effect::Scale => ("scale factor error".to_owned(), "ppm".to_owned()),
+        Effect::Lag(tau) => (format!("lag of {} s", tau_s(tau)), format!("({output})/(°C/s)")),
+    };
+    (format!("{name}, power {}", term.power), per_deg_c(&unit, term.power))
 }
 
-/// Coefficients of one kind of term, by power from 0; `None` without any.
-fn coefficients(found: &[(Term, f64)], of: impl Fn(Term) -> Option<usize>) -> Option<Vec<f64>> {
-    let powers = || found.iter().filter_map(|(term, value)| Some((of(*term)?, *value)));
-    let mut coefficients = vec![0.0; powers().map(|(power, _)| power).max()? + 1];
-    powers().for_each(|(power, value)| coefficients[power] = value);
+/// Coefficients of some effects, by power from 0; `None` without any.
+fn coefficients(found: &[(Term, f64)], of: &[Effect]) -> Option<Vec<f64>> {
+    let mine = || found.iter().filter(|(term, _)| of.contains(&term.effect));
+    let mut coefficients = vec![0.0; mine().map(|(term, _)| term.power).max()? + 1];
+    mine().for_each(|(term, value)| coefficients[term.power] = *value);
     Some(coefficients)
 }
 
-/// A curve from one kind of term; `None` without any.
-fn curve(basis: &Basis, found: &[(Term, f64)], of: impl Fn(Term) -> Option<usize>) -> Option<Curve> {
+/// A curve from some effects; `None` without any.
+fn curve(basis: &Basis, found: &[(Term, f64)], of: &[Effect]) -> Option<Curve> {
     coefficients(found, of).map(|found| basis.curve(found.into_iter().map(tidy).collect()))
-}
-
-fn of_static(term: Term) -> Option<usize> {
-    match term {
-        Term::Static(power) => Some(power),
-        _ => None,
-    }
 }
 
 /// The lags, with ascending time constants.
 fn lags(basis: &Basis, found: &[(Term, f64)]) -> impl Iterator<Item = StatedTerm> {
-    let tau = |(term, _): &(Term, f64)| match term {
-        Term::Lag(tau, _) => Some(*tau),
-        _ => None,
-    };
-    let taus: BTreeSet<u64> = found.iter().filter_map(tau).collect();
-    taus.into_iter().filter_map(|tau| {
-        let gain = curve(basis, found, |term| match term {
-            Term::Lag(this, power) if this == tau => Some(power),
-            _ => None,
-        })?;
-        Some(StatedTerm::with_parameter(Feature::Lag, tau_s(tau), gain))
+    let effects: BTreeSet<Effect> = found.iter().map(|(term, _)| term.effect).collect();
+    effects.into_iter().filter_map(|effect| {
+        let Effect::Lag(tau) = effect else { return None };
+        Some(StatedTerm::with_parameter(Feature::Lag, tau_s(tau), curve(basis, found, &[effect])?))
     })
 }
 
 /// A scale factor, or its error, times the error that was found; `None` where none was.
 fn scaled(old: &Curve, basis: &Basis, found: &[(Term, f64)], holds: Holds) -> Option<Curve> {
-    let error = coefficients(found, |term| match term {
-        Term::Scale(power) => Some(power),
-        _ => None,
-    })?;
+    let error = coefficients(found, &[Effect::Scale])?;
     Some(put(old, (basis.reference_deg_c, basis.range_deg_c), &error, holds))
 }
 
 /// Puts found coefficients (°/h and so on) into a gyro that has none of these terms; its scale factor keeps what it has, times the
 /// error that was found.
 pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.set(Feature::One, curve(basis, found, of_static));
-    let rate = branches(basis, found, |term| match term {
-        Term::Rate(branch, power) => Some((branch, power)),
-        _ => None,
-    });
-    let acceleration = branches(basis, found, |term| match term {
-        Term::Acceleration(branch, power) => Some((branch, power)),
-        _ => None,
-    });
-    for (feature, branches) in [(Feature::ThermalRate, rate), (Feature::ThermalAcceleration, acceleration)] {
-        if let Some(curves) = branches {
+    sensor.set(Feature::One, curve(basis, found, &[Effect::Static]));
+    let mut put_branches = |feature, of: fn(Branch) -> Effect| {
+        if let Some(curves) = branches(basis, found, of) {
             sensor.put(StatedTerm::branched(feature, curves));
         }
-    }
+    };
+    put_branches(Feature::ThermalRate, Effect::Rate);
+    put_branches(Feature::ThermalAcceleration, Effect::Acceleration);
     lags(basis, found).for_each(|lag| sensor.put(lag));
     let none = Curve::new(Shape::Constant { value: 0.0 });
     let old = sensor.terms.curve(Feature::Reading).unwrap_or(&none);
@@ -156,16 +135,9 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
 }
 
 /// Run-up and braking.
-fn branches(
-    basis: &Basis,
-    found: &[(Term, f64)],
-    of: impl Fn(Term) -> Option<(Branch, usize)>,
-) -> Option<[Curve; 2]> {
-    let sides = [Branch::RunUp, Branch::Braking].map(|side| {
-        curve(basis, found, |term| {
-            of(term).filter(|(on, _)| *on == Branch::Both || *on == side).map(|(_, power)| power)
-        })
-    });
+fn branches(basis: &Basis, found: &[(Term, f64)], of: fn(Branch) -> Effect) -> Option<[Curve; 2]> {
+    let sides = [Branch::RunUp, Branch::Braking];
+    let sides = sides.map(|side| curve(basis, found, &[of(Branch::Both), of(side)]));
     let zero = || basis.curve(vec![0.0]);
     sides.iter().any(Option::is_some).then(|| sides.map(|side| side.unwrap_or_else(zero)))
 }
@@ -173,7 +145,7 @@ fn branches(
 /// Puts found coefficients (output units and so on) into an accelerometer, which has a static bias and lags only; its scale factor
 /// keeps what it has, times the error that was found.
 pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.set(Feature::One, curve(basis, found, of_static));
+    sensor.set(Feature::One, curve(basis, found, &[Effect::Static]));
     lags(basis, found).for_each(|lag| sensor.put(lag));
     if let Some(new) = scaled(&sensor.scale_factor, basis, found, Holds::Factor) {
         sensor.scale_factor = new;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use isotherm_correction::sample::{ChannelName, MAX_SENSORS, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 
-use super::columns::{Basis, Term};
+use super::columns::{Basis, Effect, Term};
 use super::samples::Samples;
 use crate::error::Error;
 
@@ -50,13 +50,11 @@ pub struct Noise {
 }
 
 /// A term without its power of temperature; `None` for one that no reading's noise gets into as it stands.
-fn bare(term: Term) -> Option<(Term, usize)> {
-    match term {
-        Term::Static(0) | Term::Scale(_) => None,
-        Term::Static(power) => Some((Term::Static(1), power)),
-        Term::Lag(tau, power) => Some((Term::Lag(tau, 0), power)),
-        Term::Rate(branch, power) => Some((Term::Rate(branch, 0), power)),
-        Term::Acceleration(branch, power) => Some((Term::Acceleration(branch, 0), power)),
+fn bare(term: Term) -> Option<Term> {
+    match term.effect {
+        Effect::Scale => None,
+        Effect::Static => (term.power > 0).then_some(Effect::Static.power(1)),
+        other => Some(other.power(0)),
     }
 }
 
@@ -66,8 +64,7 @@ impl Noise {
     /// # Errors
     /// [`Error::Document`].
     pub(super) fn of(basis: &Basis, runs: &[Samples], terms: &[Term]) -> Result<Self, Error> {
-        let mut wanted: Vec<Term> =
-            terms.iter().filter_map(|term| bare(*term)).map(|(term, _)| term).collect();
+        let mut wanted: Vec<Term> = terms.iter().filter_map(|term| bare(*term)).collect();
         wanted.sort_unstable();
         wanted.dedup();
         let thermometer = Thermometer::of(runs, &basis.channel.name).filter(|one| one.sigma > 0.0);
@@ -98,17 +95,15 @@ impl Noise {
 
     /// Covariance of two terms in the mean over some temperatures (°C less the basis' reference).
     pub(super) fn covariance(&self, a: Term, b: Term, away: &[f64]) -> f64 {
-        let (Some((of_a, power_a)), Some((of_b, power_b))) = (bare(a), bare(b)) else { return 0.0 };
-        let Some(known) = self.known.get(&(of_a, of_b)) else { return 0.0 };
+        let Some(known) = bare(a).zip(bare(b)).and_then(|pair| self.known.get(&pair)) else { return 0.0 };
         // A power of temperature moves by its derivative, a gain stays.
-        let part = |of: Term, power: usize, x: f64| match of {
-            Term::Static(_) => (1..=power).map(|_| integer_power(x, power - 1)).sum(),
+        let part = |Term { effect, power }: Term, x: f64| match effect {
+            Effect::Static => (1..=power).map(|_| integer_power(x, power - 1)).sum(),
             _ => integer_power(x, power),
         };
         let good = away.iter().filter(|x| x.is_finite());
-        let (sum, count) = good.fold((0.0, 0.0), |(sum, count), x| {
-            (sum + part(of_a, power_a, *x) * part(of_b, power_b, *x), count + 1.0)
-        });
+        let (sum, count) =
+            good.fold((0.0, 0.0), |(sum, count), x| (sum + part(a, *x) * part(b, *x), count + 1.0));
         if count > 0.0 { known * sum / count } else { 0.0 }
     }
 }

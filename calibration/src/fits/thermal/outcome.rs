@@ -16,7 +16,7 @@ use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::Size;
-use crate::report::{Curve, FLAT, Figure, Rest, Verdict, judge};
+use crate::report::{Curve, FLAT, Judged, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
 
@@ -96,28 +96,16 @@ impl Outcome {
                 continue;
             }
             let written = Written::of(&document)?;
-            let (mut curves, mut troubles) = (Vec::new(), Vec::new());
-            let both =
-                runs.iter().map(|run| (run, Sample::In)).chain(judges.iter().map(|run| (run, Sample::Out)));
-            for (index, (run, sample)) in both.enumerate() {
+            let of_run = |index: usize, run: &Run| {
                 let stand = self.settings.stand(index);
-                let shares = sample == Sample::Out && runs.iter().any(|other| run.shares_log(other));
+                let shares = index >= runs.len() && runs.iter().any(|other| run.shares_log(other));
                 let rest = Rest { levels: shares.then(|| compared.levels()), ..rest(run, &stand)? };
-                let both_ways = judge(
-                    run,
-                    sample,
-                    (&before.loaded, &written.loaded),
-                    (&written.document, &rest),
-                    Rows::valid(stand.window_s(window_s)),
-                    &mut watch,
-                )?;
-                troubles.extend(both_ways.troubles.iter().map(|words| format!("{}: {words}", run.name)));
                 // On a table the accelerometers feel its turning, too.
-                let at_rest = stand.turning.is_none();
-                curves.extend(
-                    both_ways.curves.into_iter().filter(|curve| at_rest || curve.of.starts_with("gyro")),
-                );
-            }
+                let counts = if stand.turning.is_none() { "" } else { "gyro" };
+                Ok((rest, Rows::valid(stand.window_s(window_s)), counts))
+            };
+            let Judged { curves, mut troubles } =
+                judge((runs, judges), [&before, &written], of_run, &mut watch)?;
             troubles.extend(constant(&curves));
             let verdicts = Curve::verdicts(&curves);
             if verdicts.is_empty() {
@@ -255,7 +243,6 @@ impl Outcome {
     /// Gives the verdicts their reasons.
     fn say(&self, verdicts: &mut [Verdict]) {
         for verdict in verdicts {
-            verdict.figure = Figure::Rms;
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
             let Some((sensor, _, found)) = mine else { continue };
             if let Some(why) = &found.refused {

@@ -50,7 +50,7 @@ impl Samples {
     /// Takes a run through the corrector with the bare document.
     ///
     /// # Errors
-    /// As [`Run::correct`], and [`Error::Document`].
+    /// As [`Run::correct_together`], and [`Error::Document`].
     pub fn of(
         run: &Run,
         series: &Series,

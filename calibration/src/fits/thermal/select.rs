@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 use super::branches::History;
-use super::columns::{Columns, Term};
+use super::columns::{Columns, Effect, Term};
 use super::ladder::{Plan, statics};
 use super::model::Spec;
 use super::noise::Noise;
@@ -83,16 +83,16 @@ impl Target {
     }
 
     /// Columns of terms, and behind them those that stay out of the document.
-    pub(super) fn design<'a>(&self, columns: &'a Columns<'_>, terms: &[Term]) -> Vec<Cow<'a, [f64]>> {
+    fn design<'a>(&self, columns: &'a Columns<'_>, terms: &[Term]) -> Vec<Cow<'a, [f64]>> {
         let levels = self.levels().into_iter().map(Cow::Owned);
         terms.iter().map(|term| self.column(columns, *term)).chain(levels).collect()
     }
 
     /// The column of a term that was made; those of the scale factor are the sensor's own.
     pub fn column<'a>(&self, columns: &'a Columns<'_>, term: Term) -> Cow<'a, [f64]> {
-        match (term, &self.scale) {
-            (Term::Scale(power), Some(scale)) => {
-                let powers = columns.get(Term::Static(power));
+        match (term.effect, &self.scale) {
+            (Effect::Scale, Some(scale)) => {
+                let powers = columns.get(Effect::Static.power(term.power));
                 Cow::Owned(powers.iter().zip(scale).map(|(power, scale)| power * scale).collect())
             }
             _ => Cow::Borrowed(columns.get(term)),
@@ -145,7 +145,8 @@ impl<'a> Trials<'a> {
         (piece, temperature): (&[usize], &[f64]),
     ) -> Self {
         let first = usize::from(!target.level);
-        let widest = target.widest_scale().into_iter().flat_map(|widest| (first..=widest).map(Term::Scale));
+        let widest =
+            target.widest_scale().into_iter().flat_map(|widest| Effect::Scale.powers(first..=widest));
         let mut terms: Vec<Term> = terms.iter().copied().chain(widest).collect();
         terms.sort_unstable();
         terms.dedup();
@@ -176,8 +177,8 @@ impl<'a> Trials<'a> {
 
     /// What stands against each coefficient of a model.
     fn shares(&self, spec: &Spec) -> Vec<f64> {
-        let share = |term: &Term| match term {
-            Term::Static(_) | Term::Scale(_) => 0.0,
+        let share = |term: &Term| match term.effect {
+            Effect::Static | Effect::Scale => 0.0,
             _ => spec.shrink,
         };
         let levels = self.terms.len()..self.noise.nrows();

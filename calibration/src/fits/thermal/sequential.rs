@@ -4,7 +4,8 @@
 //! the steps for rate and acceleration are repeated until neither moves, because smoothing makes the two alike.
 
 use super::branches::History;
-use super::columns::{Branch, Columns, Term};
+use super::columns::{Branch, Columns, Effect, Term};
+use super::model::Spec;
 use super::select::Target;
 use crate::lsq::weighted::solve;
 use crate::report::counted;
@@ -14,6 +15,9 @@ const ROUNDS: usize = 60;
 /// Change of a coefficient, as a share of itself, that counts as none.
 const STILL: f64 = 1e-6;
 
+/// The branches that terms of the rate and of the acceleration are told apart by.
+const BRANCHES: [Branch; 2] = [Branch::RunUp, Branch::Braking];
+
 /// Coefficients with their standard errors, and why there are none.
 pub type Found = Result<Vec<(Term, f64, f64)>, String>;
 
@@ -22,9 +26,9 @@ pub fn gyro_terms() -> [Vec<Term>; 2] {
     [
         [0, 1]
             .into_iter()
-            .flat_map(|power| [Branch::RunUp, Branch::Braking].map(|branch| Term::Rate(branch, power)))
+            .flat_map(|power| BRANCHES.map(|branch| Effect::Rate(branch).power(power)))
             .collect(),
-        [Branch::RunUp, Branch::Braking].map(|branch| Term::Acceleration(branch, 0)).to_vec(),
+        BRANCHES.map(|branch| Effect::Acceleration(branch).power(0)).to_vec(),
     ]
 }
 
@@ -50,24 +54,17 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
         ));
     }
     let first = usize::from(!target.level);
-    let statics: Vec<Term> = (first..=degree(history)).map(Term::Static).collect();
-    let resting: Vec<f64> =
-        target.weights.iter().zip(&history.at_rest).map(|(w, rest)| if *rest { *w } else { 0.0 }).collect();
-    let moving: Vec<f64> =
-        target.weights.iter().zip(&history.at_rest).map(|(w, rest)| if *rest { 0.0 } else { *w }).collect();
+    let weights_at = |rest: bool| -> Vec<f64> {
+        let weights = target.weights.iter().zip(&history.at_rest);
+        weights.map(|(weight, rests)| if *rests == rest { *weight } else { 0.0 }).collect()
+    };
+    let (resting, moving) = (Target { weights: weights_at(true), ..target.clone() }, weights_at(false));
     // The scale factor goes beside the bias, as far as it stands out.
     let mut scale = target.widest_scale().map(|widest| widest.min(degree(history)));
     let (mut found, rest) = loop {
-        let powers = scale.into_iter().flat_map(|highest| (first..=highest).map(Term::Scale));
-        let terms: Vec<Term> = statics.iter().copied().chain(powers).collect();
-        let design = target.design(columns, &terms);
-        let all: Vec<&[f64]> = design.iter().map(AsRef::as_ref).collect();
-        let solution = solve(&all, &target.values, &resting, None).ok_or("too few windows on plateaus")?;
-        let found: Vec<(Term, f64, f64)> = terms
-            .iter()
-            .zip(solution.coefficients.iter().zip(&solution.sigmas))
-            .map(|(term, (value, sigma))| (*term, *value, *sigma))
-            .collect();
+        let spec = Spec { degree: degree(history), scale, ..Spec::default() };
+        let solution = resting.solve(columns, &spec, true).ok_or("too few windows on plateaus")?;
+        let found = spec.found(&solution, target.level);
         match (scale, found.last()) {
             (Some(highest), Some((_, value, sigma))) if value.abs() < STANDS_OUT * sigma => {
                 scale = highest.checked_sub(1).filter(|lower| *lower >= first);

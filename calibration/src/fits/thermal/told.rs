@@ -86,9 +86,17 @@ impl Outcome {
             "Temperature is smoothed over {} s and differentiated over {} s on a grid of {} s: this filter belongs to the coefficients.",
             self.filter.smoothing_s, self.filter.derivative_step_s, self.filter.grid_step_s
         ));
+        if !self.settings.method.is_stepwise() {
+            report.notes.push(
+                "Lags and smoothing explain all sensors of a channel best together, because heat reaches them the same \
+                 way."
+                    .into(),
+            );
+        }
         if self.settings.removes_mean() {
             report.notes.push(
-                "The mean of each run is removed: Earth's rate and gravity along the axes are unknown."
+                "The mean of each run is removed, of a judging part of a fitted log the mean of the fitted part: Earth's \
+                 rate and gravity along the axes are unknown."
                     .into(),
             );
         }

@@ -11,14 +11,11 @@ use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
 use crate::axes::AXES;
 use crate::document::{accelerometers, rows, tidy};
-use crate::fits::positions::budget::ARCSEC_PER_RAD;
 use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
-use crate::numbers::{Size, norm, unit};
-use crate::report::{
-    Curve, Figure, Report, SAME_SHARE, Sigmas, Verdict, counted, fixed, output_unit, short, six,
-};
+use crate::numbers::{ARCSEC_PER_RAD, Size, norm, unit};
+use crate::report::{Curve, Report, SAME_SHARE, Sigmas, Verdict, counted, fixed, output_unit, short, six};
 
 /// Times by which the rms may grow in poses that the fit has not seen.
 const LARGEST_GROWTH: f64 = 2.0;
@@ -66,7 +63,6 @@ pub fn report(
         Report::new("Accelerometers and gyros from a tumbled unit", &document.unit).counting("poses, turns");
     let accel = of_accelerometers(tumble, [&before.length, &after.length], settings.gravity);
     let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
-    let gyro = gyro.stated_as(Figure::Rms);
     let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);
     let gyro = match &tumble.gyro {
         Err(words) => refused(words),
@@ -107,7 +103,6 @@ fn of_accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: 
     let sizes = [before, after].map(|values| Size::of(values));
     let outside = Size::of(&tumble.held_out);
     let verdict = Verdict::new("|f|−g", "m/s²", sizes).out_of_sample(Some([sizes[0], outside]));
-    let verdict = verdict.stated_as(Figure::Rms);
     let left = outside.rms;
     if left.is_nan() || outside.count == 0 || left > LARGEST_LEFT_SHARE * gravity {
         return verdict.refused(format!(

@@ -3,17 +3,18 @@
 use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, Stand, Turning, fit};
 use isotherm_calibration::report::{Report, residuals};
 use isotherm_calibration::runs::Run;
-use isotherm_correction::sample::OutputKind;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
-use isotherm_log::offline::{Offline, load_calibration, unit_id};
+use isotherm_log::offline::{Offline, load_calibration};
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{AccelOutput, Curve, Document, Sample, Shape};
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path;
 use isotherm_simulator::presets::mems_chamber;
-use isotherm_simulator::{Scenario, Simulation};
+
+use crate::simulated_logs::{self, events};
 
 const LATITUDE_DEG: f64 = 55.75;
 const HEADING_DEG: f64 = 30.0;
@@ -37,20 +38,8 @@ fn scenario(seed: u64, [pitch_deg, roll_deg]: [f64; 2], rate_deg_per_s: f64) -> 
     scenario
 }
 
-fn events(scenario: &Scenario) -> Vec<LogEvent> {
-    let output = scenario.instrument.gyros.output_kind();
-    let accel_output = scenario.instrument.accel_output_kind().unwrap_or(OutputKind::Mean);
-    let mut events = Vec::new();
-    for step in Simulation::new(scenario).unwrap() {
-        events.extend(step.temperatures.into_iter().map(LogEvent::Temperature));
-        events.extend(step.accel.map(|tick| LogEvent::Accel { output: accel_output, tick }));
-        events.push(LogEvent::Gyro { output, tick: step.gyro });
-    }
-    events
-}
-
 fn run(name: &str, scenario: &Scenario) -> Run {
-    Run::of_events(name.to_owned(), unit_id(&scenario.unit).unwrap(), events(scenario))
+    simulated_logs::run(name, &scenario.unit, events(scenario))
 }
 
 /// What a log's operator states of it.
@@ -236,17 +225,17 @@ fn a_table_that_turns_otherwise_is_refused() {
     };
     let words = refused(-20.0, std::slice::from_ref(&turned));
     assert!(words.contains("11.5") && words.contains("-11.5") && words.contains("--rate"), "{words}");
-    let mut started = events(&scenario(5, [0.0, 0.0], 0.0));
+    let mut started: Vec<LogEvent> = events(&scenario(5, [0.0, 0.0], 0.0)).collect();
     let still =
         started.iter().position(|event| matches!(event, LogEvent::Gyro { tick, .. } if tick.sequence == 60));
     started.truncate(still.unwrap());
-    let behind = events(&scenario(5, [0.0, 0.0], 20.0)).into_iter();
+    let behind = events(&scenario(5, [0.0, 0.0], 20.0));
     started.extend(behind.filter(|event| match event {
         LogEvent::Gyro { tick, .. } => tick.sequence >= 60,
         LogEvent::Accel { tick, .. } => tick.sequence >= 60,
         LogEvent::Temperature(reading) => reading.time.as_ns() > 60_000_000_000,
     }));
-    let started = Run::of_events("started late".to_owned(), unit_id("MEMS-0001").unwrap(), started);
+    let started = simulated_logs::run("started late", "MEMS-0001", started);
     let words = refused(20.0, &[started]);
     assert!(words.contains("between 0 and 72 s") && words.contains("--start"), "{words}");
 }
@@ -266,8 +255,8 @@ fn the_residual_of_runs_in_two_attitudes_is_that_of_the_service() {
         for (scenario, stand) in scenarios.iter().zip(&stands) {
             let Site::Known { force_m_per_s2: Some(force), .. } = stand.site else { panic!() };
             let mut unit = Offline::new(&loaded, UnitSettings::default());
-            for event in &events(scenario) {
-                unit.handle(event);
+            for event in events(scenario) {
+                unit.handle(&event);
             }
             unit.finish();
             for window in unit.take().chunks(10).filter(|window| window.len() == 10) {

@@ -14,6 +14,7 @@ use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, training
 use isotherm_simulator::{Scenario, Simulation};
 
 use super::{TICK_NS, base, fitted, settings, together};
+use crate::simulated_logs::{self, events};
 
 fn scenario((seed, profile): (u64, Profile)) -> Scenario {
     Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(seed, profile) }
@@ -21,15 +22,12 @@ fn scenario((seed, profile): (u64, Profile)) -> Scenario {
 
 /// A run whose thermometers are read every so many seconds.
 fn seldom_read(scenario: &Scenario, every_s: i64) -> Run {
-    let output = scenario.instrument.gyros.output_kind();
-    let mut events = Vec::new();
-    for step in Simulation::new(scenario).unwrap() {
-        let due = |ns: i64| ns / 1_000_000_000 % every_s == 0;
-        let readings = step.temperatures.into_iter().filter(|reading| due(reading.time.as_ns()));
-        events.extend(readings.map(LogEvent::Temperature));
-        events.push(LogEvent::Gyro { output, tick: step.gyro });
-    }
-    Run::of_events("simulated".to_owned(), unit_id(&scenario.unit).unwrap(), events)
+    let is_read = |event: &LogEvent| match event {
+        LogEvent::Temperature(reading) => reading.time.as_ns() / 1_000_000_000 % every_s == 0,
+        LogEvent::Gyro { .. } => true,
+        LogEvent::Accel { .. } => false,
+    };
+    simulated_logs::run("simulated", &scenario.unit, events(scenario).filter(is_read))
 }
 
 #[test]

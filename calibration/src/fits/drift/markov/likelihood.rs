@@ -1,10 +1,10 @@
 //! The restricted likelihood of a drift's noise, and the noise that is most likely.
 
-use nalgebra::{DMatrix, DVector, Matrix2};
+use nalgebra::Matrix2;
 
-use super::{Beside, Noise};
+use super::Beside;
 use crate::fits::drift::slow::Slow;
-use crate::lsq::correlated::{self, Data};
+use crate::lsq::correlated::{self, Data, Noise};
 use crate::lsq::search::compass;
 use crate::numbers::real;
 
@@ -12,37 +12,34 @@ use crate::numbers::real;
 const DIFFERENCE: f64 = 0.05;
 /// Shortest correlation time (h), a reference of a minute: what is faster is noise to the estimator.
 const SHORTEST_TIME_H: f64 = 1.0 / 60.0;
+
 /// The solution for one size of the noise, with the Markov part's variance as the unit.
 pub(super) struct Solution {
-    pub(super) beta: DVector<f64>,
-    /// (XᵀX)⁻¹ of the independent rows.
-    pub(super) inverse: DMatrix<f64>,
-    pub(super) squares: f64,
-    log_determinant: f64,
-    /// That of the readings' covariance alone.
-    own_determinant: f64,
+    pub(super) of: correlated::Solution,
+    /// Rows less columns.
     pub(super) degrees: f64,
 }
 
 impl Solution {
     /// −2·ln of the restricted likelihood at the best variance.
     pub(super) fn minus_two_log(&self) -> f64 {
-        self.degrees * libm::log(self.squares / self.degrees) + self.log_determinant
+        self.degrees * libm::log(self.of.chi_square / self.degrees) + self.log_determinant()
     }
 
     /// −2·ln of the plain likelihood at its best variance, which fits with other columns can be compared by.
     pub(super) fn minus_two_log_of_readings(&self) -> f64 {
-        let count = self.degrees + self.count_of_columns();
-        count * libm::log(self.squares / count) + self.own_determinant
+        let count = self.degrees + real(self.of.coefficients.len());
+        count * libm::log(self.of.chi_square / count) + self.of.log_variance
     }
 
-    fn count_of_columns(&self) -> f64 {
-        real(self.beta.len())
-    }
-
-    /// The same at a given variance.
+    /// −2·ln of the restricted likelihood at a given variance.
     fn at_variance(&self, variance: f64) -> f64 {
-        self.degrees * libm::log(variance) + self.squares / variance - self.degrees + self.log_determinant
+        let squares = self.of.chi_square / variance;
+        self.degrees * libm::log(variance) + squares - self.degrees + self.log_determinant()
+    }
+
+    fn log_determinant(&self) -> f64 {
+        self.of.log_variance + self.of.log_determinant
     }
 }
 
@@ -82,29 +79,14 @@ impl<'a> Problem<'a> {
         Self { slow, data, span_h }
     }
 
-    pub(super) fn solve(&self, noise: &Noise) -> Option<Solution> {
-        let noise = if noise.markov {
-            correlated::Noise { white: noise.white_ratio, markov: Some([1.0, noise.correlation_time_h]) }
-        } else {
-            correlated::Noise { white: 1.0, markov: None }
-        };
-        let correlated::Solution {
-            coefficients, covariance, chi_square, log_variance, log_determinant, ..
-        } = self.data.solve(noise)?;
-        let determinant = log_variance + log_determinant;
-        let degrees = real(self.data.len() - coefficients.len());
-        (chi_square > 0.0 && determinant.is_finite()).then_some(Solution {
-            beta: coefficients,
-            inverse: covariance,
-            squares: chi_square,
-            log_determinant: determinant,
-            own_determinant: log_variance,
-            degrees,
-        })
+    pub(super) fn solve(&self, noise: Noise) -> Option<Solution> {
+        let of = self.data.solve(noise)?;
+        let solution = Solution { degrees: real(self.data.len() - of.coefficients.len()), of };
+        (solution.of.chi_square > 0.0 && solution.log_determinant().is_finite()).then_some(solution)
     }
 
     fn cost(&self, logarithms: [f64; 2]) -> f64 {
-        self.solve(&noise(logarithms)).map_or(f64::INFINITY, |solution| solution.minus_two_log())
+        self.solve(noise(logarithms)).map_or(f64::INFINITY, |solution| solution.minus_two_log())
     }
 
     /// The most likely noise, by a grid and then ever smaller steps.
@@ -119,14 +101,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Sigmas of ln σ and ln τ from the likelihood's curvature; `None` where it has none.
-    pub(super) fn sigmas(&self, noise: &Noise, variance: f64) -> Option<[f64; 2]> {
-        let white = noise.white_ratio * variance;
-        let tau = noise.correlation_time_h;
+    pub(super) fn sigmas(&self, noise: Noise, variance: f64) -> Option<[f64; 2]> {
+        let white = noise.white * variance;
+        let [_, tau] = noise.markov?;
         let at = |s: f64, t: f64| {
             let variance = variance * libm::exp(2.0 * s);
-            let noise =
-                Noise { correlation_time_h: tau * libm::exp(t), white_ratio: white / variance, markov: true };
-            self.solve(&noise).map(|solution| solution.at_variance(variance))
+            let noise = Noise { white: white / variance, markov: Some([1.0, tau * libm::exp(t)]) };
+            self.solve(noise).map(|solution| solution.at_variance(variance))
         };
         let h = DIFFERENCE;
         let middle = at(0.0, 0.0)?;
@@ -140,6 +121,7 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Noise by the logarithms of its correlation time (h) and of the white part's share.
 pub(super) fn noise([log_tau, log_ratio]: [f64; 2]) -> Noise {
-    Noise { correlation_time_h: libm::exp(log_tau), white_ratio: libm::exp(log_ratio), markov: true }
+    Noise { white: libm::exp(log_ratio), markov: Some([1.0, libm::exp(log_tau)]) }
 }

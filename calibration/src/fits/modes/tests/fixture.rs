@@ -4,13 +4,12 @@ use std::path::Path;
 
 use isotherm_correction::earth::Place;
 use isotherm_correction::thermal::Feature;
-use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::Document;
+use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::presets::zeeman_rest;
 use isotherm_simulator::zeeman::Zeeman;
-use isotherm_simulator::{Scenario, Simulation, Step};
 
 use crate::document::Written;
 use crate::fits::modes::fit::{Made, Wanted, make};
@@ -70,27 +69,8 @@ pub(super) fn run(scenario: &Scenario) -> Run {
     simulated(scenario, |_| {})
 }
 
-/// The scenario's events in their order.
-pub(super) fn events(scenario: &Scenario) -> Vec<LogEvent> {
-    let output = scenario.instrument.gyros.output_kind();
-    let of_step = |step: Step| {
-        let temperatures = step.temperatures.into_iter().map(LogEvent::Temperature);
-        temperatures.chain([LogEvent::Gyro { output, tick: step.gyro }]).collect::<Vec<_>>()
-    };
-    Simulation::new(scenario).unwrap().flat_map(of_step).collect()
-}
-
 pub(super) fn wanted<'a>(runs: &'a [Run], base: &'a Document) -> Wanted<'a> {
-    Wanted {
-        runs,
-        judge: &[],
-        base,
-        place: Some(place()),
-        asked: Asked::default(),
-        transition_ticks: None,
-        settle_s: None,
-        reference_deg_c: None,
-    }
+    Wanted { runs, judge: &[], base, place: Some(place()), asked: Asked::default() }
 }
 
 pub(super) fn fitted(scenario: &Scenario, base: &Document) -> Made {

@@ -6,9 +6,10 @@ use isotherm_protocol::document::Sample;
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 
-use super::fixture::{base, cycle, events, fitted, place, run, scenario, truth, wanted, zeeman};
+use super::fixture::{base, cycle, fitted, place, run, scenario, truth, wanted, zeeman};
 use crate::fits::modes::fit::{Made, Wanted, make};
 use crate::fits::modes::model::{Asked, deg_per_h};
+use crate::fixture::events;
 
 /// Normalised errors of all constants over some seeds: how many runs have all within three standard errors, and the
 /// errors by constant.
@@ -81,7 +82,8 @@ fn all_constants_of_all_gyros_are_recovered_in_99_of_100_runs() {
 
 #[test]
 fn correlated_noise_is_in_the_standard_errors() {
-    let orders = Asked { static_order: Some(2), magnetic_order: Some(2), meander_order: Some(1) };
+    let orders =
+        Asked { static_order: Some(2), magnetic_order: Some(2), meander_order: Some(1), ..Asked::default() };
     let found = over_seeds(0..30, orders, |seed| {
         let mut scenario = coarse(seed);
         for gyro in &mut zeeman(&mut scenario).gyros {

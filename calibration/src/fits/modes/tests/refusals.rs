@@ -9,11 +9,12 @@ use isotherm_protocol::document::{Document, GyroOutput};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 
-use super::fixture::{base, cycle, events, fitted, scenario, wanted, zeeman};
+use super::fixture::{base, cycle, fitted, scenario, wanted, zeeman};
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::modes::fit::{Made, Wanted, make};
 use crate::fits::modes::model::Term;
+use crate::fixture::events;
 use crate::runs::Run;
 
 /// Twenty switches, twenty seconds apart.
