@@ -1,6 +1,7 @@
 //! `--help` with the options that most calls need, `--help-advanced` with all of them, for every command of a program.
 
-use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Arg, ArgAction, Command, CommandFactory, Error, FromArgMatches};
 
 use crate::stderr::PROGRAM;
 
@@ -10,7 +11,8 @@ pub fn parse<P: CommandFactory + FromArgMatches>() -> P {
     let mut command = command::<P>();
     // A second command line in one process is a test's.
     let _ = PROGRAM.set(command.get_name().to_owned());
-    let matches = command.clone().get_matches();
+    let matches = command.clone().try_get_matches();
+    let matches = matches.unwrap_or_else(|error| listing_commands(error, &command, std::env::args()).exit());
     P::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit())
 }
 
@@ -18,6 +20,21 @@ pub fn parse<P: CommandFactory + FromArgMatches>() -> P {
 #[must_use]
 pub fn command<P: CommandFactory>() -> Command {
     with_help(P::command())
+}
+
+/// An error about a command that there is not, with those that there are.
+fn listing_commands(mut error: Error, command: &Command, arguments: impl Iterator<Item = String>) -> Error {
+    let within = arguments.fold(command, |command, name| command.find_subcommand(name).unwrap_or(command));
+    let names: Vec<_> = within.get_subcommands().map(Command::get_name).collect();
+    // Behind a positional argument, clap takes it for one argument too many.
+    let kinds = [ErrorKind::InvalidSubcommand, ErrorKind::UnknownArgument];
+    let is_option =
+        error.get(ContextKind::InvalidArg).is_some_and(|given| given.to_string().starts_with('-'));
+    if kinds.contains(&error.kind()) && !is_option && !names.is_empty() {
+        let words = format!("the commands are {}", names.join(", "));
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![words.into()]));
+    }
+    error
 }
 
 fn with_help(command: Command) -> Command {
@@ -52,6 +69,12 @@ mod tests {
 
     #[derive(Debug, clap::Subcommand)]
     enum Sub {
+        /// Orders something
+        Order {
+            unit: String,
+            #[command(subcommand)]
+            action: Action,
+        },
         /// Does something
         Run {
             /// How often
@@ -61,6 +84,12 @@ mod tests {
             #[arg(long, hide_short_help = true)]
             rarely: bool,
         },
+    }
+
+    #[derive(Debug, clap::Subcommand)]
+    enum Action {
+        Rest,
+        Go,
     }
 
     #[test]
@@ -75,5 +104,19 @@ mod tests {
         }
         assert!(help("--help-advanced").contains("--rarely"));
         command::<Cli>().debug_assert();
+    }
+
+    #[test]
+    fn an_unknown_command_is_told_those_that_there_are() {
+        let told = |arguments: &[&str]| {
+            let (command, arguments) = (command::<Cli>(), arguments.iter().map(ToString::to_string));
+            let error = command.clone().try_get_matches_from(arguments.clone()).unwrap_err();
+            listing_commands(error, &command, arguments).to_string()
+        };
+        assert!(told(&["program", "stop"]).contains("tip: the commands are order, run\n"));
+        assert!(told(&["program", "order", "A-1", "stop"]).contains("tip: the commands are rest, go\n"));
+        for arguments in [&["program", "--stop"][..], &["program", "run", "stop"]] {
+            assert!(!told(arguments).contains("commands"), "{arguments:?}");
+        }
     }
 }

@@ -24,7 +24,7 @@ pub mod table;
 pub use advanced::parse;
 pub use bar::Bar;
 pub use exit::Exit;
-pub use print::{coloured, grouped, print, print_within, to_stdout};
+pub use print::{coloured, grouped, json, print, print_within, to_stdout};
 pub use program::Common;
 pub use stderr::{failed, failed_lines, say, say_lines};
 pub use table::table;

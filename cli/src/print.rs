@@ -5,6 +5,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use isotherm_document::escape::{escaped, escaped_lines};
+use serde::Serialize;
 
 use crate::exit::Exit;
 use crate::stderr::failed;
@@ -57,6 +58,13 @@ pub fn to_stdout(bytes: &[u8]) -> io::Result<()> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
     }
+}
+
+/// A result as JSON, indented.
+#[must_use]
+pub fn json(result: &impl Serialize) -> String {
+    // Results are plain structures of numbers and texts, which always serialise.
+    serde_json::to_string_pretty(result).unwrap_or_default() + "\n"
 }
 
 /// Prints a result on stdout and gives the exit code: `exit`, or [`Exit::Failed`] where it cannot be written.

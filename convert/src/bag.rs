@@ -20,6 +20,7 @@ use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use isotherm_log::error::Error;
+use isotherm_log::recording::io_error;
 use isotherm_log::ros2::RosMessage;
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
@@ -181,11 +182,7 @@ impl BagWriter {
 }
 
 fn failed(path: &Path, source: McapError) -> Error {
-    let source = match source {
-        McapError::Io(source) => source,
-        other => io::Error::other(other),
-    };
-    Error::file(path, "write the bag", source)
+    Error::file(path, "write the bag", io_error(source))
 }
 
 #[cfg(test)]

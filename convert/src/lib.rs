@@ -14,6 +14,7 @@ mod recording;
 mod ros2;
 mod text;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -24,7 +25,9 @@ use isotherm_log::part::{LogFiles, Messages, Part};
 use isotherm_log::recording::{Attachment, RecordingReader};
 use isotherm_log::source::LogReport;
 use isotherm_log::streams::contents::Contents;
+use isotherm_log::streams::decoded::{Decoded, decode};
 use isotherm_protocol::document::Document;
+use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 pub use bag::BagTopic;
@@ -137,13 +140,33 @@ impl Conversion {
         Ok(messages.report())
     }
 
+    /// Reads the log's part into its units; what is of none, or cannot be read, is counted.
+    fn read_units<U>(
+        &self,
+        units: &mut BTreeMap<UnitId, U>,
+        converted: &mut Converted,
+        mut take: impl FnMut(&mut U, u64, &Decoded, &mut Converted) -> Result<(), Error>,
+    ) -> Result<LogReport, Error> {
+        self.read("writing", |message, _| {
+            let Ok(decoded) = decode(message) else {
+                converted.lose("frames that cannot be read", 1);
+                return Ok(());
+            };
+            match decoded.and_then(|(unit, decoded)| Some((units.get_mut(unit)?, decoded))) {
+                Some((unit, decoded)) => take(unit, message.received_ns, &decoded, converted)?,
+                None => converted.leave_out("messages of no unit", 1),
+            }
+            Ok(())
+        })
+    }
+
     /// Names and values that every output carries.
     fn provenance(&self) -> Vec<(String, String)> {
         let mut words = vec![("isotherm".to_owned(), env!("CARGO_PKG_VERSION").to_owned())];
         words.extend(self.sources.iter().cloned());
-        if self.part.start.as_ns() > 0 || self.part.end.is_some() {
-            words.push(("start_s".to_owned(), self.part.start.as_s().to_string()));
-            words.extend(self.part.end.map(|end| ("end_s".to_owned(), end.as_s().to_string())));
+        if let Some((start, end)) = self.part.window() {
+            words.push(("start_s".to_owned(), start.as_s().to_string()));
+            words.extend(end.map(|end| ("end_s".to_owned(), end.as_s().to_string())));
         }
         words
     }

@@ -1,9 +1,8 @@
 //! Where outputs may go, and files that are compressed by their name.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use isotherm_log::file::{self, Partial, refuse_overwriting, refuse_replacing};
+use isotherm_log::file::{Partial, Sink, refuse_overwriting, refuse_replacing};
 use isotherm_protocol::key::UnitId;
 
 use isotherm_log::error::Error;
@@ -56,18 +55,23 @@ impl Place {
 
     /// A file to be written, with its folder.
     pub(super) fn partial(&self, path: &Path) -> Result<Partial, Error> {
+        self.prepare(path)?;
+        Ok(Partial::of(path))
+    }
+
+    fn prepare(&self, path: &Path) -> Result<(), Error> {
         self.check(path)?;
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)
                 .map_err(|source| Error::file(folder, "create the folder", source))?;
         }
-        Ok(Partial::of(path))
+        Ok(())
     }
 
     /// A file of text or bytes to be written, compressed where its name ends in `.gz`.
     pub(super) fn sink(&self, path: &Path) -> Result<Sink, Error> {
-        let partial = self.partial(path)?;
-        Ok(Sink { stream: file::Sink::create(partial.writing(), path)?, partial })
+        self.prepare(path)?;
+        Sink::create(path)
     }
 
     /// A whole text as a file.
@@ -75,30 +79,6 @@ impl Place {
         let mut sink = self.sink(path)?;
         sink.write(|writer| writer.write_all(text.as_bytes()))?;
         sink.finish()
-    }
-}
-
-/// A file that is being written.
-#[derive(Debug)]
-pub(super) struct Sink {
-    stream: file::Sink,
-    partial: Partial,
-}
-
-impl Sink {
-    /// Writes whatever `write` does.
-    pub(super) fn write<T>(
-        &mut self,
-        write: impl FnOnce(&mut dyn Write) -> io::Result<T>,
-    ) -> Result<T, Error> {
-        write(&mut self.stream).map_err(|source| Error::file(self.partial.path(), "write", source))
-    }
-
-    /// Everything is written.
-    pub(super) fn finish(self) -> Result<Partial, Error> {
-        let Self { stream, partial } = self;
-        stream.finish().map_err(|source| Error::file(partial.path(), "write", source))?;
-        Ok(partial)
     }
 }
 

@@ -21,7 +21,6 @@ mod tests;
 use std::collections::BTreeMap;
 
 use isotherm_log::error::Error;
-use isotherm_log::streams::decoded::decode;
 use isotherm_protocol::key::UnitId;
 
 use isotherm_log::file::Partial;
@@ -45,20 +44,12 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
         tables.insert(unit.clone(), created);
     }
     let mut converted = Converted::default();
-    let log = conversion.read("writing", |message, _| {
-        match decode(message) {
-            Ok(Some((unit, decoded))) => {
-                let written = match tables.get_mut(unit) {
-                    Some(tables) => tables.take(message.received_ns, &decoded)?,
-                    None => false,
-                };
-                converted.leave_out("journal messages", u64::from(!written));
-            }
-            Ok(None) => converted.leave_out("messages of no unit", 1),
-            Err(_) => converted.lose("frames that cannot be read", 1),
-        }
-        Ok(())
-    })?;
+    let log =
+        conversion.read_units(&mut tables, &mut converted, |tables, received_ns, decoded, converted| {
+            let written = tables.take(received_ns, decoded)?;
+            converted.leave_out("journal messages", u64::from(!written));
+            Ok(())
+        })?;
     for tables in tables.into_values() {
         converted.files.extend(tables.finish()?);
     }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use isotherm_correction::sample::{ChannelName, TickFlags};
 use isotherm_log::ros2::{Header, Imu, Names, RosMessage, Temperature, time};
 use isotherm_log::streams::contents::{UnitContents, usual};
-use isotherm_log::streams::decoded::{Decoded, decode};
+use isotherm_log::streams::decoded::Decoded;
 use isotherm_log::streams::rows::{Row, Rows, Step};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::document::Document;
@@ -59,16 +59,8 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     let mut writer = BagWriter::create(bag.writing())?;
     writer.metadata("isotherm", conversion.provenance().into_iter().collect())?;
     let mut converted = Converted::default();
-    let log = conversion.read("writing", |message, _| {
-        match decode(message) {
-            Ok(Some((unit, decoded))) => match units.get_mut(unit) {
-                Some(unit) => unit.take(&decoded, &mut writer, &mut converted)?,
-                None => converted.leave_out("messages of no unit", 1),
-            },
-            Ok(None) => converted.leave_out("messages of no unit", 1),
-            Err(_) => converted.lose("frames that cannot be read", 1),
-        }
-        Ok(())
+    let log = conversion.read_units(&mut units, &mut converted, |unit, _, decoded, converted| {
+        unit.take(decoded, &mut writer, converted)
     })?;
     for unit in units.values_mut() {
         unit.finish(&mut writer, &mut converted)?;

@@ -6,17 +6,17 @@ use std::mem;
 use std::path::{Path, PathBuf};
 
 use isotherm_log::streams::contents::UnitContents;
-use isotherm_log::streams::decoded::{Decoded, decode};
+use isotherm_log::streams::decoded::Decoded;
 use isotherm_log::streams::raw_text::RawColumns;
 use isotherm_log::streams::rows::{Row, Rows, Step};
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::HealthBatch;
 
-use super::output::{Place, Sink, folder};
+use super::output::{Place, folder};
 use super::{Conversion, Converted, Found, Outcome, Target, Written};
 use isotherm_log::error::Error;
-use isotherm_log::file::Partial;
+use isotherm_log::file::{Partial, Sink};
 use isotherm_log::offline::rows::{write_header, write_tick};
 
 pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {
@@ -41,16 +41,8 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
         texts.insert(unit.clone(), UnitText::create(unit, contents, names, &conversion.place)?);
     }
     let mut converted = Converted::default();
-    let log = conversion.read("writing", |message, _| {
-        match decode(message) {
-            Ok(Some((unit, decoded))) => match texts.get_mut(unit) {
-                Some(text) => text.take(&decoded, &mut converted)?,
-                None => converted.leave_out("messages of no unit", 1),
-            },
-            Ok(None) => converted.leave_out("messages of no unit", 1),
-            Err(_) => converted.lose("frames that cannot be read", 1),
-        }
-        Ok(())
+    let log = conversion.read_units(&mut texts, &mut converted, |text, _, decoded, converted| {
+        text.take(decoded, converted)
     })?;
     let mut partials = Vec::new();
     for text in texts.into_values() {

@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use crate::looks::doubt;
 use crate::problem::Problem;
 use crate::text::{MAX_BYTES, unplaced, utf8};
 
@@ -35,7 +36,7 @@ pub fn check_regular(file: &Path) -> std::io::Result<()> {
 /// The one problem of a file that is too long, or not UTF-8.
 pub fn text<'b>(bytes: &'b [u8], file: &str) -> Result<&'b str, Vec<Problem>> {
     if bytes.len() > MAX_BYTES {
-        let message = format!("is longer than {MAX_BYTES} bytes: is it the right file?");
+        let message = format!("is longer than {MAX_BYTES} bytes: {}", doubt(bytes));
         return Err(vec![unplaced(Some(file), message)]);
     }
     utf8(bytes, Some(file))
@@ -51,6 +52,9 @@ mod tests {
         assert_eq!(text("°".as_bytes(), "f"), Ok("°"));
         assert!(words(b"a = 1\n\xff").starts_with("f:2:1: is not UTF-8 at byte 6"));
         assert!(words(&vec![b'#'; MAX_BYTES + 1]).contains("is longer than 1048576 bytes"));
+        assert!(
+            words(b"\x89MCAP0\r\n\xff").ends_with("it looks like a recording (MCAP), which is no document")
+        );
         let zero = read_bounded(Path::new("/dev/zero")).unwrap();
         assert_eq!(zero.len(), MAX_BYTES + 1);
     }

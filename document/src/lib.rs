@@ -40,6 +40,7 @@
 pub mod escape;
 pub mod file;
 mod kind;
+mod looks;
 mod number;
 mod problem;
 mod reader;
@@ -49,7 +50,7 @@ mod suggest;
 mod text;
 mod walk;
 
-pub use problem::{Problem, listed};
+pub use problem::{Problem, few, listed};
 pub use reader::{Reader, element, join, parse};
 pub use schema::{Form, published};
 pub use text::{MAX_BYTES, parse_toml, unplaced, utf8};

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::escape::escaped;
 
+/// Most names that a sentence has.
+const FEW: usize = 8;
+
 /// One thing that is wrong with (or doubtful about) a document.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Problem {
@@ -41,6 +44,18 @@ impl std::error::Error for Problem {}
 #[must_use]
 pub fn listed(problems: &[Problem]) -> String {
     problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// Names for a sentence: the first of them where they are many.
+#[must_use]
+pub fn few<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    let names: Vec<_> = names.into_iter().collect();
+    let first: Vec<_> = names.iter().take(FEW).map(AsRef::as_ref).collect();
+    match names.len() {
+        0 => "none".to_owned(),
+        all if all > FEW => format!("{} and {} more", first.join(", "), all - FEW),
+        _ => first.join(", "),
+    }
 }
 
 /// Byte offset → line and column.

@@ -5,6 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::DeTable;
 
+use crate::looks::{doubt, looks_like};
 use crate::problem::{Lines, Problem};
 use crate::reader::{MAX_PROBLEMS, Reader};
 use crate::schema::Form;
@@ -53,7 +54,7 @@ pub fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Prob
         let before =
             bytes.get(..valid).and_then(|before| std::str::from_utf8(before).ok()).unwrap_or_default();
         let (line, column) = Lines::new(before).position(valid);
-        let message = format!("is not UTF-8 at byte {valid}: is it the right file, saved as UTF-8?");
+        let message = format!("is not UTF-8 at byte {valid}: {}", doubt(bytes));
         vec![Problem { line, column, ..unplaced(file, message) }]
     })
 }
@@ -73,6 +74,10 @@ impl<'t> Reader<'t> {
             return None;
         }
         let (root, errors) = parse_toml(text);
+        if !errors.is_empty() && looks_like(text.as_bytes()).is_some() {
+            self.report_at(0, "", format!("is no TOML: {}", doubt(text.as_bytes())));
+            return None;
+        }
         let mut spaced_until = 0;
         for error in &errors {
             let span = error.span().unwrap_or(0..0);

@@ -102,7 +102,7 @@ fn verify(args: &HistoryArgs) -> Exit {
     };
     let exit = if found.holds { Exit::Ok } else { Exit::Failed };
     if args.json {
-        return print(&(serde_json::to_string_pretty(&found).unwrap_or_default() + "\n"), exit);
+        return print(&isotherm_cli::json(&found), exit);
     }
     found.breaks.iter().for_each(say);
     print(&found.to_string(), exit)

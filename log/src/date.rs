@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use isotherm_correction::units;
 use jiff::Timestamp;
 
 /// From 1990 to 2100 (s since 1970): an earlier or later time is the count of a clock that began anywhere.
@@ -18,6 +19,11 @@ pub fn date(ns: i64) -> String {
             format!("{sign}{}.{:03} s on its own clock", size / 1000, size % 1000)
         }
     }
+}
+
+/// Nanoseconds in seconds, with their sign.
+pub(crate) fn seconds(ns: i64) -> f64 {
+    units::Timestamp::from_ns(ns).seconds_from(units::Timestamp::from_ns(0))
 }
 
 #[cfg(test)]

@@ -10,9 +10,6 @@ use thiserror::Error;
 use crate::mapping::Problem;
 use crate::text::LogError;
 
-/// Most serials that a sentence names.
-const FEW: usize = 8;
-
 /// Why a log, a mapping or a calibration document cannot be used.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -65,17 +62,6 @@ pub enum Error {
     /// What was given does not go together.
     #[error("{0}")]
     Usage(String),
-}
-
-/// Serials for a sentence, not all where they are many.
-#[must_use]
-pub fn few<S: AsRef<str>>(serials: &[S]) -> String {
-    let first: Vec<_> = serials.iter().take(FEW).map(AsRef::as_ref).collect();
-    match serials.len() {
-        0 => "none".to_owned(),
-        all if all > FEW => format!("{} and {} more", first.join(", "), all - FEW),
-        _ => first.join(", "),
-    }
 }
 
 impl Error {

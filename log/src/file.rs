@@ -1,39 +1,26 @@
 //! Small files read and written whole, and outputs that must not fall on inputs.
 
 use std::fs::{File, Permissions, canonicalize};
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Read, Stdout, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf, absolute};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use isotherm_document::file::read_bounded;
-use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use crate::error::Error;
 
 /// Reads a mapping, calibration document or scenario; a log given in its place must not fill the memory.
 ///
 /// # Errors
-/// [`Error::File`].
-pub fn read_small(path: &Path, action: &'static str) -> Result<Vec<u8>, Error> {
+/// [`Error::File`], also where it is too long or not UTF-8.
+pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
     let failed = |source| Error::file(path, action, source);
     let bytes = read_bounded(path).map_err(failed)?;
-    if bytes.len() > MAX_DOCUMENT_BYTES {
-        let words = format!("longer than {MAX_DOCUMENT_BYTES} bytes: is it the right file?");
-        return Err(failed(io::Error::other(words)));
-    }
-    Ok(bytes)
-}
-
-/// The same as text.
-///
-/// # Errors
-/// [`Error::File`], also where it is not UTF-8.
-pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
-    String::from_utf8(read_small(path, action)?).map_err(|error| {
-        let words = format!("not UTF-8 at byte {}: is it the right file?", error.utf8_error().valid_up_to());
-        Error::file(path, action, io::Error::other(words))
+    let text = isotherm_document::file::text(&bytes, "").map(ToOwned::to_owned);
+    text.map_err(|problems| {
+        failed(io::Error::other(problems.into_iter().map(|problem| problem.message).collect::<String>()))
     })
 }
 
@@ -146,62 +133,81 @@ impl Drop for Partial {
     }
 }
 
-/// A file that is being written, compressed or not.
+/// A file that is being written, compressed where its name ends in `.gz`; or standard output.
 #[derive(Debug)]
-pub enum Sink {
-    /// As it is.
-    Plain(BufWriter<File>),
-    /// By gzip.
-    Gzip(Box<GzEncoder<BufWriter<File>>>),
+pub struct Sink {
+    stream: Stream,
+    partial: Partial,
 }
 
+/// Where bytes go.
+#[derive(Debug)]
+enum Stream {
+    Plain(BufWriter<File>),
+    Gzip(Box<GzEncoder<BufWriter<File>>>),
+    Stdout(BufWriter<Stdout>),
+}
+
+/// Bytes that are written together.
+const BLOCK: usize = 1 << 16;
+
 impl Sink {
-    /// Creates a file, to be compressed where the name that it will have ends in `.gz`.
+    /// Creates a file.
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn create(path: &Path, named: &Path) -> Result<Self, Error> {
-        let file = File::create(path).map_err(|source| Error::file(named, "create", source))?;
-        let file = BufWriter::with_capacity(1 << 16, file);
-        Ok(if named.extension().is_some_and(|extension| extension == "gz") {
-            Self::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        let partial = Partial::of(path);
+        let file = File::create(partial.writing()).map_err(|source| Error::file(path, "create", source))?;
+        let file = BufWriter::with_capacity(BLOCK, file);
+        let stream = if path.extension().is_some_and(|extension| extension == "gz") {
+            Stream::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
         } else {
-            Self::Plain(file)
-        })
+            Stream::Plain(file)
+        };
+        Ok(Self { stream, partial })
     }
 
-    /// Writes out what is still here.
+    /// Standard output.
+    #[must_use]
+    pub fn stdout() -> Self {
+        let partial = Partial { path: "standard output".into(), writing: PathBuf::new(), kept: true };
+        Self { stream: Stream::Stdout(BufWriter::with_capacity(BLOCK, io::stdout())), partial }
+    }
+
+    /// Writes whatever `write` does.
     ///
     /// # Errors
-    /// That of the disk.
-    pub fn finish(self) -> io::Result<()> {
-        match self {
-            Self::Plain(mut file) => file.flush(),
-            Self::Gzip(encoder) => encoder.finish()?.flush(),
-        }
+    /// [`Error::File`].
+    pub fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, Error> {
+        let written = match &mut self.stream {
+            Stream::Plain(file) => write(file),
+            Stream::Gzip(encoder) => write(encoder),
+            Stream::Stdout(stdout) => write(stdout),
+        };
+        written.map_err(|source| Error::file(&self.partial.path, "write", source))
+    }
+
+    /// Everything is written: what has to be given its name.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn finish(self) -> Result<Partial, Error> {
+        let Self { stream, partial } = self;
+        let written = match stream {
+            Stream::Plain(mut file) => file.flush(),
+            Stream::Gzip(encoder) => encoder.finish().and_then(|mut file| file.flush()),
+            Stream::Stdout(mut stdout) => stdout.flush(),
+        };
+        written.map_err(|source| Error::file(&partial.path, "write", source))?;
+        Ok(partial)
     }
 }
 
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Plain(file) => file.write(bytes),
-            Self::Gzip(encoder) => encoder.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Plain(file) => file.flush(),
-            Self::Gzip(encoder) => encoder.flush(),
-        }
-    }
-}
-
-/// Whether a file begins with these bytes; what cannot be read does not.
-pub(crate) fn begins_with(path: &Path, magic: &[u8]) -> bool {
+/// Whether something begins with these bytes; what cannot be read does not.
+pub(crate) fn begins_with(source: impl Read, magic: &[u8]) -> bool {
     let mut start = Vec::with_capacity(magic.len());
-    let read = File::open(path).and_then(|file| file.take(magic.len() as u64).read_to_end(&mut start));
+    let read = source.take(magic.len() as u64).read_to_end(&mut start);
     read.is_ok() && start == magic
 }
 
@@ -243,11 +249,9 @@ mod tests {
 
     #[test]
     fn a_small_file_is_small() {
-        let error = read_small(Path::new("/dev/zero"), "read the mapping").unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "/dev/zero: cannot read the mapping: longer than 1048576 bytes: is it the right file?"
-        );
+        let error = read_small_text(Path::new("/dev/zero"), "read the mapping").unwrap_err().to_string();
+        let words = "is longer than 1048576 bytes: is it the right file, saved as UTF-8?";
+        assert_eq!(error, format!("/dev/zero: cannot read the mapping: {words}"));
     }
 
     #[test]

@@ -19,7 +19,8 @@ use std::sync::Arc;
 
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
-use isotherm_protocol::document::{Document, Problem};
+use isotherm_document::file::{read_bounded, text};
+use isotherm_protocol::document::{Document, Parsed, Problem};
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::stream::{UnitStream, unfit};
 
@@ -27,7 +28,6 @@ pub use parallel::{Made, RunOptions, correct};
 pub use unit::{Basis, Form, Output, UnitPlan, UnitReport};
 
 use crate::error::Error;
-use crate::file::read_small;
 use crate::text::LogEvent;
 
 /// A calibration document that was read from a file.
@@ -46,16 +46,25 @@ pub struct Loaded {
 /// Reads a calibration document.
 ///
 /// # Errors
-/// [`Error::File`], [`Error::Calibration`] with every problem, [`Error::Unit`].
+/// [`Error::File`], [`Error::Calibration`] with every problem.
+pub fn read_document(path: &Path) -> Result<Parsed, Error> {
+    let bytes =
+        read_bounded(path).map_err(|source| Error::file(path, "read the calibration document", source))?;
+    let name = path.display().to_string();
+    text(&bytes, &name)
+        .and_then(|text| Document::parse(text, Some(&name)))
+        .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))
+}
+
+/// Reads a calibration document, to correct by it.
+///
+/// # Errors
+/// Those of [`read_document`], [`Error::Unit`].
 pub fn load_calibration(path: &Path) -> Result<Loaded, Error> {
-    let bytes = read_small(path, "read the calibration document")?;
-    let parsed = Document::parse_bytes(&bytes, Some(&path.display().to_string()))
-        .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))?;
-    let mut digest = [0; 8];
-    digest.copy_from_slice(parsed.digest.first_chunk::<8>().unwrap_or(&[0; 8]));
+    let parsed = read_document(path)?;
     Ok(Loaded {
         calibration: Arc::new(parsed.calibration),
-        digest,
+        digest: parsed.digest.first_chunk().copied().unwrap_or_default(),
         unit: unit_id(&parsed.document.unit)?,
         warnings: parsed.warnings,
     })
@@ -131,6 +140,13 @@ impl Offline {
     /// Takes ready ticks as one frame; false where there are none.
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
         self.stream.next_frame(frame).is_some()
+    }
+
+    /// Takes the corrected ticks that are ready, as rows or frames.
+    pub fn give_out(&mut self, form: Form) -> Output {
+        let mut output = Output::default();
+        output.give_out(&mut self.stream, form);
+        output
     }
 
     /// What was refused or passed over, in words for whoever reads only the summary.

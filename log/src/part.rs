@@ -41,6 +41,20 @@ pub struct Part {
     pub end: Option<Span>,
 }
 
+impl Part {
+    /// Begin and end of what is not the whole time.
+    #[must_use]
+    pub fn window(&self) -> Option<(Span, Option<Span>)> {
+        (self.start > Span::ZERO || self.end.is_some()).then_some((self.start, self.end))
+    }
+
+    /// How long it is; `None` to the end.
+    #[must_use]
+    pub fn duration(&self) -> Option<Span> {
+        self.end.map(|end| Span::from_ns(end.as_ns().saturating_sub(self.start.as_ns())))
+    }
+}
+
 impl LogFiles {
     /// Opens a part of the log.
     ///
@@ -53,15 +67,13 @@ impl LogFiles {
         let mut beginning_ns = None;
         let (log, window) = match self {
             Self::Recordings(paths) => {
-                let window =
-                    (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
                 let mut before_ns = 0;
                 if part.start > Span::ZERO {
                     beginning_ns = Log::recordings(paths)?.next_message()?.map(|message| message.received_ns);
                     let start_ns = u64::try_from(part.start.as_ns()).unwrap_or(0);
                     before_ns = beginning_ns.map_or(0, |beginning| beginning.saturating_add(start_ns));
                 }
-                (Log::recordings_at(paths, before_ns)?, window)
+                (Log::recordings_at(paths, before_ns)?, part.window())
             }
             Self::Text { paths, mapping, unit, batch_ticks } => {
                 let options = TextOptions {
@@ -69,9 +81,7 @@ impl LogFiles {
                     unit,
                     batch_ticks: *batch_ticks,
                     start: part.start,
-                    duration: part
-                        .end
-                        .map(|end| Span::from_ns(end.as_ns().saturating_sub(part.start.as_ns()))),
+                    duration: part.duration(),
                 };
                 (Log::text(paths, options)?, None)
             }
@@ -97,9 +107,8 @@ impl Messages {
     /// # Errors
     /// [`Error::File`].
     pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
-        let window = (part.start > Span::ZERO || part.end.is_some()).then_some((part.start, part.end));
         let log = Log::corrected(path, unit)?;
-        Ok(Self { log, units: part.units.clone(), window, beginning_ns: None, over: false })
+        Ok(Self { log, units: part.units.clone(), window: part.window(), beginning_ns: None, over: false })
     }
 
     /// The next message; `None` behind the last.

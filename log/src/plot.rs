@@ -25,6 +25,7 @@ mod unit;
 
 use std::collections::BTreeMap;
 
+use isotherm_protocol::document::Parsed;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
@@ -58,8 +59,8 @@ pub struct PlotLog {
 pub struct PlotOptions {
     /// Most bins of each quantity (2…2²⁰); up to three times as many ticks are shown one by one.
     pub detail: usize,
-    /// Text of a calibration document: the nominal scale of raw readings, and what [`PlotLog::correct`] corrects with.
-    pub calibration: Option<String>,
+    /// A calibration document: the nominal scale of raw readings, and what [`PlotLog::correct`] corrects with.
+    pub calibration: Option<Parsed>,
 }
 
 impl Default for PlotOptions {

@@ -28,6 +28,7 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -37,7 +38,7 @@ pub use place::is_being_written;
 pub use reader::{RecordingReader, RecordingReport};
 pub(crate) use record::chunk_records;
 pub use recover::recover;
-pub use writer::{RecordingOptions, RecordingWriter};
+pub use writer::{RecordingOptions, RecordingWriter, io_error};
 
 /// Encoding of the messages: frames of `docs/wire.md`.
 pub const MESSAGE_ENCODING: &str = "isotherm";
@@ -63,6 +64,23 @@ pub struct Attachment {
     /// What it holds.
     #[serde(skip)]
     pub bytes: Vec<u8>,
+}
+
+impl Attachment {
+    fn read(header: mcap::records::AttachmentHeader, data: Cow<'_, [u8]>) -> Self {
+        let mcap::records::AttachmentHeader { name, media_type, log_time, .. } = header;
+        Self { name, media_type, attached_ns: log_time, bytes: data.into_owned() }
+    }
+
+    fn as_written(&self) -> mcap::Attachment<'_> {
+        mcap::Attachment {
+            log_time: self.attached_ns,
+            create_time: self.attached_ns,
+            name: self.name.clone(),
+            media_type: self.media_type.clone(),
+            data: self.bytes.as_slice().into(),
+        }
+    }
 }
 
 /// A record of names and values inside a recording.

@@ -1,6 +1,7 @@
 //! A log of either kind as messages: recordings as they are, text logs put into batches.
 
 use std::collections::{BTreeSet, VecDeque};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -25,7 +26,7 @@ use crate::text::{LogEvent, LogReader, ReadReport, Window};
 /// Whether a file is a recording; what cannot be read is not.
 #[must_use]
 pub fn is_recording(path: &Path) -> bool {
-    begins_with(path, recording::MAGIC)
+    File::open(path).is_ok_and(|file| begins_with(file, recording::MAGIC))
 }
 
 /// How the text logs of a command are read.

@@ -28,7 +28,7 @@ use crate::progress::Progress;
 use file::FileReader;
 
 pub(crate) use dates::{is_date, says_order, stamp_ns};
-pub(crate) use input::open as open_raw;
+pub(crate) use input::{Source as Bytes, open as open_raw};
 
 pub use error::{LogError, LogFault, Reason};
 pub use window::Window;

@@ -173,7 +173,7 @@ pub(super) async fn run(args: &CommandArgs) -> Result<Exit, ConsoleError> {
 fn answer(reply: &CommandReply, json: bool) -> Exit {
     let exit = if reply.accepted { Exit::Ok } else { Exit::Failed };
     if json {
-        return print(&(serde_json::to_string_pretty(reply).unwrap_or_default() + "\n"), exit);
+        return print(&isotherm_cli::json(reply), exit);
     }
     if reply.accepted {
         return print(&(in_words(reply) + "\n"), exit);
@@ -197,7 +197,11 @@ fn in_words(reply: &CommandReply) -> String {
 }
 
 /// Gives one command.
-async fn give(client: &Client, unit: &UnitId, order: &CommandOrder) -> Result<CommandReply, ConsoleError> {
+pub(super) async fn give(
+    client: &Client,
+    unit: &UnitId,
+    order: &CommandOrder,
+) -> Result<CommandReply, ConsoleError> {
     let order = serde_json::to_vec(order).unwrap_or_default();
     client.json(&client.order(key::command(unit)), "", Some(&order)).await
 }

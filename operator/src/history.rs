@@ -10,7 +10,7 @@ use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key;
 
 use super::client::{self, Client, ClientArgs};
-use super::page::{of, short};
+use super::page::{self, of, short};
 use super::status::or_none;
 use super::{ConsoleError, show};
 
@@ -74,7 +74,7 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     entries.retain(|entry| args.all || matches!(entry.event, AuditEvent::Accepted(_)));
     entries.truncate(args.limit as usize);
     let text = if args.json {
-        serde_json::to_string_pretty(&entries).unwrap_or_default() + "\n"
+        isotherm_cli::json(&entries)
     } else if entries.is_empty() {
         format!("{unit}: nothing has been done to it\n")
     } else {
@@ -94,7 +94,7 @@ fn table(entries: &[AuditEntry]) -> String {
     for (line, changes) in table.lines().zip(changes) {
         text.extend([line.trim_end(), "\n"]);
         if !changes.is_empty() {
-            text.extend([INDENT, &show::cut(&changes, WIDTH - INDENT.len()), "\n"]);
+            text.extend([INDENT, &page::fit(&changes, WIDTH - INDENT.len()), "\n"]);
         }
     }
     text
@@ -139,7 +139,7 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
     };
     // To the second; the JSON has the rest.
     let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
-    let cut = |text: &str| show::cut(text, LONGEST_NAME);
+    let cut = |text: &str| page::fit(text, LONGEST_NAME);
     let cells =
         vec![number.to_string(), time, event.name().to_owned(), revision, digest, cut(by), cut(&from)];
     (cells, changes)

@@ -22,12 +22,16 @@ mod units;
 use std::time::{Duration, Instant};
 
 use isotherm_correction::sample::ChannelName;
+use isotherm_protocol::pair::PairReport;
+use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
+use ratatui::text::Line;
 
 pub use figure::fit;
 pub(crate) use figure::{deg_per_h, of, short};
 pub use pairs::{of_unit, pairs, said as said_of_pairs};
-pub use remark::{Level, is_running, knows_rates, state_word};
+pub(crate) use remark::schedule;
+pub use remark::{Level, Remark, is_running, knows_rates, state_word};
 pub use services::{services, tally};
 pub use sheet::sheet;
 pub use units::{applied, channel_in_view, range, units};
@@ -59,7 +63,7 @@ impl<'a> Unit<'a> {
 
     /// What is to be noticed, the gravest first.
     #[must_use]
-    pub fn remarks(&self) -> Vec<remark::Remark> {
+    pub fn remarks(&self) -> Vec<Remark> {
         remark::remarks(self)
     }
 
@@ -108,6 +112,24 @@ impl Lately {
             stuck: false,
         }
     }
+}
+
+/// Services, instances, and units, a line each.
+#[must_use]
+pub fn overview(
+    (services, gone): (&[ServiceStatus], &[String]),
+    instances: &[PairReport],
+    units: &[Unit<'_>],
+    columns: usize,
+) -> Vec<Line<'static>> {
+    let mut lines = self::services(services, gone, columns);
+    lines.extend(pairs(instances, columns));
+    lines.push(tally(units, columns));
+    if !units.is_empty() {
+        lines.push(Line::default());
+        lines.extend(self::units(units, columns).lines());
+    }
+    lines
 }
 
 /// Every channel at one time.

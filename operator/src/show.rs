@@ -7,6 +7,8 @@ use isotherm_protocol::control::{CorrectionChange, Difference, Schedule};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
 
+use crate::page;
+
 /// A table with a line under its header; columns from `right` on are aligned to the right.
 pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, right: usize) -> Table {
     let mut table = isotherm_cli::table(header, rows, right..);
@@ -31,22 +33,9 @@ pub(super) fn problem(problem: &Problem, name: Option<&str>) -> String {
     Problem { file, ..problem.clone() }.to_string()
 }
 
-/// A text cut to what fits in a column.
-pub(super) fn cut(text: &str, longest: usize) -> String {
-    if text.chars().count() > longest {
-        text.chars().take(longest.saturating_sub(1)).chain(['…']).collect()
-    } else {
-        text.to_owned()
-    }
-}
-
-/// When a change takes effect, in words.
+/// When a change takes effect, and how long it takes.
 pub(super) fn schedule(schedule: Schedule, slew_s: f64) -> String {
-    let mut words = match schedule {
-        Schedule::NextTick => "from the next tick on".to_owned(),
-        Schedule::Sequence(sequence) => format!("from tick {sequence} on"),
-        Schedule::TimeNs(time_ns) => format!("from the first tick that ends at {time_ns} ns or later"),
-    };
+    let mut words = page::schedule(schedule);
     if slew_s > 0.0 {
         let _ = write!(words, ", over {} s", (slew_s * 1e3).round() / 1e3);
     }

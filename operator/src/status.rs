@@ -70,7 +70,7 @@ impl Report {
     /// As the command prints it.
     #[must_use]
     pub fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+        isotherm_cli::json(self)
     }
 }
 
@@ -142,14 +142,7 @@ fn unit<'a>(report: &'a Report, status: &'a Status) -> (Unit<'a>, Option<&'a Ser
 
 fn table(report: &Report, columns: usize) -> Vec<Line<'static>> {
     let units: Vec<Unit<'_>> = report.units.iter().map(|status| unit(report, status).0).collect();
-    let mut lines = page::services(&report.services, &[], columns);
-    lines.extend(page::pairs(&report.instances, columns));
-    lines.push(page::tally(&units, columns));
-    if !units.is_empty() {
-        lines.push(Line::default());
-        lines.extend(page::units(&units, columns).lines());
-    }
-    lines
+    page::overview((&report.services, &[]), &report.instances, &units, columns)
 }
 
 /// The page of a unit; two instances that have it, one more than should, give a page each.

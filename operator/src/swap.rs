@@ -5,13 +5,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use isotherm_cli::{Exit, failed, print, say, say_lines};
-use isotherm_protocol::control::{
-    CommandOrder, CommandReply, Order, Schedule, SwapOptions, SwapOutcome, SwapReply,
-};
+use isotherm_protocol::control::{CommandOrder, Order, Schedule, SwapOptions, SwapOutcome, SwapReply};
 use isotherm_protocol::key::{self, UnitId};
 
 use super::ConsoleError;
 use super::client::{self, Client, ClientArgs};
+use super::command::give;
 use super::follow::Follow;
 use super::page::{of, short};
 use super::show;
@@ -109,9 +108,7 @@ impl Wish {
             }
             Self::Rollback { revision, by } => {
                 let order = Order::Rollback { revision: *revision, dry_run };
-                let order = serde_json::to_vec(&CommandOrder { by: by.clone(), order }).unwrap_or_default();
-                let key = client.order(key::command(unit));
-                let reply: CommandReply = client.json(&key, "", Some(&order)).await?;
+                let reply = give(client, unit, &CommandOrder { by: by.clone(), order }).await?;
                 let reason = reply.reason.unwrap_or_else(|| "refused without a reason".to_owned());
                 reply.swap.ok_or(ConsoleError::Refused(reason))
             }
@@ -198,7 +195,7 @@ fn tell(reply: &SwapReply, name: Option<&str>) {
 fn result(reply: &SwapReply, json: bool) -> Exit {
     let exit = if reply.outcome == SwapOutcome::Refused { Exit::BadConfiguration } else { Exit::Ok };
     if json {
-        return print(&(serde_json::to_string_pretty(reply).unwrap_or_default() + "\n"), exit);
+        return print(&isotherm_cli::json(reply), exit);
     }
     // A service before 0.2 says the proposed digest in the place of the one in force.
     let digest = short(reply.proposed.as_ref().unwrap_or(&reply.digest));

@@ -7,16 +7,14 @@
 //! | [`play`], [`pace`] | a log to the raw topics, at a speed |
 //! | [`keyboard`] | keys pressed meanwhile |
 //! | [`record`] | what is on the bus to recordings |
-//! | [`output`], [`summary`] | corrected ticks as a file, and their figures |
 //! | [`simulated`] | a scenario as a text log |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod cli;
 pub mod error;
 pub mod keyboard;
-pub mod output;
 pub mod pace;
 pub mod play;
 pub mod record;
 pub mod simulated;
-pub mod summary;
+mod stop;

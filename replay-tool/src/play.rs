@@ -4,7 +4,6 @@ mod player;
 mod playlist;
 mod report;
 mod silence;
-mod stop;
 mod units;
 
 use std::collections::BTreeMap;
@@ -18,14 +17,15 @@ use isotherm_log::schedule::Clock;
 use isotherm_log::source::LogReport;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::HealthReading;
+use tokio::signal::unix::SignalKind;
 use tokio::sync::mpsc::UnboundedReceiver;
 use zenoh::key_expr::OwnedKeyExpr;
 
 use crate::error::Error;
 use crate::pace::Speed;
+use crate::stop::Stop;
 use player::Player;
 pub(crate) use playlist::wanted;
-use stop::stop_asked;
 
 pub use report::{Counts, PlayReport, Position, Returned, UnitReport};
 
@@ -126,11 +126,11 @@ pub async fn play(
     watch: &impl Watch,
 ) -> Result<Played, Error> {
     // From here on a signal ends in order.
-    let mut stop = std::pin::pin!(stop_asked()?);
+    let mut stop = Stop::on(&[SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()])?;
     let way = options.session.way(Role::Peer)?;
     let opened = tokio::select! {
         biased;
-        () = &mut stop => return Err(Error::Stopped),
+        () = stop.asked() => return Err(Error::Stopped),
         session = way.open_patiently(options.wait, |words| watch.say(words)) => session?,
     };
     let played = {
@@ -138,7 +138,7 @@ pub async fn play(
         let tried = way.tried();
         let ended = tokio::select! {
             biased;
-            () = &mut stop => Err(Error::Stopped),
+            () = stop.asked() => Err(Error::Stopped),
             ended = run(&opened, &tried, options, &mut player, watch) => ended,
         };
         Played { report: player.report(ended.is_err()), log: player.log_report(), ended }

@@ -24,7 +24,7 @@ use isotherm_bus::receipt::Receipt;
 use isotherm_bus::{BusError, ClientOptions};
 use isotherm_log::recording::RecordingOptions;
 use isotherm_protocol::key::UnitId;
-use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::signal::unix::SignalKind;
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 use zenoh::Session;
@@ -32,6 +32,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::SampleKind;
 
 use crate::error::Error;
+use crate::stop::Stop;
 use files::Files;
 use inquiry::Question;
 use queue::Queue;
@@ -40,7 +41,7 @@ use services::{await_service, follow_services, open, start_asker};
 use writer::{FileWriter, Told};
 
 pub use queue::TopicCount;
-pub use report::{EndedBy, RecordReport};
+pub use report::{Done, EndedBy, RecordReport};
 pub use topics::{TopicFilter, is_first, key_expressions};
 pub use writer::Bounds;
 
@@ -54,7 +55,7 @@ const SILENCE: Duration = Duration::from_millis(500);
 /// How long a session may take to close.
 const CLOSE_LIMIT: Duration = Duration::from_secs(5);
 /// The signal for a file that would be longer than the system allows. Caught, writing fails as on a full disk.
-const SIGXFSZ: i32 = 25;
+const SIGXFSZ: SignalKind = SignalKind::from_raw(25);
 
 /// Whether a service is needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,14 +104,15 @@ pub struct RecordOptions {
 /// # Errors
 /// [`Error::Usage`] and [`Error::Log`] where the file cannot be begun, [`Error::Bus`] where the session cannot be opened or
 /// no service answers, [`Error::Stopped`] where it was stopped before it began. A disk that is full later is no error: see
-/// [`RecordReport::failure`].
+/// [`Done::failure`].
 pub async fn record(
     options: &RecordOptions,
     mut watch: impl FnMut(&RecordReport),
 ) -> Result<RecordReport, Error> {
     let rotates = options.bounds.file_bytes.is_some() || options.bounds.file_time.is_some();
     let files = Files::new(&options.out, rotates, options.keep, options.writing.overwrite)?;
-    let mut stop = Stop::listen()?;
+    let mut stop = Stop::on(&[SignalKind::interrupt(), SignalKind::terminate()])?;
+    let _too_long = Stop::on(&[SIGXFSZ])?;
     let session = open(options, &mut stop).await?;
     let recorded = on_session(&session, options, files, &mut stop, &mut watch).await;
     let closed = isotherm_bus::close(session, CLOSE_LIMIT).await;
@@ -119,32 +121,6 @@ pub async fn record(
         report.warnings.push(error.to_string());
     }
     Ok(report)
-}
-
-/// Signals that end a recording.
-struct Stop {
-    interrupt: Signal,
-    terminate: Signal,
-    _too_long: Signal,
-}
-
-impl Stop {
-    fn listen() -> Result<Self, Error> {
-        let listen = |kind| signal(kind).map_err(|source| Error::Runtime { source });
-        Ok(Self {
-            interrupt: listen(SignalKind::interrupt())?,
-            terminate: listen(SignalKind::terminate())?,
-            _too_long: listen(SignalKind::from_raw(SIGXFSZ))?,
-        })
-    }
-
-    /// Ends with the next of them.
-    async fn asked(&mut self) {
-        tokio::select! {
-            _ = self.interrupt.recv() => {}
-            _ = self.terminate.recv() => {}
-        }
-    }
 }
 
 /// Records on an open session.

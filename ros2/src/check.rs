@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Exit, print, say};
+use isotherm_cli::{Exit, json, print, say};
 use isotherm_document::Problem;
 use isotherm_document::escape::escaped;
 use serde::Serialize;
@@ -28,7 +28,7 @@ pub struct CheckArgs {
 }
 
 /// What was found in one file.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 struct Finding {
     file: String,
     good: bool,
@@ -51,8 +51,8 @@ pub fn run(args: &CheckArgs) -> Exit {
         Exit::Ok
     };
     if args.json {
-        let json = serde_json::json!({ "good": exit == Exit::Ok, "files": findings });
-        return print(&(serde_json::to_string_pretty(&json).unwrap_or_default() + "\n"), exit);
+        let all = serde_json::json!({ "good": exit == Exit::Ok, "files": findings });
+        return print(&json(&all), exit);
     }
     let mut text = String::new();
     for Finding { file, unreadable, problems, units, .. } in &findings {
@@ -66,13 +66,7 @@ pub fn run(args: &CheckArgs) -> Exit {
 }
 
 fn check(path: &Path) -> Finding {
-    let finding = Finding {
-        file: path.display().to_string(),
-        good: false,
-        unreadable: None,
-        problems: Vec::new(),
-        units: Vec::new(),
-    };
+    let finding = Finding { file: path.display().to_string(), ..Finding::default() };
     match Mapping::load(path) {
         Ok(mapping) => {
             let units = mapping.units.iter();

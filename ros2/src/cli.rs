@@ -184,9 +184,8 @@ async fn correct(args: &BridgeArgs) -> Result<(Option<RunningService>, Session),
         let way = options.way(Role::Listener)?;
         return Ok((None, way.open_patiently(REACH, |words| tracing::warn!("{words}")).await?));
     }
-    let mut settings = args.config.as_deref().map_or_else(|| Ok(Settings::default()), Settings::load)?;
-    settings.calibrations = args.calibration.clone().or(settings.calibrations);
-    settings.state = args.state.clone().or(settings.state);
+    let (calibrations, state) = (args.calibration.as_ref(), args.state.as_ref());
+    let mut settings = Settings::given(args.config.as_deref(), calibrations, state, None)?;
     let session = &mut settings.zenoh.session;
     if session.config.is_none() && session.connect.is_empty() && session.listen.is_empty() {
         // The default port is that of the router of ROS 2.

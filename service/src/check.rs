@@ -60,7 +60,7 @@ pub enum FileKind {
 }
 
 /// What was found in one file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// The file.
     pub file: String,
@@ -102,22 +102,18 @@ pub fn run(args: &CheckArgs) -> Exit {
     let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
         Ok(trusted) => trusted,
         Err(problems) => {
-            problems.iter().for_each(say);
+            say_problems(&problems, &[]);
             return Exit::BadConfiguration;
         }
     };
-    for warning in trusted.iter().flat_map(|(_, warnings)| warnings) {
-        say(format_args!("{warning} (warning)"));
-    }
+    say_problems(&[], trusted.as_ref().map_or(&[][..], |(_, warnings)| warnings));
     let trusted = trusted.as_ref().map(|(trusted, _)| trusted);
     let check = |file: &PathBuf| kinds::check_file(file, args.kind, trusted);
     let mut findings: Vec<_> = args.files.iter().map(check).collect();
     rivals::refuse(&mut findings);
     let text = if args.json {
         let good = findings.iter().all(|finding| finding.good);
-        serde_json::to_string_pretty(&serde_json::json!({ "good": good, "files": findings }))
-            .unwrap_or_default()
-            + "\n"
+        isotherm_cli::json(&serde_json::json!({ "good": good, "files": findings }))
     } else {
         findings.iter().map(in_words).collect()
     };
@@ -129,16 +125,19 @@ fn in_words(finding: &Finding) -> String {
     if let Some(reason) = &finding.unreadable {
         say(format_args!("{}: cannot be read: {reason}", escaped(&finding.file)));
     }
-    for problem in &finding.problems {
-        say(problem);
-    }
-    for warning in &finding.warnings {
-        say(format_args!("{warning} (warning)"));
-    }
+    say_problems(&finding.problems, &finding.warnings);
     let summary = finding.summary.as_ref();
     summary.map_or_else(String::new, |summary| {
         format!("{}: {}\n", escaped(&finding.file), escaped(&summary.summary))
     })
+}
+
+/// What is wrong and what is doubtful, on stderr.
+pub(crate) fn say_problems(problems: &[Problem], warnings: &[Problem]) {
+    problems.iter().for_each(say);
+    for warning in warnings {
+        say(format_args!("{warning} (warning)"));
+    }
 }
 
 fn verdict(findings: &[Finding]) -> Exit {

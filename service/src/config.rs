@@ -151,6 +151,23 @@ impl Settings {
             .map_err(ServiceError::Configuration)
     }
 
+    /// The configuration of a file, else the default, with what the command line puts in its place.
+    ///
+    /// # Errors
+    /// As [`Settings::load`].
+    pub fn given(
+        config: Option<&Path>,
+        calibrations: Option<&PathBuf>,
+        state: Option<&PathBuf>,
+        metrics: Option<SocketAddr>,
+    ) -> Result<Self, ServiceError> {
+        let mut settings = config.map_or_else(|| Ok(Self::default()), Self::load)?;
+        settings.calibrations = calibrations.cloned().or(settings.calibrations);
+        settings.state = state.cloned().or(settings.state);
+        settings.metrics.listen = metrics.or(settings.metrics.listen);
+        Ok(settings)
+    }
+
     /// Whether this one leaves the connection to the other instance to that, as `pair.other` says.
     ///
     /// # Errors

@@ -41,7 +41,8 @@ pub mod store;
 pub mod watch;
 
 pub(crate) use carry::Carried;
-pub(crate) use control_status::{ControlStatus, Posted, UNWRITTEN};
+pub(crate) use control_status::{ControlStatus, Posted, STATE_FOLDER, UNWRITTEN};
 pub(crate) use manager::{SwapManager, Worker};
 pub(crate) use queue::{Asked, Inbox, Notice, Origin, PreLaunchEnd};
-pub(crate) use start::{Found, first_of};
+pub(crate) use request::is_asked;
+pub(crate) use start::Found;

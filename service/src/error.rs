@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use isotherm_bus::BusError;
-use isotherm_cli::Exit;
+use isotherm_cli::{Exit, failed};
 use isotherm_protocol::document::Problem;
 use thiserror::Error;
 
+use crate::check::say_problems;
 use crate::control::store::StoreError;
 
 /// Why the service did not start, or a command failed.
@@ -98,6 +99,14 @@ pub enum ServiceError {
 }
 
 impl ServiceError {
+    /// Says what is wrong, every problem on a line of its own, and gives the exit code.
+    pub(crate) fn tell(&self) -> Exit {
+        if let Self::Configuration(problems) = self {
+            say_problems(problems, &[]);
+        }
+        failed(self, self.exit())
+    }
+
     /// The exit code that this error stands for.
     #[must_use]
     pub fn exit(&self) -> Exit {

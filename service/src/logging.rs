@@ -66,14 +66,17 @@ impl LogArgs {
     /// Warnings only, unless the environment says otherwise: for commands that have no options for it.
     #[must_use]
     pub fn quiet() -> Self {
-        let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| "warn".to_owned());
-        Self { log_format: LogFormat::Human, log_level }
+        Self::unless_said("warn")
     }
 
     /// Nothing, unless the environment says otherwise: for commands that say themselves what went wrong.
     #[must_use]
     pub fn silent() -> Self {
-        let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| "off,zenoh=off".to_owned());
+        Self::unless_said("off,zenoh=off")
+    }
+
+    fn unless_said(level: &str) -> Self {
+        let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| level.to_owned());
         Self { log_format: LogFormat::Human, log_level }
     }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use isotherm_bus::SessionOptions;
-use isotherm_cli::{Exit, failed, print_within, say};
+use isotherm_cli::{Exit, print_within};
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
 
@@ -80,18 +80,8 @@ pub async fn run(args: ServeArgs) -> Exit {
             tracing::error!("stopped immediately by a second signal");
             Exit::DataLoss
         }
-        Err(error) => refused(&error),
+        Err(error) => error.tell(),
     }
-}
-
-/// Says what is wrong, every problem on a line of its own.
-fn refused(error: &ServiceError) -> Exit {
-    if let ServiceError::Configuration(problems) = error {
-        for problem in problems {
-            say(problem);
-        }
-    }
-    failed(error, error.exit())
 }
 
 /// Says what was done.
@@ -102,19 +92,8 @@ fn report(totals: &Totals, json: bool) -> Exit {
 
 /// The configuration with the command line's options put over it.
 fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
-    let mut settings = match &args.config {
-        Some(path) => Settings::load(path)?,
-        None => Settings::default(),
-    };
-    if let Some(folder) = &args.calibrations {
-        settings.calibrations = Some(folder.clone());
-    }
-    if let Some(folder) = &args.state {
-        settings.state = Some(folder.clone());
-    }
-    if args.metrics.is_some() {
-        settings.metrics.listen = args.metrics;
-    }
+    let (calibrations, state) = (args.calibrations.as_ref(), args.state.as_ref());
+    let mut settings = Settings::given(args.config.as_deref(), calibrations, state, args.metrics)?;
     settings.web.enabled |= args.web;
     settings.listen_for_web();
     let (configured, given) = (&mut settings.zenoh.session, &args.session);
@@ -158,14 +137,15 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let state = open_store(settings.state.as_deref())?;
     let awaited = settings.zenoh.session.awaited()?;
     let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
-    let session = tokio::select! {
-        session = open_session(settings.zenoh.session.clone(), &awaited) => session?,
-        // There is nothing to flush.
-        _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
+    let start = async {
+        let session = open_session(settings.zenoh.session.clone(), &awaited).await?;
+        let locators = isotherm_bus::locators(&session);
+        let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
+        Ok::<_, ServiceError>((service, locators))
     };
-    let locators = isotherm_bus::locators(&session);
-    let service = tokio::select! {
-        service = start_on(settings, Calibrations::default(), state, metrics, session) => service?,
+    let (service, locators) = tokio::select! {
+        started = start => started?,
+        // There is nothing to flush.
         _ = stop_asked() => return Ok(Some(Totals { stopped_in_time: true, ..Totals::default() })),
     };
     tracing::info!(version = env!("CARGO_PKG_VERSION"), locators = locators.join(" "), "ready");
@@ -201,8 +181,7 @@ async fn open_session(options: SessionOptions, awaited: &str) -> Result<Session,
             Ok(Err(join)) => return Err(ServiceError::Thread(std::io::Error::other(join))),
             Err(_) => {
                 let waited_s = start.elapsed().as_secs();
-                tracing::warn!(waited_s, "nothing is corrected yet: waiting for {awaited}");
-                supervisor::status(&format!("nothing is corrected yet: waiting for {awaited}"));
+                tracing::warn!(waited_s, "{}", supervisor::waiting_for(awaited));
                 pause = FURTHER_WORDS;
             }
         }

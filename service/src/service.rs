@@ -112,7 +112,7 @@ pub(crate) async fn start_on(
     let source =
         Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
     let subscribers = Arc::<Subscribers>::default();
-    let source = source.feeling(Arc::clone(&pulse)).asking(Arc::clone(&subscribers));
+    let source = source.at_work(Arc::clone(&pulse), Arc::clone(&subscribers));
     let swap_manager = SwapManager::start(&inbox, work).map_err(ServiceError::Thread)?;
     let said = (control_status, Arc::clone(&subscribers));
     let status_publisher = StatusPublisher::start(&session, Arc::clone(&intake), said, &pair, &settings)

@@ -15,9 +15,11 @@ const LOOKS: u32 = 4;
 /// A shorter time is none that a watchdog could have.
 const SHORTEST: Duration = Duration::from_millis(10);
 
-/// Says what the service is doing.
-pub(crate) fn status(words: &str) {
-    tell(&[NotifyState::Status(words)]);
+/// Says what the start waits for, and gives it in words for the log.
+pub(crate) fn waiting_for(awaited: &str) -> String {
+    let words = format!("nothing is corrected yet: waiting for {awaited}");
+    tell(&[NotifyState::Status(&words)]);
+    words
 }
 
 /// Says that the service is at work.

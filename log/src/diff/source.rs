@@ -1,11 +1,9 @@
 //! Corrected logs, read tick by tick: recordings, and the CSV and wire files of `correct`.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use isotherm_protocol::codec::{self, MAX_FRAME};
 use isotherm_protocol::corrected::CorrectedBatch;
@@ -23,6 +21,7 @@ use crate::progress::Progress;
 use crate::recording::RecordingReport;
 use crate::replica::{entry_words, join};
 use crate::source::{LogReport, is_recording};
+use crate::text::{Bytes, open_raw};
 
 /// Rows of a CSV that are read together.
 const ROWS: usize = 512;
@@ -39,18 +38,22 @@ pub struct Ticks {
 }
 
 /// A log of corrected ticks.
-#[derive(Debug)]
 pub struct CorrectedLog {
     path: PathBuf,
     source: Source,
     progress: Progress,
 }
 
-#[derive(Debug)]
+impl std::fmt::Debug for CorrectedLog {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CorrectedLog").field("path", &self.path).finish_non_exhaustive()
+    }
+}
+
 enum Source {
     Recording(Box<Recording>),
-    Csv { lines: BufReader<Counted>, unit: UnitId, line: u64 },
-    Wire { bytes: BufReader<Counted>, units: BTreeSet<UnitId>, frame: Vec<u8> },
+    Csv { lines: BufReader<Bytes>, unit: UnitId, line: u64 },
+    Wire { bytes: BufReader<Bytes>, units: BTreeSet<UnitId>, frame: Vec<u8> },
 }
 
 #[derive(Debug)]
@@ -62,25 +65,10 @@ struct Recording {
     ready: VecDeque<Ticks>,
 }
 
-/// A file whose bytes are counted as they are read.
-#[derive(Debug)]
-struct Counted {
-    file: File,
-    read: Arc<AtomicU64>,
-}
-
-impl Read for Counted {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.file.read(buffer)?;
-        self.read.fetch_add(count as u64, Ordering::Relaxed);
-        Ok(count)
-    }
-}
-
 /// Whether a file is a CSV of corrected ticks, which does not say of which unit it is.
 #[must_use]
 pub fn is_csv(path: &Path) -> bool {
-    begins_with(path, FIRST_COLUMNS.as_bytes())
+    open_raw(path, &Arc::default()).is_ok_and(|(bytes, _)| begins_with(bytes, FIRST_COLUMNS.as_bytes()))
 }
 
 impl CorrectedLog {
@@ -89,7 +77,6 @@ impl CorrectedLog {
     /// # Errors
     /// [`Error::File`] where it cannot be opened.
     pub fn open(path: &Path, units: &BTreeSet<UnitId>, unnamed: &UnitId) -> Result<Self, Error> {
-        let failed = |source| Error::file(path, "open the corrected log", source);
         if is_recording(path) {
             let part = Part { units: units.clone(), ..Part::default() };
             let messages = LogFiles::Recordings(vec![path.to_owned()]).open(&part)?;
@@ -107,11 +94,9 @@ impl CorrectedLog {
             });
         }
         let csv = is_csv(path);
-        let file = File::open(path).map_err(failed)?;
-        let length = file.metadata().map_err(failed)?.len();
-        let read = Arc::new(AtomicU64::new(0));
-        let progress = Progress::new(Arc::clone(&read), length);
-        let bytes = BufReader::with_capacity(1 << 16, Counted { file, read });
+        let read = Arc::default();
+        let (bytes, length) = open_raw(path, &read)?;
+        let (bytes, progress) = (BufReader::new(bytes), Progress::new(read, length));
         let source = if csv {
             Source::Csv { lines: bytes, unit: units.first().unwrap_or(unnamed).clone(), line: 0 }
         } else {

@@ -5,6 +5,8 @@ use isotherm_correction::units::{AngularRate, SpecificForce};
 use isotherm_protocol::corrected::SigmaRun;
 use serde::Serialize;
 
+use crate::offline::rows::mode_cell;
+
 /// A corrected tick of a log, and what the log says of the calibration that made it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LogTick {
@@ -206,9 +208,5 @@ pub(super) fn words<'n>(names: impl Iterator<Item = &'n str>) -> String {
 /// A lasing mode, for people.
 #[must_use]
 pub fn mode(mode: Option<LasingMode>) -> &'static str {
-    match mode {
-        Some(LasingMode::Plus) => "1",
-        Some(LasingMode::Minus) => "-1",
-        None => "none",
-    }
+    if mode.is_none() { "none" } else { mode_cell(mode) }
 }

@@ -143,11 +143,9 @@ impl<'a> File<'a> {
 
     /// Notes which columns with numbers are not used, and asks where one states a sensor's unit and such sensors lack.
     fn unused(self, used: &[usize], sensors: &[Sensors], proposal: &mut Proposal) {
-        let given = &self.hints.columns;
-        let names = if given.is_empty() { self.found.header.as_deref().unwrap_or_default() } else { given };
-        let numbers = |index: usize| self.figures.columns.get(index).is_some_and(|column| column.numbers > 0);
-        let left: Vec<_> = (0..names.len().min(self.found.width))
-            .filter(|index| !used.contains(index) && numbers(*index) && names[*index] != "-")
+        let names = self.names();
+        let left: Vec<_> = (0..names.len())
+            .filter(|index| !used.contains(index) && self.has_numbers(*index) && names[*index] != "-")
             .collect();
         if left.is_empty() {
             return;
@@ -158,31 +156,41 @@ impl<'a> File<'a> {
             found.is_none_or(|sensors| sensors.columns.iter().any(Option::is_none))
         };
         let asked = proposal.open.iter().any(|open| matches!(open, Question::Columns { .. }));
-        let is_sensor = |index: &usize| {
-            let row = self.found.units.get(*index).map(String::as_str).filter(|_| given.is_empty());
-            match kind_by_unit(&names[*index], row) {
-                Some(Kind::Gyro) => lacks("gyro"),
-                Some(Kind::Accel) => lacks("accel"),
-                _ => false,
-            }
+        let is_sensor = |index: &usize| match kind_by_unit(&names[*index], self.row_unit(*index)) {
+            Some(Kind::Gyro) => lacks("gyro"),
+            Some(Kind::Accel) => lacks("accel"),
+            _ => false,
         };
-        if given.is_empty() && !asked && left.iter().any(is_sensor) {
+        if self.hints.columns.is_empty() && !asked && left.iter().any(is_sensor) {
             proposal.open.push(self.ask_columns());
         }
     }
 
-    /// What the columns hold: by the names that were given, else by the header, else by the name of the file.
-    fn meanings(self) -> Meanings {
-        let given = &self.hints.columns;
+    /// The columns' names: those that were given, else the header's.
+    fn names(self) -> &'a [String] {
+        let given = self.hints.columns.as_slice();
         let names = if given.is_empty() { self.found.header.as_deref().unwrap_or_default() } else { given };
-        let unit =
-            |index: usize| self.found.units.get(index).map(String::as_str).filter(|_| given.is_empty());
-        let first = names.iter().enumerate().take(self.found.width);
-        let mut meanings: Meanings =
-            first.filter_map(|(index, column)| Some((index, meaning(column, unit(index))?))).collect();
-        // A column in which no number stands says nothing, whatever its name.
-        meanings
-            .retain(|(index, _)| self.figures.columns.get(*index).is_some_and(|column| column.numbers > 0));
+        names.get(..self.found.width).unwrap_or(names)
+    }
+
+    /// A column's unit by the row of units, which belongs to the header.
+    fn row_unit(self, index: usize) -> Option<&'a str> {
+        let row = self.found.units.get(index).map(String::as_str);
+        row.filter(|_| self.hints.columns.is_empty())
+    }
+
+    /// Whether a number stands in a column; one without says nothing, whatever its name.
+    fn has_numbers(self, index: usize) -> bool {
+        self.figures.columns.get(index).is_some_and(|column| column.numbers > 0)
+    }
+
+    /// What the columns hold: by their names, else by the name of the file.
+    fn meanings(self) -> Meanings {
+        let names = self.names();
+        let columns = names.iter().enumerate().filter(|(index, _)| self.has_numbers(*index));
+        let mut meanings: Meanings = columns
+            .filter_map(|(index, column)| Some((index, meaning(column, self.row_unit(index))?)))
+            .collect();
         let of_file = meaning(&format!("{} x", self.name.split('.').next().unwrap_or_default()), None);
         match of_file {
             Some(file) if names.is_empty() && matches!(file.kind, Kind::Gyro | Kind::Accel) => {

@@ -1,9 +1,10 @@
 //! When the messages of a stream were received, against when they happened.
 
-use isotherm_correction::units::{Span, Timestamp};
+use isotherm_correction::units::Span;
 use serde::Serialize;
 
 use super::histogram::{Histogram, Spread};
+use crate::date::seconds;
 
 /// Messages that are looked at together, at most.
 const BLOCK_MESSAGES: usize = 4096;
@@ -104,11 +105,6 @@ impl Delays {
         self.first.get_or_insert(smallest);
         self.last = Some(smallest);
     }
-}
-
-/// Nanoseconds in seconds, with their sign.
-pub(super) fn seconds(ns: i64) -> f64 {
-    Timestamp::from_ns(ns).seconds_from(Timestamp::from_ns(0))
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use serde::Serialize;
 
 use super::histogram::{Histogram, Spread};
 use super::sequence::{Order, Place, Run, Sequence};
-use super::timing::{Delays, Jitter, seconds};
+use super::timing::{Delays, Jitter};
+use crate::date::seconds;
 
 /// How often ticks come.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -47,6 +47,15 @@ pub fn write_header(writer: &mut dyn Write) -> io::Result<()> {
     writeln!(writer, "{HEADER}")
 }
 
+/// A lasing mode as a cell.
+pub(crate) fn mode_cell(mode: Option<LasingMode>) -> &'static str {
+    match mode {
+        Some(LasingMode::Plus) => "1",
+        Some(LasingMode::Minus) => "-1",
+        None => "",
+    }
+}
+
 /// Writes one output as a row of the CSV.
 ///
 /// # Errors
@@ -57,12 +66,7 @@ pub fn write_tick(writer: &mut dyn Write, tick: &CorrectedTick) -> io::Result<()
     for delta in tick.delta_angle.iter().chain(&tick.delta_velocity) {
         write!(writer, ",{delta:?}")?;
     }
-    let mode = match tick.mode {
-        Some(LasingMode::Plus) => "1",
-        Some(LasingMode::Minus) => "-1",
-        None => "",
-    };
-    write!(writer, ",{mode},{}", tick.flags.bits())?;
+    write!(writer, ",{},{}", mode_cell(tick.mode), tick.flags.bits())?;
     write_cell(writer, tick.gyro_flags.iter().map(SensorFlags::bits))?;
     write_cell(writer, tick.accel_flags.iter().map(SensorFlags::bits))?;
     write_cell(writer, tick.gyro_parity.iter())?;

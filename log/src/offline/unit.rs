@@ -74,6 +74,23 @@ pub struct Output {
     pub ticks: u64,
 }
 
+impl Output {
+    /// Takes what is ready, as rows or frames.
+    pub(super) fn give_out(&mut self, stream: &mut UnitStream, form: Form) {
+        // Writing to a vector does not fail.
+        if form == Form::Wire {
+            let mut frame = Vec::new();
+            while stream.next_frame(&mut frame).is_some() {
+                let _ = write_frame(&mut self.bytes, &frame);
+            }
+        } else if form == Form::Csv {
+            let mut ticks = stream.ready().ticks().iter();
+            let _ = ticks.try_for_each(|tick| write_tick(&mut self.bytes, tick));
+        }
+        stream.drop_ready();
+    }
+}
+
 /// What correcting a unit came to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnitReport {
@@ -229,26 +246,14 @@ impl Taker {
             self.sums.add(tick);
             self.output.ticks += u64::from(tick.ticks);
         }
-        match self.form {
-            Form::Sums => stream.drop_ready(),
-            // Writing to a vector does not fail.
-            Form::Csv => {
-                let mut ticks = stream.ready().ticks().iter();
-                let _ = ticks.try_for_each(|tick| write_tick(&mut self.output.bytes, tick));
-                stream.drop_ready();
-            }
-            Form::Wire => {
-                while stream.next_frame(&mut self.frame).is_some() {
-                    let _ = write_frame(&mut self.output.bytes, &self.frame);
-                }
-            }
-            Form::Messages => {
-                while stream.next_frame(&mut self.frame).is_some() {
-                    let topic = Topic::Corrected(self.id.clone());
-                    let message = Message { topic, received_ns: self.received_ns, frame: self.frame.clone() };
-                    self.output.messages.push(message);
-                }
-            }
+        if self.form != Form::Messages {
+            self.output.give_out(stream, self.form);
+            return;
+        }
+        while stream.next_frame(&mut self.frame).is_some() {
+            let topic = Topic::Corrected(self.id.clone());
+            let message = Message { topic, received_ns: self.received_ns, frame: self.frame.clone() };
+            self.output.messages.push(message);
         }
     }
 

@@ -8,11 +8,11 @@ use isotherm_protocol::key::UnitId;
 use super::difference::Difference;
 use super::nominal::{DEG_PER_H, Scale, unscaled};
 use super::reading::UnitLogs;
-use super::time::seconds;
 use super::track::{Finished, Overall, Track};
 use super::unit::{ACCEL_FLAGS, GYRO_FLAGS, MODE_MINUS, MODE_PLUS, RawTrack, SWITCH, Since, UnitPlot};
 use super::{AXES, PlotSummary};
 use crate::date::date;
+use crate::date::seconds;
 use isotherm_pages::{Axis, Chart, Content, Form, Ink, Lane, Mark, Page, Panel, Series, Stretch, Table};
 use words::{duration, figure, remarks, results};
 
@@ -165,10 +165,7 @@ impl Drawing {
             self.raw(log, gyro, scale, what, &mut parts.rates, &mut parts.unplaced, &mut parts.flags);
         }
         if let Some(accel) = shown.accel {
-            let scale = match (nominal.and_then(|nominal| nominal.accel.clone()), accel.kind) {
-                (Some(scale), _) => Some(scale),
-                (None, _) => None,
-            };
+            let scale = nominal.and_then(|nominal| nominal.accel.clone());
             let what = ("accelerometer", "specific force along", "m/s²");
             self.raw(log, accel, scale, what, &mut parts.forces, &mut parts.unplaced, &mut parts.flags);
         }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use isotherm_correction::unit::UnitSettings;
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{Document, Parsed};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 
@@ -82,12 +82,9 @@ pub(super) struct Plot {
 impl Plot {
     /// Nothing read yet.
     pub(super) fn new(logs: Vec<PlotLog>, options: &PlotOptions) -> Result<Self, Error> {
-        let parsed = options.calibration.as_deref().map(|text| Document::parse(text, None)).transpose();
-        let parsed = parsed
-            .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))?;
         let mut sources = Vec::with_capacity(logs.len());
         for log in logs {
-            let stream = match &parsed {
+            let stream = match &options.calibration {
                 Some(parsed) if log.correct => {
                     let unit = crate::offline::unit_id(&parsed.document.unit)?;
                     let mut stream = UnitStream::new(unit, UnitSettings::default());
@@ -105,7 +102,7 @@ impl Plot {
             units: BTreeMap::new(),
             left_out: BTreeSet::new(),
             detail: options.detail.clamp(2, 1 << 20),
-            nominal: options.calibration.as_deref().and_then(Nominal::of),
+            nominal: options.calibration.as_ref().map(|parsed| Nominal::of(&parsed.document)),
             second_moved_ns: None,
         };
         plot.align()?;
@@ -232,13 +229,14 @@ impl Plot {
         for (log, source) in self.logs.iter_mut().enumerate() {
             let Some(recording) = source.log.messages.log().recording() else { continue };
             for attachment in recording.take_attachments() {
-                let Ok(text) = std::str::from_utf8(&attachment.bytes) else { continue };
-                let Ok(document) = Document::parse(text, None) else { continue };
-                let unit = self.units.iter_mut().find(|(unit, _)| unit.as_str() == document.document.unit);
+                let Ok(Parsed { document, .. }) = Document::parse_bytes(&attachment.bytes, None) else {
+                    continue;
+                };
+                let unit = self.units.iter_mut().find(|(unit, _)| unit.as_str() == document.unit);
                 if let Some(shown) = unit.and_then(|(_, unit)| unit.logs.get_mut(log)?.as_mut())
                     && shown.nominal.is_none()
                 {
-                    shown.learn(text);
+                    shown.nominal = Some(Nominal::of(&document));
                 }
             }
         }

@@ -1,18 +1,11 @@
 //! The time axis of a unit: the producer's clock, with its jumps taken out.
 
-use isotherm_correction::units::Timestamp;
-
 /// A clock that goes back by more than this belongs to another run of the producer (ns).
 const BACK_NS: i64 = 10_000_000_000;
 /// A clock that goes on by more than this was set (ns).
 const FORWARD_NS: i64 = 86_400_000_000_000;
 /// Most jumps that are followed; a clock that jumps on and on is drawn as it is from then on.
 const MAX_JUMPS: usize = 4096;
-
-/// Nanoseconds in seconds, with their sign.
-pub(super) fn seconds(ns: i64) -> f64 {
-    Timestamp::from_ns(ns).seconds_from(Timestamp::from_ns(0))
-}
 
 /// The streams of a unit, each of which is in the order of its own times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use super::time::seconds as seconds_of;
+use crate::date::seconds as seconds_of;
 use isotherm_pages::{Bits, Places, Samples};
 
 /// So many times as many ticks as bins are kept as they are: they take the same room in the file.

@@ -6,13 +6,15 @@ use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
+use isotherm_protocol::document::Document;
 use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 use isotherm_protocol::status::{Output, Status};
 
 use super::nominal::{DEG_PER_H, Nominal};
-use super::time::{Clock, Stream, seconds};
+use super::time::{Clock, Stream};
 use super::track::Track;
+use crate::date::seconds;
 use crate::message::Message;
 use crate::streams::decoded::{Decoded, decode};
 use isotherm_pages::Ink;
@@ -153,12 +155,7 @@ impl UnitPlot {
             track.begin(first.sequence, self.time(Stream::Gyro, first.end_time));
         }
         for tick in &batch.ticks {
-            let mode = match tick.mode {
-                Some(LasingMode::Plus) => 1 << MODE_PLUS,
-                Some(LasingMode::Minus) => 1 << MODE_MINUS,
-                None => 0,
-            };
-            let bits = mode | u32::from(tick.switch_command) << SWITCH;
+            let bits = mode_bit(tick.mode) | u32::from(tick.switch_command) << SWITCH;
             let at_ns = self.time(Stream::Gyro, tick.end_time);
             track.push(at_ns, tick.duration, &tick.readings, bits);
         }
@@ -269,9 +266,9 @@ impl UnitPlot {
     }
 
     /// Notes a document's nominal scale.
-    pub(super) fn learn(&mut self, document: &str) {
-        if let Some(nominal) = Nominal::of(document) {
-            self.nominal = Some(nominal);
+    fn learn(&mut self, document: &str) {
+        if let Ok(parsed) = Document::parse(document, None) {
+            self.nominal = Some(Nominal::of(&parsed.document));
         }
     }
 
@@ -346,16 +343,20 @@ fn per_second(duration: Span) -> f64 {
     if duration == Span::ZERO { f64::NAN } else { 1.0 / span_s }
 }
 
+fn mode_bit(mode: Option<LasingMode>) -> u32 {
+    match mode {
+        Some(LasingMode::Plus) => 1 << MODE_PLUS,
+        Some(LasingMode::Minus) => 1 << MODE_MINUS,
+        None => 0,
+    }
+}
+
 /// All flags of a tick in one word.
 fn flags(tick: &CorrectedTick) -> u32 {
     let any = |flags: &[SensorFlags]| {
         u32::from(flags.iter().fold(0, |bits, flags| bits | flags.bits()) >> 1 & 0b1_1111)
     };
-    let mode = match tick.mode {
-        Some(LasingMode::Plus) => 1 << MODE_PLUS,
-        Some(LasingMode::Minus) => 1 << MODE_MINUS,
-        None => 0,
-    };
+    let mode = mode_bit(tick.mode);
     let tick_flags = u32::from(tick.flags.bits()) & ((1 << GYRO_FLAGS) - 1);
     tick_flags | any(&tick.gyro_flags) << GYRO_FLAGS | any(&tick.accel_flags) << ACCEL_FLAGS | mode
 }

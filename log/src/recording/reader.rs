@@ -280,12 +280,7 @@ pub(super) fn take(
             let (received_ns, frame) = (header.log_time, data.into_owned());
             Some(Found::Message(Some(Message { topic, received_ns, frame })))
         }
-        Record::Attachment { header, data, .. } => Some(Found::Attachment(Attachment {
-            name: header.name,
-            media_type: header.media_type,
-            attached_ns: header.log_time,
-            bytes: data.into_owned(),
-        })),
+        Record::Attachment { header, data, .. } => Some(Found::Attachment(Attachment::read(header, data))),
         // These are for a file that is to be recovered.
         Record::Metadata(metadata) if metadata.name == CHANNELS => None,
         Record::Metadata(metadata) => {

@@ -194,15 +194,7 @@ impl RecordingWriter {
     /// As [`RecordingWriter::write`].
     pub fn attach(&mut self, attachment: &Attachment) -> Result<(), Error> {
         self.flush()?;
-        let Attachment { name, media_type, attached_ns, bytes } = attachment;
-        let attachment = mcap::Attachment {
-            log_time: *attached_ns,
-            create_time: *attached_ns,
-            name: name.clone(),
-            media_type: media_type.clone(),
-            data: bytes.as_slice().into(),
-        };
-        let attached = self.writer.attach(&attachment).and_then(|()| self.writer.flush());
+        let attached = self.writer.attach(&attachment.as_written()).and_then(|()| self.writer.flush());
         attached.map_err(|source| failed(&self.path, source))?;
         self.note_whole()
     }
@@ -319,9 +311,14 @@ fn enter(
 
 /// An error of the library as one of this crate.
 pub(super) fn failed(path: &Path, source: McapError) -> Error {
-    let source = match source {
+    Error::file(path, "write the recording", io_error(source))
+}
+
+/// An error of the library as one of the system.
+#[must_use]
+pub fn io_error(source: McapError) -> io::Error {
+    match source {
         McapError::Io(source) => source,
         other => io::Error::other(other),
-    };
-    Error::file(path, "write the recording", source)
+    }
 }

@@ -10,13 +10,14 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use isotherm_document::few;
 use isotherm_protocol::codec;
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalPart};
 use isotherm_protocol::key::UnitId;
 use mcap::records::{Channel, Record, op};
 
 use super::{Mark, Outline, Outlines, UnitOutline};
-use crate::error::{Error, few};
+use crate::error::Error;
 use crate::message::Topic;
 use crate::recording::walk::{Head, RecordFile};
 use crate::recording::{MAGIC, MESSAGE_ENCODING, chunk_records};
@@ -46,7 +47,7 @@ pub fn check_units(paths: &[PathBuf], units: &BTreeSet<UnitId>) -> Result<(), Er
     Err(Error::NoSuchUnit {
         recording: names.join(", "),
         unit: unit.clone(),
-        there: few(&there.keys().map(UnitId::as_str).collect::<Vec<_>>()),
+        there: few(there.keys().map(UnitId::as_str)),
     })
 }
 

@@ -8,10 +8,11 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, LasingMode, OutputKind};
+use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind};
 
 use super::contents::{Shape, UnitContents, usual};
 use super::rows::Row;
+use crate::offline::rows::mode_cell;
 
 /// Sensors of a gyro section that no row fills: a mapping must have one.
 const UNFILLED: Shape = Shape { counts: false, sensors: 3, half_periods: false };
@@ -234,10 +235,10 @@ impl RawColumns {
         };
         write!(writer, ",{},{}", tick.sequence, tick.duration.as_ns())?;
         if self.mode {
-            write!(writer, ",{},{}", state(tick.mode), u8::from(tick.switch_command))?;
+            write!(writer, ",{},{}", mode_cell(tick.mode), u8::from(tick.switch_command))?;
         }
         if self.meander {
-            write!(writer, ",{}", state(tick.meander))?;
+            write!(writer, ",{}", mode_cell(tick.meander))?;
         }
         write_readings(self.gyro.output(), &tick.readings, writer)?;
         tick.half_periods.iter().try_for_each(|half| write!(writer, ",{},{}", half.positive, half.negative))
@@ -280,15 +281,6 @@ fn write_readings(output: OutputKind, values: &[f64], writer: &mut dyn Write) ->
 /// Writes empty cells.
 fn write_empty(cells: usize, writer: &mut dyn Write) -> io::Result<()> {
     (0..cells).try_for_each(|_| writer.write_all(b","))
-}
-
-/// A state as a cell.
-fn state(mode: Option<LasingMode>) -> &'static str {
-    match mode {
-        Some(LasingMode::Plus) => "1",
-        Some(LasingMode::Minus) => "-1",
-        None => "",
-    }
 }
 
 #[cfg(test)]

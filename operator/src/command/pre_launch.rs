@@ -64,9 +64,8 @@ pub(super) async fn follow(
     };
     bar.finish();
     let exit = if matches!(outcome.verdict, PreLaunchVerdict::Accepted(_)) { Exit::Ok } else { Exit::Failed };
-    let text =
-        if json { serde_json::to_string_pretty(&outcome).unwrap_or_default() } else { words(unit, &outcome) };
-    Ok(print(&(text + "\n"), exit))
+    let text = if json { isotherm_cli::json(&outcome) } else { words(unit, &outcome) + "\n" };
+    Ok(print(&text, exit))
 }
 
 /// The outcome, once there is one of this calibration.

@@ -40,9 +40,8 @@ pub(super) async fn follow(
         ConsoleError::TimedOut(format!("{unit} has given no report within {} s", LONGEST.as_secs()))
     })?;
     let exit = if report.passed { Exit::Ok } else { Exit::Failed };
-    let text =
-        if json { serde_json::to_string_pretty(&report).unwrap_or_default() } else { words(unit, &report) };
-    Ok(print(&(text + "\n"), exit))
+    let text = if json { isotherm_cli::json(&report) } else { words(unit, &report) + "\n" };
+    Ok(print(&text, exit))
 }
 
 /// The report as a table, its verdict in the first line.

@@ -1,13 +1,14 @@
 //! Instances of a pair: who speaks for how many units, what the others do, and units that nobody takes.
 
 use isotherm_cli::grouped;
+use isotherm_document::few;
 use isotherm_protocol::pair::{PairReport, Role, UnitRole};
 use ratatui::text::{Line, Span};
 
 use super::figure::{fit, of};
 use super::{Level, tone};
 
-/// Units that are named; more of them are counted.
+/// Differences of an instance that are told.
 const NAMED: usize = 8;
 
 /// The lines of all instances; none of one alone that takes every unit.
@@ -41,7 +42,7 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
             speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
         });
         if !twice.is_empty() {
-            said.push((Level::Fault, vec![format!("two instances publish {}", listed(&twice))]));
+            said.push((Level::Fault, vec![format!("two instances publish {}", few(&twice))]));
         }
     }
     let mut nobody: Vec<String> = reports.iter().flat_map(|report| report.passed_over.clone()).collect();
@@ -49,7 +50,7 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
     nobody.sort_unstable();
     nobody.dedup();
     if !nobody.is_empty() {
-        said.push((Level::Warning, vec![format!("no service takes {}", listed(&nobody))]));
+        said.push((Level::Warning, vec![format!("no service takes {}", few(&nobody))]));
     }
     said
 }
@@ -96,12 +97,6 @@ fn named(reports: &[PairReport], is: impl Fn(&PairReport, &str) -> bool) -> Vec<
     named.sort_unstable();
     named.dedup();
     named
-}
-
-fn listed(units: &[String]) -> String {
-    let first = units.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(" ");
-    let beyond = units.len().saturating_sub(NAMED);
-    if beyond > 0 { format!("{first} and {beyond} more") } else { first }
 }
 
 #[cfg(test)]

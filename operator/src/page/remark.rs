@@ -59,7 +59,7 @@ impl Level {
 }
 
 /// Something to be noticed.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Remark {
     /// How grave it is.
     pub level: Level,
@@ -226,7 +226,7 @@ fn work(status: &Status, add: &mut impl FnMut(Level, String)) {
 }
 
 /// When a change takes effect.
-pub(super) fn schedule(schedule: Schedule) -> String {
+pub(crate) fn schedule(schedule: Schedule) -> String {
     match schedule {
         Schedule::NextTick => "from the next tick on".to_owned(),
         Schedule::Sequence(sequence) => format!("from tick {sequence} on"),

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_cli::Exit;
-use isotherm_log::file::read_small;
-use isotherm_log::source::LogReport;
-use isotherm_protocol::document::Document;
+use isotherm_log::offline::read_document;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
@@ -142,7 +140,8 @@ impl ConvertArgs {
             Target::Text if Target::by_name(out).is_none() => place.check_folder(out)?,
             Target::Text | Target::Mcap => place.check(out)?,
         }
-        let documents = self.calibration.iter().map(|path| document(path)).collect::<Result<_, _>>()?;
+        let documents = self.calibration.iter().map(|path| Ok(read_document(path)?.document));
+        let documents = documents.collect::<Result<_, Error>>()?;
         let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
         sources
             .extend(log.mapping_file().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())));
@@ -164,15 +163,6 @@ impl ConvertArgs {
 fn names(paths: &[PathBuf]) -> String {
     let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
     names.join(", ")
-}
-
-/// Reads a calibration document.
-fn document(path: &Path) -> Result<Document, Error> {
-    let bytes = read_small(path, "read the calibration document")?;
-    let parsed = Document::parse_bytes(&bytes, Some(&path.display().to_string())).map_err(|problems| {
-        isotherm_log::error::Error::Calibration(problems.iter().map(ToString::to_string).collect())
-    })?;
-    Ok(parsed.document)
 }
 
 /// Runs the command.
@@ -211,23 +201,5 @@ fn human(outcome: &convert::Outcome) -> String {
             text += &show::table(&rows);
         }
     }
-    text + &reading(&outcome.log)
-}
-
-/// What reading the log came to, in words.
-fn reading(report: &LogReport) -> String {
-    match report {
-        LogReport::Text(report) => show::reading(report),
-        LogReport::Recording(report) => {
-            let mut text = String::new();
-            if let Some(words) = &report.cut_short {
-                text = format!("{words}; everything before it has been used\n");
-            }
-            if report.foreign_messages > 0 {
-                text += &report.foreign_messages.to_string();
-                text += " messages of other programs were skipped\n";
-            }
-            text
-        }
-    }
+    text + &show::reading(&outcome.log)
 }

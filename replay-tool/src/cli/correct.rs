@@ -5,7 +5,8 @@ mod report;
 mod sink;
 mod text;
 
-use std::path::PathBuf;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_cli::Exit;
@@ -13,9 +14,9 @@ use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
 
-use super::LogArgs;
+use super::{LogArgs, print};
 use crate::error::Error;
-use crate::output::Format;
+use sink::Format;
 
 /// Correct a log offline, with the service's own state machine
 #[derive(Debug, Args)]
@@ -98,6 +99,16 @@ impl CorrectArgs {
         ];
         given.into_iter().find_map(|(name, given)| given.then_some(name))
     }
+}
+
+/// Prints the summary: on standard error where the ticks go to standard output.
+fn print_summary(args: &CorrectArgs, text: &str) -> Result<(), Error> {
+    if args.out.as_deref() == Some(Path::new("-")) {
+        // A reader that has gone away is no error.
+        let _ = io::stderr().write_all(text.as_bytes());
+        return Ok(());
+    }
+    print(text.as_bytes())
 }
 
 /// Runs the command.

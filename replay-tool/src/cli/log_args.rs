@@ -125,8 +125,7 @@ impl LogArgs {
             return Err(Error::Usage("this needs a text log, the log is recordings".to_owned()));
         }
         let part = self.part()?;
-        let duration = part.end.map(|end| Span::from_ns(end.as_ns().saturating_sub(part.start.as_ns())));
-        Ok(Window::new(LogReader::open(&self.text_mapping()?, &self.log)?, part.start, duration))
+        Ok(Window::new(LogReader::open(&self.text_mapping()?, &self.log)?, part.start, part.duration()))
     }
 
     /// The file of a text log's mapping: the one given, else the one beside the log.

@@ -12,7 +12,7 @@ use isotherm_bus::outlet::least_in_flight;
 use isotherm_cli::Exit;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
-use isotherm_log::error::few;
+use isotherm_document::few;
 use isotherm_log::faults::FaultOptions;
 use isotherm_log::message::Topic;
 use isotherm_log::schedule::Clock;
@@ -237,7 +237,7 @@ fn check_names(options: &PlayOptions) -> Result<(), Error> {
         }
     }
     let Some(missing) = missing.first() else { return Ok(()) };
-    let has = few(&units.into_iter().collect::<Vec<_>>());
+    let has = few(&units);
     Err(Error::Usage(format!("--remap names {missing}, but there is no such unit to play; units: {has}")))
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{read_small_text, refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::offline::read_document;
 use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
@@ -130,8 +131,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     refuse_overwriting(&args.out, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     refuse_replacing(&args.out, args.overwrite)?;
     let calibration = args.calibration.as_deref();
-    let calibration =
-        calibration.map(|path| read_small_text(path, "read the calibration document")).transpose()?;
+    let calibration = calibration.map(read_document).transpose()?;
 
     let unnamed = UnitId::new(UNNAMED).ok();
     let first_units = args.log.units()?;
@@ -171,47 +171,36 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
 fn human(report: &Report<'_>) -> String {
     let Report { page, bytes, summary } = report;
     let mut text = format!("{page}: {} kB\n", bytes / 1000);
-    let mut line = |words: std::fmt::Arguments<'_>| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{words}");
-    };
     for (unit, logs) in &summary.units {
         for (log, shown) in summary.logs.iter().zip(logs) {
             let Some(shown) = shown else { continue };
-            line(format_args!(
+            let _ = writeln!(
+                text,
                 "unit {unit} in {log}: {} raw ticks, {} corrected, {} announced as missing, {} marks",
                 shown.raw_ticks, shown.corrected_ticks, shown.missed_ticks, shown.marks
-            ));
+            );
             if shown.marks_left_out + shown.unreadable_messages > 0 {
-                line(format_args!(
+                let _ = writeln!(
+                    text,
                     "  {} further marks left out, {} messages cannot be read",
                     shown.marks_left_out, shown.unreadable_messages
-                ));
+                );
             }
         }
     }
     for (unit, difference) in &summary.differences {
-        line(format_args!(
+        let _ = writeln!(
+            text,
             "unit {unit}: {} corrected ticks in both, {} of them differ; {} only in the first, {} only in the second",
             difference.common_ticks,
             difference.differing_ticks,
             difference.only_first,
             difference.only_second
-        ));
+        );
     }
     if summary.units_left_out > 0 {
-        line(format_args!("{} further units are left out: choose with --unit", summary.units_left_out));
+        let _ = writeln!(text, "{} further units are left out: choose with --unit", summary.units_left_out);
     }
-    for report in &summary.reading {
-        match report {
-            LogReport::Recording(report) => {
-                if let Some(words) = &report.cut_short {
-                    line(format_args!("not read to the end: {words}"));
-                }
-            }
-            LogReport::Text(report) => line(format_args!("{}", show::reading(report).trim_end())),
-        }
-    }
-    text.truncate(text.trim_end().len());
-    text + "\n"
+    summary.reading.iter().for_each(|report| text += &show::reading(report));
+    text
 }

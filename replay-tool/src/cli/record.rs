@@ -192,20 +192,20 @@ pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
     runtime.shutdown_background();
     let report = recorded.map_err(|error| table::advise(error, &options))?;
     live.warn(&report);
-    if let Some(failure) = &report.failure {
+    if let Some(failure) = &report.done.failure {
         show::warn(&format!("recording has stopped: {failure}; everything before that is in the file"));
     }
     if report.lost > 0 {
         show::warn(&format!("{} of {} messages are lost", report.lost, report.received));
     }
-    if !report.units_without_memory.is_empty() {
-        let units = report.units_without_memory.join(", ");
+    if !report.done.units_without_memory.is_empty() {
+        let units = report.done.units_without_memory.join(", ");
         show::warn(&format!(
             "no memory or journal of {units} from before the recording: its output cannot be reproduced to the bit"
         ));
     }
-    if args.topic.is_empty() && !report.units_without_raw.is_empty() {
-        let units = report.units_without_raw.join(", ");
+    if args.topic.is_empty() && !report.done.units_without_raw.is_empty() {
+        let units = report.done.units_without_raw.join(", ");
         show::warn(&format!(
             "no raw messages of {units} were received: producers do not reach this recorder; give one --connect, to \
              the service or a router, and no --listen"

@@ -1,11 +1,13 @@
 //! Summaries as tables and as JSON.
 
+use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::ops::RangeBounds;
 
 use comfy_table::Row;
 use serde::Serialize;
 
+use isotherm_log::source::LogReport;
 use isotherm_log::text::ReadReport;
 
 /// A table of two columns, figures to the right.
@@ -43,20 +45,31 @@ pub(super) fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).map(|text| text + "\n").unwrap_or_default()
 }
 
-/// What reading the log came to, in words; empty where there is nothing to say.
-pub(super) fn reading(report: &ReadReport) -> String {
+/// What reading a log came to, in words; empty where there is nothing to say.
+pub(super) fn reading(report: &LogReport) -> String {
+    let report = match report {
+        LogReport::Text(report) => return rows(report),
+        LogReport::Recording(report) => report,
+    };
+    let mut text = String::new();
+    if let Some(words) = &report.cut_short {
+        let _ = writeln!(text, "not read to the end: {words}; everything before it has been used");
+    }
+    if report.foreign_messages > 0 {
+        let _ = writeln!(text, "{} messages of other programs were skipped", report.foreign_messages);
+    }
+    text
+}
+
+/// The same of a text log.
+pub(super) fn rows(report: &ReadReport) -> String {
     let mut text = String::new();
     if report.skipped_rows > 0 {
-        let first = report.first_skipped.as_deref().unwrap_or_default();
-        let rows = report.skipped_rows;
-        text.push_str(
-            &[&rows.to_string(), " rows could not be read and were skipped; the first:\n  ", first, "\n"]
-                .concat(),
-        );
+        let (rows, first) = (report.skipped_rows, report.first_skipped.as_deref().unwrap_or_default());
+        let _ = writeln!(text, "{rows} rows could not be read and were skipped; the first:\n  {first}");
     }
     if report.bad_status_rows > 0 {
-        let rows = report.bad_status_rows.to_string();
-        text.push_str(&[&rows, " rows were skipped because of their status\n"].concat());
+        let _ = writeln!(text, "{} rows were skipped because of their status", report.bad_status_rows);
     }
     if report.cut_short {
         text += "the compressed log is cut short; everything before the end has been used\n";

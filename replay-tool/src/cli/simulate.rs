@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::{print, seconds, show};
 use crate::error::Error;
 use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
-use isotherm_log::file::{Partial, Sink, read_small_text, refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::{Sink, read_small_text, refuse_overwriting, refuse_replacing, write_whole};
 use isotherm_log::mapping::Mapping;
 
 /// Simulate a log, with the mapping that reads it back
@@ -170,21 +170,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
 
     let mapping = Mapping::path_beside(out);
     args.refuse_overwriting(out, &mapping)?;
-    let create = |path: &Path| -> Result<_, Error> {
-        let partial = Partial::of(path);
-        Ok((Sink::create(partial.writing(), path)?, partial))
-    };
-    let (mut log, whole) = create(out)?;
+    let mut log = Sink::create(out)?;
     let mapping_text = columns.mapping();
-    let failed = |source| Error::file(out, "write", source);
-    let mut rows = LogWriter::new(columns, &mut log).map_err(failed)?;
-    let mut truth = match &args.truth {
-        Some(path) => Some(create(path)?),
-        None => None,
-    };
-    if let Some((writer, partial)) = &mut truth {
-        write_truth_header(scenario.instrument.gyros.count(), writer)
-            .map_err(|source| Error::file(partial.path(), "write", source))?;
+    let mut rows = log.write(|writer| LogWriter::new(columns, writer))?;
+    let mut truth = args.truth.as_deref().map(Sink::create).transpose()?;
+    if let Some(truth) = &mut truth {
+        truth.write(|writer| write_truth_header(scenario.instrument.gyros.count(), writer))?;
     }
     let mut report = Report {
         unit: scenario.unit.clone(),
@@ -197,23 +188,22 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     };
     let mut bar = Bar::over_ticks(simulation.remaining());
     for step in simulation {
-        rows.write(&step, &mut log).map_err(failed)?;
-        if let Some((writer, partial)) = &mut truth {
-            write_truth(&step, writer).map_err(|source| Error::file(partial.path(), "write", source))?;
+        log.write(|writer| rows.write(&step, writer))?;
+        if let Some(truth) = &mut truth {
+            truth.write(|writer| write_truth(&step, writer))?;
         }
         report.ticks += 1;
         report.temperature_readings += step.temperatures.len() as u64;
         bar.step();
     }
     bar.finish();
-    log.finish().map_err(failed)?;
-    if let Some((writer, partial)) = truth {
-        writer.finish().map_err(|source| Error::file(partial.path(), "write", source))?;
-        partial.keep()?;
+    let log = log.finish()?;
+    if let Some(truth) = truth {
+        truth.finish()?.keep()?;
     }
     write_whole(&mapping, mapping_text.as_bytes(), true)
         .map_err(|source| Error::file(&mapping, "write", source))?;
-    whole.keep()?;
+    log.keep()?;
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     Ok(Exit::Ok)
 }

@@ -8,7 +8,6 @@ use serde::Serialize;
 use tokio::time::Instant;
 
 use super::queue::{Queue, TopicCount};
-use super::writer::Done;
 
 /// Why a recording ended.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -27,13 +26,32 @@ pub enum EndedBy {
     Failure,
 }
 
-/// What recording came to.
+/// What was written.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct RecordReport {
+pub struct Done {
     /// Files that are there, oldest first.
     pub files: Vec<PathBuf>,
     /// Files deleted to keep only the newest.
     pub files_deleted: u64,
+    /// Files attached, in each recording file anew.
+    pub attachments: u64,
+    /// What the journals came to.
+    pub journal: JournalAccount,
+    /// Units that were recorded but cannot be corrected again from this recording alone: nothing says what they knew.
+    pub units_without_memory: Vec<String>,
+    /// Units of which corrected messages were recorded but nothing raw, though it was asked for: producers do not reach the
+    /// recorder.
+    pub units_without_raw: Vec<String>,
+    /// Why nothing more could be written.
+    pub failure: Option<String>,
+}
+
+/// What recording came to.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RecordReport {
+    /// What was written; nothing before the end.
+    #[serde(flatten)]
+    pub done: Done,
     /// Why it ended.
     pub ended_by: EndedBy,
     /// How long it took, from the first file's beginning (s).
@@ -48,28 +66,17 @@ pub struct RecordReport {
     pub file_bytes: u64,
     /// By key.
     pub topics: Vec<TopicCount>,
-    /// Files attached, in each recording file anew.
-    pub attachments: u64,
-    /// What the journals came to.
-    pub journal: JournalAccount,
-    /// Units that were recorded but cannot be corrected again from this recording alone: nothing says what they knew.
-    pub units_without_memory: Vec<String>,
-    /// Units of which corrected messages were recorded but nothing raw, though it was asked for: producers do not reach the
-    /// recorder.
-    pub units_without_raw: Vec<String>,
     /// Services that were there, by instance.
     pub services: BTreeSet<String>,
     /// What somebody should know.
     pub warnings: Vec<String>,
-    /// Why nothing more could be written.
-    pub failure: Option<String>,
 }
 
 impl RecordReport {
     /// Whether anything was lost.
     #[must_use]
     pub fn lost_data(&self) -> bool {
-        self.lost > 0 || self.failure.is_some()
+        self.lost > 0 || self.done.failure.is_some()
     }
 }
 
@@ -87,20 +94,16 @@ pub(super) fn fill(report: &mut RecordReport, queue: &Queue, begun: Instant) {
 
 /// What the writing thread has done.
 pub(super) fn finish(report: &mut RecordReport, done: Done, with_service: bool) {
-    let Done { files, deleted, attachments, journal, without_memory, without_raw, failure } = done;
     let length = |path: &PathBuf| std::fs::metadata(path).map_or(0, |metadata| metadata.len());
-    if deleted == 0 {
+    if done.files_deleted == 0 {
         // With the summaries.
-        report.file_bytes = files.iter().map(length).sum();
+        report.file_bytes = done.files.iter().map(length).sum();
     }
-    (report.files, report.files_deleted, report.attachments) = (files, deleted, attachments);
-    report.journal = journal;
-    if with_service {
-        report.units_without_memory = without_memory;
-        report.units_without_raw = without_raw;
-    }
-    if let Some(error) = failure {
-        report.failure = Some(error.to_string());
+    if done.failure.is_some() {
         report.ended_by = EndedBy::Failure;
+    }
+    report.done = done;
+    if !with_service {
+        (report.done.units_without_memory, report.done.units_without_raw) = (Vec::new(), Vec::new());
     }
 }

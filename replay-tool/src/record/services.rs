@@ -14,8 +14,9 @@ use zenoh::sample::SampleKind;
 
 use super::inquiry::{self, Question};
 use super::queue::Queue;
-use super::{RecordOptions, RecordReport, ServiceWait, Stop};
+use super::{RecordOptions, RecordReport, ServiceWait};
 use crate::error::Error;
+use crate::stop::Stop;
 
 /// How long one wait for a service takes where it is repeated.
 const ONE_WAIT: Duration = Duration::from_secs(5);

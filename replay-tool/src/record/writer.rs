@@ -1,20 +1,18 @@
 //! The thread that writes.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use isotherm_log::message::{Message, Topic};
-use isotherm_log::recording::{
-    Attachment, Documents, JournalAccount, METADATA, Metadata, RecordingOptions, RecordingWriter,
-};
+use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
 use isotherm_protocol::codec;
 use isotherm_protocol::journal::JournalPart;
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::files::Files;
 use super::queue::{Item, Queue, Taken, now_ns};
+use super::report::Done;
 use super::told::{beginning, end};
 use crate::error::Error;
 
@@ -41,25 +39,6 @@ pub(super) enum Told {
     Warning(String),
     /// Nothing more can be written.
     Failed,
-}
-
-/// What the thread has done.
-#[derive(Debug, Default)]
-pub(super) struct Done {
-    /// Files that are there, oldest first.
-    pub(super) files: Vec<PathBuf>,
-    /// Files deleted to keep only the newest.
-    pub(super) deleted: u64,
-    /// Files attached, those of each recording file counted.
-    pub(super) attachments: u64,
-    /// What the journals came to.
-    pub(super) journal: JournalAccount,
-    /// Units with raw messages of whose journal neither memory nor beginning has come.
-    pub(super) without_memory: Vec<String>,
-    /// Units with corrected messages of which nothing raw has come.
-    pub(super) without_raw: Vec<String>,
-    /// Why writing ended early.
-    pub(super) failure: Option<Error>,
 }
 
 /// The thread's work.
@@ -154,17 +133,17 @@ impl FileWriter {
                 _ => false,
             };
         }
-        let without_raw = corrected.difference(&raw).cloned().collect();
+        let units_without_raw = corrected.difference(&raw).cloned().collect();
         raw.retain(|unit| !journal.knows(unit));
         Done {
             // The last may not have come into being.
             files: files.kept().filter(|path| path.exists()).cloned().collect(),
-            deleted: files.deleted(),
+            files_deleted: files.deleted(),
             attachments,
             journal: journal.account().clone(),
-            without_memory: raw.into_iter().collect(),
-            without_raw,
-            failure,
+            units_without_memory: raw.into_iter().collect(),
+            units_without_raw,
+            failure: failure.map(|error| error.to_string()),
         }
     }
 

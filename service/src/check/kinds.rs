@@ -31,15 +31,7 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
     let bytes = match read_bounded(path) {
         Ok(bytes) => bytes,
         Err(error) => {
-            return Finding {
-                file,
-                kind: None,
-                good: false,
-                unreadable: Some(error.to_string()),
-                problems: Vec::new(),
-                warnings: Vec::new(),
-                summary: None,
-            };
+            return Finding { file, unreadable: Some(error.to_string()), ..Finding::default() };
         }
     };
     let recognised = recognise(path, &bytes);

@@ -2,14 +2,16 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use isotherm_document::few;
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, StoreStatus,
 };
 
 use super::manager::Worker;
-use super::start::first_of;
 
+/// Kind of the standing problem of a state folder that cannot be written.
+pub(crate) const STATE_FOLDER: &str = "state_folder";
 /// Kind of the standing problem of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";
 
@@ -28,6 +30,13 @@ pub(crate) struct Posted {
     pub(crate) accepted: u64,
     /// Swaps refused since the start.
     pub(crate) refused: u64,
+}
+
+impl Posted {
+    /// The problem of a kind, if there is one.
+    pub(crate) fn standing(&self, kind: &str) -> Option<&Standing> {
+        self.problems.iter().find(|problem| problem.kind == kind)
+    }
 }
 
 /// Something that is wrong until somebody does something about it.
@@ -87,7 +96,7 @@ impl Worker {
     /// What is wrong until somebody does something about it.
     fn problems(&self) -> Vec<Standing> {
         let lost = self.lost.iter().map(|words| Standing {
-            kind: "state_folder",
+            kind: STATE_FOLDER,
             count: 1,
             words: format!("swaps are refused, the state folder cannot be written: {words}"),
         });
@@ -100,7 +109,7 @@ impl Worker {
             .records
             .iter()
             .filter(|(_, record)| record.untrusted.is_some())
-            .map(|(unit, _)| unit)
+            .map(|(unit, _)| unit.as_str())
             .collect();
         let count = untrusted.len() as u64;
         let untrusted = (count > 0).then(|| Standing {
@@ -108,7 +117,7 @@ impl Worker {
             count,
             words: format!(
                 "restored without a signature that is now trusted: {}; `isotherm status UNIT` says what to do",
-                first_of(untrusted.into_iter())
+                few(untrusted)
             ),
         });
         let unwritten = self.folder.unwritten();

@@ -185,27 +185,23 @@ impl Worker {
         let documents = kept.filter_map(|document| document.text.as_ref()).chain(bases);
         let documents = documents.map(CompressedText::read);
         let overlays = layers.map(|layers| layers.text.read());
-        match self.store.keep(SystemTime::now(), documents, overlays) {
-            Ok(false) => {
-                if self.lost.take().is_some() {
-                    tracing::info!("the state folder is back: swaps are accepted again");
-                }
-            }
+        let lost = match self.store.keep(SystemTime::now(), documents, overlays) {
+            Ok(false) => self.store.write_failure().map(ToOwned::to_owned),
             Ok(true) => {
-                self.lost = None;
                 tracing::warn!(
                     "the state folder was replaced: what is in force was written into the new one; earlier documents \
                      and entries are in the old one"
                 );
+                None
             }
-            Err(error) => {
-                let words = error.to_string();
-                if self.lost.as_ref() != Some(&words) {
-                    tracing::error!("swaps are refused, the state folder cannot be written: {words}");
-                }
-                self.lost = Some(words);
-            }
+            Err(error) => Some(error.to_string()),
+        };
+        if let Some(words) = lost.as_ref().filter(|_| lost != self.lost) {
+            tracing::error!("swaps are refused, the state folder cannot be written: {words}");
+        } else if self.lost.is_some() && lost.is_none() {
+            tracing::info!("the state folder can be written: swaps are accepted again");
         }
+        self.lost = lost;
     }
 
     /// Does what is asked for.

@@ -195,7 +195,7 @@ fn one_unit(key: &str, asked: Asked) -> Result<UnitId, String> {
 }
 
 /// Whether a query takes a key in.
-fn is_asked(query: &Query, key: &str) -> bool {
+pub(crate) fn is_asked(query: &Query, key: &str) -> bool {
     keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key))
 }
 

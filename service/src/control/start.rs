@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use isotherm_correction::units::Span;
+use isotherm_document::few;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::history::Intent;
 use isotherm_protocol::key::UnitId;
@@ -13,11 +14,8 @@ use super::document::Document;
 use super::file::read_all;
 use super::manager::Worker;
 use super::revision::{Calibrations, Record, Revision};
-use crate::control::watch::{Known, documents_in};
+use crate::control::watch::{Known, files_in};
 use crate::signing::check_signature;
-
-/// How many units a line of the log names.
-const NAMED: usize = 8;
 
 /// What was found of each file of the folder, for its watcher.
 pub(crate) type Found = std::collections::BTreeMap<std::path::PathBuf, Known>;
@@ -87,7 +85,7 @@ impl Worker {
         let Some(folder) = self.folder.path().map(Path::to_owned) else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
-        for (file, read) in read_all(&documents_in(&folder)?) {
+        for (file, read) in read_all(&files_in(&folder, "toml")?) {
             match read {
                 Ok(read) => {
                     found.insert(file.clone(), Known::Content(read.digest.0));
@@ -109,10 +107,8 @@ impl Worker {
         }
         bad += self.end_group();
         self.miss_documents();
-        tracing::info!(
-            folder = %folder.display(), count = self.records.len(), units = first_of(self.records.keys()),
-            bad_documents = bad, "calibrations read"
-        );
+        let (count, units) = (self.records.len(), few(self.records.keys().map(UnitId::as_str)));
+        tracing::info!(folder = %folder.display(), count, units, bad_documents = bad, "calibrations read");
         Ok((found, bad))
     }
 
@@ -164,12 +160,4 @@ impl Worker {
             }
         }
     }
-}
-
-/// The first few units, and how many more there are.
-pub(crate) fn first_of<'u>(units: impl ExactSizeIterator<Item = &'u UnitId>) -> String {
-    let beyond = units.len().saturating_sub(NAMED);
-    let named: Vec<_> = units.take(NAMED).map(UnitId::as_str).collect();
-    let more = if beyond > 0 { format!(" and {beyond} more") } else { String::new() };
-    named.join(" ") + &more
 }

@@ -23,6 +23,7 @@ mod log;
 mod opened;
 mod read;
 mod retention;
+mod trial;
 mod verify;
 
 pub use error::StoreError;
@@ -31,7 +32,7 @@ pub use verify::{Break, Verification, verify};
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Instant, SystemTime};
 
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::chain::Chain;
@@ -68,6 +69,10 @@ pub struct Store {
     prune_due: bool,
     /// Lines of the audit file were lost.
     is_damaged: bool,
+    /// Why the last write failed, until one works.
+    write_failure: Option<String>,
+    /// When it is tried whether one works.
+    next_trial: Instant,
 }
 
 /// Where the entries go.
@@ -127,11 +132,9 @@ impl Store {
             opened.lost = lost.collect();
         }
         let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
-        let full_bytes = FULL_BYTES;
         let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
-        let (stuck, prune_due, written) = (false, true, BTreeMap::new());
-        let store =
-            Self { journal, documents, overlays, index, written, full_bytes, stuck, prune_due, is_damaged };
+        let prune_due = true;
+        let store = Self { journal, documents, overlays, index, prune_due, is_damaged, ..Self::in_memory() };
         Ok((store, opened))
     }
 
@@ -148,6 +151,8 @@ impl Store {
             stuck: false,
             prune_due: false,
             is_damaged: false,
+            write_failure: None,
+            next_trial: Instant::now(),
         }
     }
 
@@ -165,8 +170,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::TooLong`], [`StoreError::Lost`] or [`StoreError::Write`].
     pub fn put_document(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
-        self.check_held()?;
-        self.documents.put(bytes)
+        self.write(|store| store.documents.put(bytes))
     }
 
     /// Keeps calibration documents, each under its digest: all of them are on the disk when this returns. Much sooner than
@@ -175,8 +179,7 @@ impl Store {
     /// # Errors
     /// As [`Self::put_document`]; some may be kept then.
     pub fn put_documents(&mut self, documents: &[(Digest, CompressedBytes)]) -> Result<(), StoreError> {
-        self.check_held()?;
-        self.documents.put_all(documents)
+        self.write(|store| store.documents.put_all(documents))
     }
 
     /// Keeps an overlay, as [`Self::put_document`] does a document.
@@ -184,8 +187,7 @@ impl Store {
     /// # Errors
     /// The same.
     pub fn put_overlay(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
-        self.check_held()?;
-        self.overlays.put(bytes)
+        self.write(|store| store.overlays.put(bytes))
     }
 
     /// Writes an entry down and gives its number; it is on the disk when this returns. Texts and lists are cut to their
@@ -214,8 +216,15 @@ impl Store {
         time: SystemTime,
         entries: impl IntoIterator<Item = (Option<&'e UnitId>, &'e str, AuditEvent)>,
     ) -> Result<u64, StoreError> {
-        let entries: Vec<_> = entries.into_iter().collect();
-        self.check_held()?;
+        let entries = entries.into_iter().collect();
+        self.write(|store| store.write_entries(time, entries))
+    }
+
+    fn write_entries(
+        &mut self,
+        time: SystemTime,
+        entries: Vec<(Option<&UnitId>, &str, AuditEvent)>,
+    ) -> Result<u64, StoreError> {
         entries.iter().try_for_each(|(_, _, event)| self.check_stored(event))?;
         self.begin_anew_if_due(time)?;
         let revision = |event: &AuditEvent| match event {
@@ -291,6 +300,7 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let lost = match self.check_held() {
             Ok(()) => {
+                self.try_if_due(Instant::now());
                 self.prune_if_due(time);
                 return Ok(false);
             }
@@ -314,6 +324,7 @@ impl Store {
         self.index.next_number = next_number;
         [self.documents, self.overlays] = shelves;
         self.journal = Journal::Folder { path, log, lock, mark };
+        self.write_failure = None;
         Ok(true)
     }
 

@@ -32,7 +32,7 @@ use self::signals::Signals;
 use self::states::FileStates;
 use self::worker::Worker;
 
-pub(crate) use self::folder::{documents_in, read_document};
+pub(crate) use self::folder::{files_in, read_document};
 
 /// How long an ending waits for the thread, which a dead network share may hold.
 const STOP_LIMIT: Duration = Duration::from_secs(1);
@@ -113,8 +113,6 @@ pub struct WatchSettings {
     /// How long a file must stay the same before it is read. One that never does is read after twenty times as long,
     /// as it is at that moment.
     pub settle: Duration,
-    /// How long a file, or the folder, may be gone without being called so; `None` for twice `settle`.
-    pub grace: Option<Duration>,
     /// Distance of the looks that no event asked for. At each of them up to 64 files whose state has not changed are
     /// read and compared, in turn.
     pub poll: Duration,
@@ -124,17 +122,20 @@ pub struct WatchSettings {
 
 impl Default for WatchSettings {
     fn default() -> Self {
-        Self { settle: Duration::from_millis(150), grace: None, poll: Duration::from_secs(5), events: true }
+        Self { settle: Duration::from_millis(150), poll: Duration::from_secs(5), events: true }
     }
 }
 
 impl WatchSettings {
-    /// With every duration in its range and a grace time.
+    /// With every duration in its range.
     fn bounded(self) -> Self {
         let bounded = |time: Duration| time.clamp(Duration::from_millis(1), Duration::from_secs(86_400));
-        let settle = bounded(self.settle);
-        let grace = Some(bounded(self.grace.unwrap_or(settle * 2)));
-        Self { settle, grace, poll: bounded(self.poll), events: self.events }
+        Self { settle: bounded(self.settle), poll: bounded(self.poll), events: self.events }
+    }
+
+    /// How long a file, or the folder, may be gone without being called so.
+    fn grace(&self) -> Duration {
+        self.settle * 2
     }
 }
 

@@ -10,7 +10,6 @@
 //! | `families` | every metric: name, meaning, and where its value comes from |
 //! | `page` | a look as `OpenMetrics` text |
 //! | `health` | what speaks against the service's health |
-//! | `state_folder` | whether the state folder can be written |
 //!
 //! A unit's lock is held for as long as its status takes, as it is by whoever asks for that status over the bus; text is
 //! made of it afterwards. One look at a time, on a thread where waiting hurts nobody: a unit that is held up by a slow
@@ -23,7 +22,6 @@ mod health;
 pub(crate) mod http;
 mod page;
 mod source;
-mod state_folder;
 
 use std::io;
 use std::net::SocketAddr;

@@ -31,7 +31,7 @@ pub(super) async fn others(
 ) -> Result<Vec<Member>, ServiceError> {
     connected(session, &settings.zenoh.session, LIMIT).await?;
     let Some(other) = &settings.pair.other else { return members(session, group).await };
-    supervisor::status(&format!("nothing is corrected yet: waiting for the other instance at {other}"));
+    supervisor::waiting_for(&format!("the other instance at {other}"));
     let (start, mut told) = (Instant::now(), false);
     loop {
         let is_there = is_there(settings, other, group).await?;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Exit, failed, print};
+use isotherm_cli::{Exit, failed, json, print};
 use isotherm_protocol::signature::{KeyError, PrivateKey};
 use serde::Serialize;
 use thiserror::Error;
@@ -60,9 +60,7 @@ enum KeygenError {
 #[must_use]
 pub fn run(args: &KeygenArgs) -> Exit {
     match make(&args.name, &args.folder) {
-        Ok(made) if args.json => {
-            print(&(serde_json::to_string_pretty(&made).unwrap_or_default() + "\n"), Exit::Ok)
-        }
+        Ok(made) if args.json => print(&json(&made), Exit::Ok),
         Ok(made) => print(&in_words(&made), Exit::Ok),
         Err(error) => failed(error, Exit::Failed),
     }

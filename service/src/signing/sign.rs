@@ -11,6 +11,7 @@ use isotherm_protocol::signature::{self, Existing, KeyId, PrivateKey, Wrong};
 use serde::Serialize;
 
 use super::{files, private_key};
+use crate::check::say_problems;
 use isotherm_document::file::{read_bounded, text};
 
 /// Arguments of `sign`.
@@ -43,7 +44,7 @@ pub struct SignArgs {
 }
 
 /// What became of one file.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 struct Outcome {
     /// The document.
     file: String,
@@ -70,9 +71,7 @@ pub fn run(args: &SignArgs) -> Exit {
     }
     let key = match private_key::read(&args.key) {
         Ok((key, warning)) => {
-            if let Some(warning) = warning {
-                say(format_args!("{warning} (warning)"));
-            }
+            say_problems(&[], warning.as_slice());
             key
         }
         Err((problem, exit)) => {
@@ -100,26 +99,17 @@ fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> 
     let mut outcome = Outcome {
         file: file.display().to_string(),
         output: output.display().to_string(),
-        signed: false,
-        unit: None,
-        digest: None,
-        failure: None,
-        problems: Vec::new(),
-        warnings: Vec::new(),
+        ..Outcome::default()
     };
     let bytes = match read_bounded(file) {
         Ok(bytes) => bytes,
         Err(error) => {
-            outcome.failure = Some(format!("cannot be read: {error}"));
-            return (outcome, None);
+            return (Outcome { failure: Some(format!("cannot be read: {error}")), ..outcome }, None);
         }
     };
     let text = match text(&bytes, &outcome.file) {
         Ok(text) => text,
-        Err(problems) => {
-            outcome.problems = problems;
-            return (outcome, None);
-        }
+        Err(problems) => return (Outcome { problems, ..outcome }, None),
     };
     let signed = match signature::sign(text, key, existing) {
         Ok(signed) => Some(signed),
@@ -165,7 +155,7 @@ fn report(outcomes: &[Outcome], key_id: KeyId, json: bool) -> Exit {
     if json {
         let signed = exit == Exit::Ok;
         let report = serde_json::json!({ "signed": signed, "key_id": key_id, "files": outcomes });
-        return print(&(serde_json::to_string_pretty(&report).unwrap_or_default() + "\n"), exit);
+        return print(&isotherm_cli::json(&report), exit);
     }
     let text: String = outcomes.iter().map(|outcome| in_words(outcome, key_id)).collect();
     if outcomes.len() > 1 && outcomes.iter().all(|outcome| !outcome.signed) {
@@ -179,12 +169,7 @@ fn in_words(outcome: &Outcome, key_id: KeyId) -> String {
     if let Some(failure) = &outcome.failure {
         say(format_args!("{}: {failure}", outcome.file));
     }
-    for problem in &outcome.problems {
-        say(problem);
-    }
-    for warning in &outcome.warnings {
-        say(format_args!("{warning} (warning)"));
-    }
+    say_problems(&outcome.problems, &outcome.warnings);
     if !outcome.signed {
         return String::new();
     }

@@ -2,12 +2,13 @@
 
 use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::signature::{self, PublicKey, TrustedKeys};
 
 use crate::config::SwapSettings;
+use crate::control::watch::files_in;
 
 use isotherm_document::file::{read_bounded, text};
 use isotherm_document::unplaced;
@@ -27,8 +28,8 @@ const WORLD_WRITABLE: u32 = 0o002;
 /// bad file among them no key is taken: a key that silently did not count would have its signer's documents refused.
 pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), Vec<Problem>> {
     let name = folder.display().to_string();
-    let files =
-        key_files(folder).map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?;
+    let unread = |error: std::io::Error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))];
+    let files = files_in(folder, "pub").map_err(unread)?;
     let mut trusted = TrustedKeys::default();
     let (mut problems, mut warnings) = (Vec::new(), Vec::new());
     warnings.extend(open_to_all(folder));
@@ -42,10 +43,7 @@ pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), V
         }
         warnings.extend(open_to_all(&path));
     }
-    warnings.extend(
-        private_keys(folder)
-            .map_err(|error| vec![unplaced(Some(&name), format!("cannot be read: {error}"))])?,
-    );
+    warnings.extend(private_keys(folder).map_err(unread)?);
     if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
 }
 
@@ -101,19 +99,6 @@ fn private_keys(folder: &Path) -> std::io::Result<Vec<Problem>> {
     }
     found.sort_by(|a, b| a.file.cmp(&b.file));
     Ok(found)
-}
-
-fn key_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
-        if !hidden && path.extension().is_some_and(|extension| extension == "pub") && !path.is_dir() {
-            files.push(path);
-        }
-    }
-    files.sort();
-    Ok(files)
 }
 
 /// One key and its name, or what is wrong with it.

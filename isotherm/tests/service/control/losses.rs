@@ -14,7 +14,7 @@ fn plain() -> SwapOptions {
 }
 
 /// What the status says under a kind.
-fn told<'s>(status: &'s ServiceStatus, kind: &str) -> Option<&'s str> {
+pub(crate) fn told<'s>(status: &'s ServiceStatus, kind: &str) -> Option<&'s str> {
     status.faults.iter().find(|fault| fault.kind == kind).map(|fault| fault.first.as_str())
 }
 

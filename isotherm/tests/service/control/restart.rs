@@ -9,6 +9,8 @@ use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::status::State;
 use isotherm_service::{ServiceError, Settings};
 
+use super::folder::until_service;
+use super::losses::told;
 use super::stand::{Folders, Stand, UNIT, assert_accepted, assert_refused, audit_file, document, unit_id};
 
 fn plain() -> SwapOptions {
@@ -164,9 +166,12 @@ async fn a_swap_that_cannot_be_written_down_is_refused_and_changes_nothing() {
     assert_refused(&reply, &["nothing has changed", "documents"]);
     assert_eq!(reply.revision, 1);
     assert_eq!(stand.revisions(UNIT, 20).await, [1]);
+    let status = until_service(&stand, |status| told(status, "state_folder").is_some()).await;
+    assert!(told(&status, "state_folder").unwrap().contains("documents"), "{status:#?}");
     std::fs::remove_file(&shelf).unwrap();
     std::fs::rename(&aside, &shelf).unwrap();
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &plain()).await, 2);
+    until_service(&stand, |status| told(status, "state_folder").is_none()).await;
 
     // The audit file itself: replaced by a link that leads nowhere.
     let audit = audit_file(&folders.state);

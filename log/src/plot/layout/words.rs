@@ -1,7 +1,7 @@
 //! Words and figures of a page.
 
+use crate::date::seconds;
 use crate::plot::PlotSummary;
-use crate::plot::time::seconds;
 
 /// What each unit has in each log: a sentence, and what else is to be known.
 pub(super) fn results(summary: &PlotSummary) -> Vec<(String, String)> {

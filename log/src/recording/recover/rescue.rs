@@ -114,12 +114,7 @@ impl<'a> Rescue<'a> {
             Record::Message { header, data } => self.message(header, &data, report)?,
             Record::Attachment { header, data, .. } => {
                 report.attachments += 1;
-                self.attach(&Attachment {
-                    name: header.name,
-                    media_type: header.media_type,
-                    attached_ns: header.log_time,
-                    bytes: data.into_owned(),
-                })?;
+                self.attach(&Attachment::read(header, data))?;
             }
             Record::Metadata(metadata) => {
                 if metadata.name == CHANNELS {
@@ -224,17 +219,9 @@ impl<'a> Rescue<'a> {
     }
 
     fn attach(&mut self, attachment: &Attachment) -> Result<(), Error> {
-        let Attachment { name, media_type, attached_ns, bytes } = attachment;
-        self.documents.remove(name);
-        self.attached.insert(name.clone());
-        let attachment = mcap::Attachment {
-            log_time: *attached_ns,
-            create_time: *attached_ns,
-            name: name.clone(),
-            media_type: media_type.clone(),
-            data: bytes.as_slice().into(),
-        };
-        self.writer.attach(&attachment).map_err(|source| self.failed(source))
+        self.documents.remove(&attachment.name);
+        self.attached.insert(attachment.name.clone());
+        self.writer.attach(&attachment.as_written()).map_err(|source| self.failed(source))
     }
 
     fn failed(&self, source: McapError) -> Error {

@@ -6,18 +6,18 @@ use std::thread::available_parallelism;
 
 use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
+use isotherm_document::few;
 use isotherm_log::diff::DiffOptions;
-use isotherm_log::error::few;
-use isotherm_log::file::read_small;
+use isotherm_log::file::read_small_text;
 use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::replica::{Changes, Outlines, scan};
 use isotherm_protocol::key::UnitId;
 
-use super::CorrectArgs;
 use super::report::Report;
 use super::sink::Sink;
-use crate::cli::{print, show};
+use super::{CorrectArgs, print_summary};
+use crate::cli::show;
 use crate::error::Error;
 
 /// Gyro ticks in a message of a text log.
@@ -73,7 +73,7 @@ fn make(
     let inputs: Vec<_> = args.log.inputs().into_iter().chain(args.calibration.iter().cloned()).collect();
     let mut sink = Sink::open(args, &units, &inputs)?;
     for path in documents {
-        sink.document(read_small(path, "read the calibration document")?)?;
+        sink.document(read_small_text(path, "read the calibration document")?.into_bytes())?;
     }
     // A journal is followed from its beginning; what comes before the part is corrected and not given out.
     let by_journal = plans.iter().any(|plan| matches!(plan.basis, Basis::Journal { .. }));
@@ -100,12 +100,7 @@ fn make(
     sink.finish(&args.log.log)?;
     let report = Report::new(&units, &log);
     report.warn();
-    let text = if args.json { show::json(&report) } else { report.human() };
-    if args.out.as_deref() == Some(Path::new("-")) {
-        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
-    } else {
-        print(text.as_bytes())?;
-    }
+    print_summary(args, &if args.json { show::json(&report) } else { report.human() })?;
     Ok(Exit::of_loss(report.lost_data()))
 }
 

@@ -1,10 +1,12 @@
-//! Where the corrected ticks of a recording's units go.
+//! Where the corrected ticks of a log's units go.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::create_dir_all;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use isotherm_log::file::{refuse_overwriting, refuse_replacing};
+use clap::ValueEnum;
+use isotherm_log::file::{self, refuse_overwriting, refuse_replacing};
+use isotherm_log::offline::rows::write_header;
 use isotherm_log::offline::{Form, Made};
 use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
 use isotherm_protocol::digest::Digest;
@@ -12,14 +14,23 @@ use isotherm_protocol::key::UnitId;
 
 use super::CorrectArgs;
 use crate::error::Error;
-use crate::output::{Format, Output, write_header};
+
+/// How corrected ticks are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum Format {
+    /// One row per output.
+    #[default]
+    Csv,
+    /// Frames as on the bus, each after its length.
+    Wire,
+}
 
 /// What is written to.
 pub(super) enum Sink {
     /// Nothing.
     None,
     /// A file for each unit, by its place.
-    Files(Vec<Output>),
+    Files(Vec<file::Sink>),
     /// A recording.
     Recording { writer: Box<RecordingWriter>, attached: BTreeSet<Digest>, received_ns: u64 },
 }
@@ -59,13 +70,14 @@ impl Sink {
                 )));
             }
         };
-        for path in &paths {
+        let is_stdout = |path: &Path| path == Path::new("-");
+        for path in paths.iter().filter(|path| !is_stdout(path)) {
             refuse_overwriting(path, &inputs)?;
             refuse_replacing(path, *overwrite)?;
         }
         let mut files = Vec::new();
         for path in paths {
-            let mut file = Output::create(&path, *overwrite)?;
+            let mut file = if is_stdout(&path) { file::Sink::stdout() } else { file::Sink::create(&path)? };
             if format == Format::Csv {
                 file.write(|writer| write_header(writer))?;
             }
@@ -101,7 +113,7 @@ impl Sink {
             Self::None => Ok(()),
             Self::Files(files) => made.into_iter().try_for_each(|(place, output)| {
                 let file = files.get_mut(place);
-                file.map_or(Ok(()), |file| file.write(|writer| writer.write_all(&output.bytes)))
+                file.map_or(Ok(()), |file| Ok(file.write(|writer| writer.write_all(&output.bytes))?))
             }),
             Self::Recording { .. } => {
                 let (mut messages, mut documents) = (Vec::new(), Vec::new());
@@ -126,7 +138,7 @@ impl Sink {
     pub(super) fn finish(self, inputs: &[PathBuf]) -> Result<(), Error> {
         match self {
             Self::None => Ok(()),
-            Self::Files(files) => files.into_iter().try_for_each(Output::finish),
+            Self::Files(files) => files.into_iter().try_for_each(|file| Ok(file.finish()?.keep()?)),
             Self::Recording { mut writer, .. } => {
                 let inputs: Vec<_> = inputs.iter().map(|path| path.display().to_string()).collect();
                 let values = [

@@ -1,19 +1,17 @@
 //! Text logs: one unit with one calibration.
 
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use isotherm_cli::{Bar, Exit};
-use isotherm_log::file::refuse_overwriting;
-use isotherm_log::offline::{Offline, load_calibration};
+use isotherm_log::offline::sums::{Summary, Sums};
+use isotherm_log::offline::{Form, Made, Offline, load_calibration};
 use isotherm_log::text::ReadReport;
 use serde::Serialize;
 
-use super::CorrectArgs;
-use crate::cli::{print, show};
+use super::sink::Sink;
+use super::{CorrectArgs, print_summary};
+use crate::cli::show;
 use crate::error::Error;
-use crate::output::{Format, Output, write_frame, write_header, write_tick};
-use crate::summary::{Summary, Sums};
 
 /// Outputs that are written together.
 const BLOCK: usize = 512;
@@ -52,7 +50,6 @@ fn calibration(args: &CorrectArgs) -> Result<&Path, Error> {
 /// Runs the command on a text log.
 pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let settings = args.settings()?;
-    let format = args.format.unwrap_or_default();
     let calibration = calibration(args)?;
     if args.out.as_ref().and_then(|out| out.extension()).is_some_and(|extension| extension == "mcap") {
         return super::recording::run_text(args, calibration);
@@ -62,29 +59,23 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         show::warn(&warning.to_string());
     }
     let mut events = args.log.events()?;
-    if let Some(out) = &args.out {
-        let mapping = args.log.mapping_file();
-        let inputs = events.inner().paths().iter().chain(&mapping).map(PathBuf::as_path);
-        refuse_overwriting(out, &inputs.chain([calibration]).collect::<Vec<_>>())?;
-    }
-    let out = args.out.as_deref();
-    let mut output = out.map(|out| Output::create(out, args.overwrite)).transpose()?;
-    if let Some(output) = output.as_mut().filter(|_| format == Format::Csv) {
-        output.write(|writer| write_header(writer))?;
-    }
+    let mut inputs = events.inner().paths().to_vec();
+    inputs.extend(args.log.mapping_file().into_iter().chain([calibration.to_owned()]));
+    let mut sink = Sink::open(args, std::slice::from_ref(&loaded.unit), &inputs)?;
+    let form = sink.form(args.format);
     let mut unit = Offline::new(&loaded, settings);
     let mut sums = Sums::default();
     let mut bar = Bar::over_log(events.inner().progress().watch());
     for event in &mut events {
         unit.handle(&event?);
         if unit.ready() >= BLOCK {
-            take(&mut unit, &mut sums, output.as_mut(), format)?;
+            sink.write(take(&mut unit, &mut sums, form))?;
         }
         bar.step_saying(|| Some(format!("{} ticks", sums.ticks())));
     }
     unit.finish();
-    take(&mut unit, &mut sums, output.as_mut(), format)?;
-    output.map(Output::finish).transpose()?;
+    sink.write(take(&mut unit, &mut sums, form))?;
+    sink.finish(&inputs)?;
     bar.finish();
 
     for trouble in unit.troubles() {
@@ -99,37 +90,14 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         counters: unit.counters().into_iter().collect(),
         log: &log,
     };
-    let text = if args.json { show::json(&report) } else { human(&report) };
-    if args.out.as_deref() == Some(Path::new("-")) {
-        let _ = io::stderr().write_all(text.as_bytes());
-    } else {
-        print(text.as_bytes())?;
-    }
+    print_summary(args, &if args.json { show::json(&report) } else { human(&report) })?;
     Ok(Exit::of_loss(log.lost_data() || unit.refused() > 0))
 }
 
-/// Takes what is ready, sums it up and writes it.
-fn take(
-    unit: &mut Offline,
-    sums: &mut Sums,
-    output: Option<&mut Output>,
-    format: Format,
-) -> Result<(), Error> {
+/// Takes what is ready and sums it up.
+fn take(unit: &mut Offline, sums: &mut Sums, form: Form) -> Made {
     unit.peek().for_each(|tick| sums.add(tick));
-    match (output, format) {
-        (None, _) => unit.take().clear(),
-        (Some(output), Format::Csv) => {
-            let ticks = unit.take();
-            output.write(|writer| ticks.iter().try_for_each(|tick| write_tick(writer, tick)))?;
-        }
-        (Some(output), Format::Wire) => {
-            let mut frame = Vec::new();
-            while unit.next_frame(&mut frame) {
-                output.write(|writer| write_frame(writer, &frame))?;
-            }
-        }
-    }
-    Ok(())
+    vec![(0, unit.give_out(form))]
 }
 
 /// The summary as tables.
@@ -149,5 +117,5 @@ fn human(report: &Report<'_>) -> String {
         ("mean rate (°/h)", summary.mean_rate_deg_per_h, 4),
         ("mean specific force (m/s²)", summary.mean_specific_force_m_per_s2, 6),
     ];
-    show::table(&rows) + &show::axes(&means) + &show::reading(report.log)
+    show::table(&rows) + &show::axes(&means) + &show::rows(report.log)
 }

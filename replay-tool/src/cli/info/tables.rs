@@ -21,17 +21,17 @@ pub(in crate::cli) fn of(info: &LogInfo) -> String {
     let mut text = String::new();
     files(&mut text, info);
     for (unit, of) in &info.units {
-        line(&mut text, format_args!("\nUnit {unit}"));
+        let _ = writeln!(text, "\nUnit {unit}");
         text += &topics(&of.topics);
         let begin_ns = of.topics.iter().filter_map(|topic| topic.first_ns).min().unwrap_or(0);
-        line(&mut text, format_args!("first tick {}", date(begin_ns)));
+        let _ = writeln!(text, "first tick {}", date(begin_ns));
         unit_details(&mut text, of, begin_ns);
     }
     if !info.other_topics.is_empty() {
-        line(&mut text, format_args!("\nOf no unit"));
+        let _ = writeln!(text, "\nOf no unit");
         text += &topics(&info.other_topics);
         if info.other_messages > 0 {
-            line(&mut text, format_args!("and {} messages of further topics", info.other_messages));
+            let _ = writeln!(text, "and {} messages of further topics", info.other_messages);
         }
     }
     text
@@ -39,61 +39,44 @@ pub(in crate::cli) fn of(info: &LogInfo) -> String {
 
 fn files(text: &mut String, info: &LogInfo) {
     for FileInfo { path, bytes, recording } in &info.files {
-        line(text, format_args!("{path}: {}", DecimalBytes(*bytes)));
+        let _ = writeln!(text, "{path}: {}", DecimalBytes(*bytes));
         let Some(layout) = recording else { continue };
         let end =
             if layout.complete { "whole" } else { "cut short: repair it with `isotherm-replay recover`" };
-        line(
+        let _ = writeln!(
             text,
-            format_args!(
-                "  {} chunks, {} of messages in {} ({}), {} attachments, {end}",
-                layout.chunks,
-                DecimalBytes(layout.uncompressed_bytes),
-                DecimalBytes(layout.stored_bytes),
-                layout.compression.join(", "),
-                layout.attachments
-            ),
+            "  {} chunks, {} of messages in {} ({}), {} attachments, {end}",
+            layout.chunks,
+            DecimalBytes(layout.uncompressed_bytes),
+            DecimalBytes(layout.stored_bytes),
+            layout.compression.join(", "),
+            layout.attachments
         );
     }
-    match &info.reading {
-        LogReport::Recording(report) => {
-            if let Some(words) = &report.cut_short {
-                line(text, format_args!("not read to the end: {words}"));
-            }
-            if report.foreign_messages > 0 {
-                line(text, format_args!("{} messages of something else skipped", report.foreign_messages));
-            }
-        }
-        LogReport::Text(report) => {
-            line(
-                text,
-                format_args!("{} rows read, {} dropped before them", report.rows, report.dropped_rows),
-            );
-            text.push_str(&show::reading(report));
-        }
+    if let LogReport::Text(report) = &info.reading {
+        let _ = writeln!(text, "{} rows read, {} dropped before them", report.rows, report.dropped_rows);
     }
+    text.push_str(&show::reading(&info.reading));
     if let (Some(first), Some(last)) = (info.first_received_ns, info.last_received_ns) {
-        line(
+        let _ = writeln!(
             text,
-            format_args!(
-                "received over {}, from {}",
-                seconds(last.saturating_sub(first)),
-                date(i64::try_from(first).unwrap_or(i64::MAX))
-            ),
+            "received over {}, from {}",
+            seconds(last.saturating_sub(first)),
+            date(i64::try_from(first).unwrap_or(i64::MAX))
         );
     }
     if !info.service_versions.is_empty() {
-        line(text, format_args!("service version {}", info.service_versions.join(", ")));
+        let _ = writeln!(text, "service version {}", info.service_versions.join(", "));
     }
     for metadata in &info.metadata {
-        line(text, format_args!("metadata {:?}:", metadata.name));
+        let _ = writeln!(text, "metadata {:?}:", metadata.name);
         for (name, value) in metadata.values.iter().take(LISTED * 2) {
-            line(text, format_args!("  {name} = {value}"));
+            let _ = writeln!(text, "  {name} = {value}");
         }
     }
     for attachment in info.attachments.iter().take(LISTED) {
         let (name, kind) = (&attachment.name, &attachment.media_type);
-        line(text, format_args!("attachment {name:?} ({kind}, {})", DecimalBytes(attachment.bytes)));
+        let _ = writeln!(text, "attachment {name:?} ({kind}, {})", DecimalBytes(attachment.bytes));
     }
     more(text, info.attachments.len());
 }
@@ -146,54 +129,48 @@ fn topic_details(text: &mut String, topic: &TopicInfo) {
     let (key, begin_ns) = (&topic.key, topic.first_ns.unwrap_or(0));
     if let Some(order) = &topic.order {
         if let Some(gap) = order.gaps.longest {
-            line(
+            let _ = writeln!(
                 text,
-                format_args!(
-                    "{key}: longest gap {} ticks from {} on, after {}",
-                    gap.ticks,
-                    gap.first_sequence,
-                    after(gap.after_ns, begin_ns)
-                ),
+                "{key}: longest gap {} ticks from {} on, after {}",
+                gap.ticks,
+                gap.first_sequence,
+                after(gap.after_ns, begin_ns)
             );
         }
         if order.restarts > 0 {
             let (restarts, series) = (order.restarts, order.series_changes);
-            line(text, format_args!("{key}: {restarts} restarts, {series} of them with a new series"));
+            let _ = writeln!(text, "{key}: {restarts} restarts, {series} of them with a new series");
         }
     }
     if topic.time_went_back > 0 {
-        line(text, format_args!("{key}: time did not advance {} times", topic.time_went_back));
+        let _ = writeln!(text, "{key}: time did not advance {} times", topic.time_went_back);
     }
     if let (Some(longest), Some(intervals)) = (topic.longest_interval, topic.intervals)
         && longest.ns > intervals.p50_ns.saturating_mul(3) / 2
     {
-        line(
+        let _ = writeln!(
             text,
-            format_args!(
-                "{key}: longest time between consecutive ticks {}, after {}",
-                seconds(longest.ns),
-                after(longest.after_ns, begin_ns)
-            ),
+            "{key}: longest time between consecutive ticks {}, after {}",
+            seconds(longest.ns),
+            after(longest.after_ns, begin_ns)
         );
     }
     if let Some(durations) = topic.tick_durations.filter(|durations| durations.min_ns != durations.max_ns) {
-        line(text, format_args!("{key}: tick durations p50/p99/max {} ms", spread(&durations)));
+        let _ = writeln!(text, "{key}: tick durations p50/p99/max {} ms", spread(&durations));
     }
     if let Some(drift) =
         topic.jitter.and_then(|jitter| jitter.clock_drift_ppm).filter(|drift| drift.abs() >= 1.0)
     {
         if drift.abs() < 10_000.0 {
-            line(text, format_args!("{key}: the recorder's clock gains {drift:.1} ppm on the producer's"));
+            let _ = writeln!(text, "{key}: the recorder's clock gains {drift:.1} ppm on the producer's");
         } else {
-            line(
-                text,
-                format_args!("{key}: played at {:.3} times its recorded speed", 1.0 / (1.0 + drift * 1e-6)),
-            );
+            let _ =
+                writeln!(text, "{key}: played at {:.3} times its recorded speed", 1.0 / (1.0 + drift * 1e-6));
         }
     }
     if topic.unreadable > 0 {
         let first = topic.first_unreadable.as_deref().unwrap_or_default();
-        line(text, format_args!("{key}: {} messages cannot be read; the first: {first}", topic.unreadable));
+        let _ = writeln!(text, "{key}: {} messages cannot be read; the first: {first}", topic.unreadable);
     }
 }
 
@@ -203,31 +180,27 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
         let between = modes.between_changes.map_or_else(String::new, |between| {
             format!(", {} from one to the next (median)", seconds(between.p50_ns))
         });
-        line(
+        let _ = writeln!(
             text,
-            format_args!(
-                "modes: {} ticks +1, {} ticks −1, {} switches, {} commanded{between}",
-                modes.plus_ticks, modes.minus_ticks, modes.changes, modes.switch_commands
-            ),
+            "modes: {} ticks +1, {} ticks −1, {} switches, {} commanded{between}",
+            modes.plus_ticks, modes.minus_ticks, modes.changes, modes.switch_commands
         );
     }
     if let Some(corrected) = &unit.corrected {
-        line(
+        let _ = writeln!(
             text,
-            format_args!(
-                "corrected: {} outputs of {} ticks, {} gaps announced with {} ticks, the longest {}",
-                corrected.outputs,
-                corrected.ticks,
-                corrected.gaps,
-                corrected.missed_ticks,
-                corrected.longest_gap_ticks
-            ),
+            "corrected: {} outputs of {} ticks, {} gaps announced with {} ticks, the longest {}",
+            corrected.outputs,
+            corrected.ticks,
+            corrected.gaps,
+            corrected.missed_ticks,
+            corrected.longest_gap_ticks
         );
         let flags: Vec<_> = corrected.flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
         let sensors: Vec<_> =
             corrected.sensor_flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
         if !flags.is_empty() || !sensors.is_empty() {
-            line(text, format_args!("flags: {}", [flags, sensors].concat().join(", ")));
+            let _ = writeln!(text, "flags: {}", [flags, sensors].concat().join(", "));
         }
         let angle = corrected.angle_sigma_rad.map(|sigma| {
             let rms = sigma.rms.map(|rms| Angle::from_rad(rms).as_arcsec());
@@ -237,35 +210,29 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
         for (of, sigma, unit) in angle.into_iter().chain(velocity) {
             let SigmaInfo { outputs, unknown, rms: [x, y, z] } = sigma;
             if outputs == 0 {
-                line(text, format_args!("σ of {of} increments: unknown in {unknown} outputs"));
+                let _ = writeln!(text, "σ of {of} increments: unknown in {unknown} outputs");
             } else {
-                line(
+                let _ = writeln!(
                     text,
-                    format_args!(
-                        "σ of {of} increments, rms: {x:.3e} {y:.3e} {z:.3e} {unit}, unknown in {unknown} outputs"
-                    ),
+                    "σ of {of} increments, rms: {x:.3e} {y:.3e} {z:.3e} {unit}, unknown in {unknown} outputs"
                 );
             }
         }
         for (channel, range) in &corrected.temperatures {
-            line(
+            let _ = writeln!(
                 text,
-                format_args!(
-                    "temperature applied {channel}: {:.3} to {:.3} °C, up to {:.4} °C/s",
-                    range.min_deg_c, range.max_deg_c, range.max_rate_deg_c_per_s
-                ),
+                "temperature applied {channel}: {:.3} to {:.3} °C, up to {:.4} °C/s",
+                range.min_deg_c, range.max_deg_c, range.max_rate_deg_c_per_s
             );
         }
         for first in corrected.revisions.iter().take(LISTED) {
-            line(
+            let _ = writeln!(
                 text,
-                format_args!(
-                    "calibration {} ({}): first tick {}, {}",
-                    first.revision.counter,
-                    hexadecimal(first.revision.digest),
-                    first.first_sequence,
-                    after(first.first_end_ns, begin_ns)
-                ),
+                "calibration {} ({}): first tick {}, {}",
+                first.revision.counter,
+                hexadecimal(first.revision.digest),
+                first.first_sequence,
+                after(first.first_end_ns, begin_ns)
             );
         }
         more(text, corrected.revisions.len());
@@ -280,19 +247,19 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
 
 fn journal_details(text: &mut String, journal: &JournalInfo) {
     let entries: Vec<_> = journal.entries.iter().map(|(name, count)| format!("{name} {count}")).collect();
-    line(text, format_args!("journal: {}", entries.join(", ")));
+    let _ = writeln!(text, "journal: {}", entries.join(", "));
     if journal.missing_entries > 0 || journal.broken_parts > 0 {
         let (missing, broken) = (journal.missing_entries, journal.broken_parts);
-        line(text, format_args!("journal: {missing} entries are missing, {broken} parts are incomplete"));
+        let _ = writeln!(text, "journal: {missing} entries are missing, {broken} parts are incomplete");
     }
     for swap in journal.swaps.iter().take(LISTED) {
         let (counter, digest) = (swap.revision.counter, hexadecimal(swap.revision.digest));
-        line(text, format_args!("given: calibration {counter} ({digest}), {}", swap.source));
+        let _ = writeln!(text, "given: calibration {counter} ({digest}), {}", swap.source);
     }
     more(text, journal.swaps.len());
     for command in journal.commands.iter().take(LISTED) {
         let verdict = if command.accepted { "" } else { "refused: " };
-        line(text, format_args!("command {}: {verdict}{}", command.command, command.words));
+        let _ = writeln!(text, "command {}: {verdict}{}", command.command, command.words);
     }
     more(text, journal.commands.len());
 }
@@ -301,7 +268,7 @@ fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
     for StateInfo { last_tick_ns, state, .. } in status.states.iter().take(LISTED) {
         let state = isotherm_correction::operation::State::from(*state);
         let when = last_tick_ns.map_or_else(|| "before the first tick".to_owned(), |ns| after(ns, begin_ns));
-        line(text, format_args!("state {state}: {when}"));
+        let _ = writeln!(text, "state {state}: {when}");
     }
     more(text, status.states.len());
 }
@@ -309,13 +276,8 @@ fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
 /// Says that a list is longer than what was printed.
 fn more(text: &mut String, length: usize) {
     if length > LISTED {
-        line(text, format_args!("  and {} more: --json lists them", length - LISTED));
+        let _ = writeln!(text, "  and {} more: --json lists them", length - LISTED);
     }
-}
-
-fn line(text: &mut String, words: std::fmt::Arguments<'_>) {
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "{words}");
 }
 
 fn dash() -> String {

@@ -2,14 +2,13 @@
 
 use super::{Report, show};
 use crate::play::{Acknowledge, PlayOptions, PlayReport, UnitReport};
-use isotherm_log::error::few;
-use isotherm_log::source::LogReport;
+use isotherm_document::few;
 
 /// What whoever reads only the table must know.
 pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
     let of = |chosen: fn(&UnitReport) -> bool| {
-        let units: Vec<_> = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).collect();
-        (!units.is_empty()).then(|| few(&units))
+        let mut units = play.units.iter().filter(|unit| chosen(unit)).map(|unit| &*unit.unit).peekable();
+        units.peek().is_some().then(|| few(units))
     };
     let uncalibrated =
         of(|unit| unit.returned.ticks_uncalibrated.is_some_and(|ticks| ticks > 0)).map(|units| {
@@ -57,7 +56,7 @@ pub(super) fn human(report: &Report<'_>, options: &PlayOptions) -> String {
             ),
         ]);
     }
-    show::table(&rows) + &units(play, options) + &reading(report.log)
+    show::table(&rows) + &units(play, options) + &show::reading(report.log)
 }
 
 /// One row per unit.
@@ -108,14 +107,4 @@ fn units(play: &PlayReport, options: &PlayOptions) -> String {
         row
     };
     show::grid(header, play.units.iter().map(row), 1..)
-}
-
-/// What reading the log came to, in words; empty where there is nothing to say.
-fn reading(log: &LogReport) -> String {
-    match log {
-        LogReport::Text(report) => show::reading(report),
-        LogReport::Recording(report) => {
-            report.cut_short.as_ref().map_or_else(String::new, |words| format!("{words}\n"))
-        }
-    }
 }

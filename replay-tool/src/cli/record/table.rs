@@ -91,15 +91,15 @@ pub(super) fn human(report: &RecordReport) -> String {
         ("lost", report.lost.to_string()),
         ("messages per second", format!("{rate:.1}")),
         ("written to files", size(float(report.file_bytes))),
-        ("attachments", report.attachments.to_string()),
-        ("journal entries", report.journal.entries.to_string()),
-        ("journal entries lost", report.journal.missing.to_string()),
+        ("attachments", report.done.attachments.to_string()),
+        ("journal entries", report.done.journal.entries.to_string()),
+        ("journal entries lost", report.done.journal.missing.to_string()),
     ];
-    if report.files_deleted > 0 {
-        rows.push(("older files deleted", report.files_deleted.to_string()));
+    if report.done.files_deleted > 0 {
+        rows.push(("older files deleted", report.done.files_deleted.to_string()));
     }
     let mut text = topics(&report.topics) + &show::table(&rows);
-    for path in &report.files {
+    for path in &report.done.files {
         text.push_str(&path.to_string_lossy());
         text.push('\n');
     }

@@ -9,6 +9,7 @@ use isotherm_protocol::history::{
 };
 use isotherm_protocol::key::UnitId;
 
+use super::Store;
 use crate::control::command::PRE_LAUNCH_ENDED;
 
 /// Most good sets of one unit that are kept in memory.
@@ -195,22 +196,6 @@ impl Index {
         self.units.is_empty() && self.files.is_empty()
     }
 
-    /// What an operator wants of a unit.
-    pub(super) fn intent(&self, unit: &UnitId) -> Option<&Intent> {
-        self.units.get(unit).map(|of_unit| &of_unit.intent)
-    }
-
-    /// The last command that a unit's stream took, as far as it stands in this audit file.
-    pub(super) fn command(&self, unit: &UnitId) -> Option<&TakenCommand> {
-        self.units.get(unit)?.command.as_ref()
-    }
-
-    /// The units that were ever given a calibration or a command.
-    pub(super) fn units(&self) -> impl Iterator<Item = &UnitId> {
-        let forgotten = |of_unit: &OfUnit| of_unit.sets.is_empty() && of_unit.intent.is_empty();
-        self.units.iter().filter(move |(_, of_unit)| !forgotten(of_unit)).map(|(unit, _)| unit)
-    }
-
     /// Documents and overlays of every revision that can be gone back to.
     pub(super) fn digests(&self) -> impl Iterator<Item = Digest> {
         let sets = self.units.values().flat_map(|of_unit| &of_unit.sets);
@@ -222,53 +207,9 @@ impl Index {
         self.units.get(unit).into_iter().flat_map(|of_unit| &of_unit.sets)
     }
 
-    /// Highest revision counter that a unit was given; 0 where none.
-    pub(super) fn highest_revision(&self, unit: &UnitId) -> u64 {
-        self.units.get(unit).map_or(0, |of_unit| of_unit.highest_revision).max(self.floor)
-    }
-
     /// Highest revision counter of all units.
     pub(super) fn highest(&self) -> u64 {
         self.units.values().map(|of_unit| of_unit.highest_revision).max().unwrap_or(0)
-    }
-
-    /// Digest last seen in a file of the watched folder.
-    pub(super) fn seen(&self, path: &str) -> Option<Digest> {
-        self.files.get(path).map(|seen| seen.digest)
-    }
-
-    /// Digest last refused in a file of the watched folder, where nothing else was seen in it since.
-    pub(super) fn refused(&self, path: &str) -> Option<Digest> {
-        self.files.get(path).filter(|seen| seen.refused).map(|seen| seen.digest)
-    }
-
-    /// Digest last refused in a file of the watched folder because of a rival.
-    pub(super) fn rival(&self, path: &str) -> Option<Digest> {
-        self.rivals.get(path).copied()
-    }
-
-    /// What the watched folder said for a unit last and was taken.
-    pub(super) fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
-        self.units.get(unit)?.folder
-    }
-
-    /// The set that a rollback goes to: the newest before the last one that corrects otherwise. Rollbacks are followed to
-    /// the revision that they went back to, so that a second one goes further back instead of forth again.
-    pub(super) fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
-        let last = self.sets(unit).next_back()?;
-        let mut from = last;
-        loop {
-            while let Source::Rollback { to } = from.source {
-                match self.sets(unit).rfind(|set| set.revision == to && to < from.revision) {
-                    Some(set) => from = set,
-                    None => break,
-                }
-            }
-            from = self.sets(unit).rfind(|set| set.revision < from.revision)?;
-            if !from.corrects_as(last) {
-                return Some(from);
-            }
-        }
     }
 
     /// Everything that a new file must begin with.
@@ -288,6 +229,95 @@ impl Index {
             (seen.unit.as_ref(), AuditEvent::CarriedFile(carried))
         });
         units.chain(files)
+    }
+}
+
+/// What holds by the entries so far.
+impl Store {
+    /// What an operator wants of a unit, by the commands that were carried out.
+    #[must_use]
+    pub fn intent(&self, unit: &UnitId) -> Option<&Intent> {
+        self.index.units.get(unit).map(|of_unit| &of_unit.intent)
+    }
+
+    /// Units that were ever given a calibration or a command.
+    pub fn units(&self) -> impl Iterator<Item = &UnitId> {
+        let forgotten = |of_unit: &OfUnit| of_unit.sets.is_empty() && of_unit.intent.is_empty();
+        self.index.units.iter().filter(move |(_, of_unit)| !forgotten(of_unit)).map(|(unit, _)| unit)
+    }
+
+    /// The calibration that was accepted last for a unit and not withdrawn: what a restart begins with. It may not have come
+    /// in force yet, see [`GoodSet::in_force`].
+    #[must_use]
+    pub fn last_good(&self, unit: &UnitId) -> Option<&GoodSet> {
+        self.index.sets(unit).next_back()
+    }
+
+    /// Good sets of a unit, the newest first: at most 1000, and the last eight at least.
+    pub fn good_sets(&self, unit: &UnitId) -> impl Iterator<Item = &GoodSet> {
+        self.index.sets(unit).rev()
+    }
+
+    /// The set that a rollback goes to: the newest before the last good one that corrects otherwise. Rollbacks are followed to
+    /// the revision that they went back to, so that a second one goes further back instead of forth again.
+    #[must_use]
+    pub fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
+        let last = self.last_good(unit)?;
+        let mut from = last;
+        loop {
+            while let Source::Rollback { to } = from.source {
+                match self.good_sets(unit).find(|set| set.revision == to && to < from.revision) {
+                    Some(set) => from = set,
+                    None => break,
+                }
+            }
+            from = self.good_sets(unit).find(|set| set.revision < from.revision)?;
+            if !from.corrects_as(last) {
+                return Some(from);
+            }
+        }
+    }
+
+    /// The last command that a unit's stream took, as far as it stands in this audit file.
+    pub(crate) fn last_command(&self, unit: &UnitId) -> Option<&TakenCommand> {
+        self.index.units.get(unit)?.command.as_ref()
+    }
+
+    /// The good set of a revision.
+    #[must_use]
+    pub fn by_revision(&self, unit: &UnitId, revision: u64) -> Option<&GoodSet> {
+        self.good_sets(unit).find(|set| set.revision == revision)
+    }
+
+    /// Highest revision counter that a unit was ever given, withdrawn ones included; 0 where none. The next one is one more.
+    #[must_use]
+    pub fn highest_revision(&self, unit: &UnitId) -> u64 {
+        self.index.units.get(unit).map_or(0, |of_unit| of_unit.highest_revision).max(self.index.floor)
+    }
+
+    /// Digest of what was last seen in a file of the watched folder, accepted or refused.
+    #[must_use]
+    pub fn seen_in_folder(&self, path: &str) -> Option<Digest> {
+        self.index.files.get(path).map(|seen| seen.digest)
+    }
+
+    /// Digest of what was last refused in a file of the watched folder, where nothing else was seen in it since.
+    #[must_use]
+    pub fn refused_in_folder(&self, path: &str) -> Option<Digest> {
+        self.index.files.get(path).filter(|seen| seen.refused).map(|seen| seen.digest)
+    }
+
+    /// Digest of what was last refused in a file of the watched folder because of another one that names its unit.
+    #[must_use]
+    pub fn rival_in_folder(&self, path: &str) -> Option<Digest> {
+        self.index.rivals.get(path).copied()
+    }
+
+    /// Digest of what the watched folder said for a unit last and was taken, under whatever name: the same again, under
+    /// whatever name, is no swap.
+    #[must_use]
+    pub fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
+        self.index.units.get(unit)?.folder
     }
 }
 

@@ -1,5 +1,4 @@
-//! What is read back: what holds by the entries so far, documents, the newest entries; and audit files line by line, whatever is
-//! in them.
+//! What is read back: documents, the newest entries; and audit files line by line, whatever is in them.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -7,10 +6,9 @@ use std::path::{Path, PathBuf};
 
 use isotherm_document::file::check_regular;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{AuditEntry, GoodSet, Intent, MAX_LINE_BYTES};
+use isotherm_protocol::history::{AuditEntry, MAX_LINE_BYTES};
 use isotherm_protocol::key::UnitId;
 
-use super::index::TakenCommand;
 use super::{Journal, Store, StoreError};
 
 impl Store {
@@ -28,78 +26,6 @@ impl Store {
     /// The same.
     pub fn overlay(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
         self.overlays.get(digest)
-    }
-
-    /// What an operator wants of a unit, by the commands that were carried out.
-    #[must_use]
-    pub fn intent(&self, unit: &UnitId) -> Option<&Intent> {
-        self.index.intent(unit)
-    }
-
-    /// Units that were ever given a calibration or a command.
-    pub fn units(&self) -> impl Iterator<Item = &UnitId> {
-        self.index.units()
-    }
-
-    /// The calibration that was accepted last for a unit and not withdrawn: what a restart begins with. It may not have come
-    /// in force yet, see [`GoodSet::in_force`].
-    #[must_use]
-    pub fn last_good(&self, unit: &UnitId) -> Option<&GoodSet> {
-        self.index.sets(unit).next_back()
-    }
-
-    /// Good sets of a unit, the newest first: at most 1000, and the last eight at least.
-    pub fn good_sets(&self, unit: &UnitId) -> impl Iterator<Item = &GoodSet> {
-        self.index.sets(unit).rev()
-    }
-
-    /// The set that a rollback goes to: the newest before the last good one that corrects otherwise. After a rollback it is
-    /// the one before that which was gone back to, so that a second rollback goes further back.
-    #[must_use]
-    pub fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
-        self.index.previous(unit)
-    }
-
-    /// The last command that a unit's stream took, as far as it stands in this audit file.
-    pub(crate) fn last_command(&self, unit: &UnitId) -> Option<&TakenCommand> {
-        self.index.command(unit)
-    }
-
-    /// The good set of a revision.
-    #[must_use]
-    pub fn by_revision(&self, unit: &UnitId, revision: u64) -> Option<&GoodSet> {
-        self.index.sets(unit).rfind(|set| set.revision == revision)
-    }
-
-    /// Highest revision counter that a unit was ever given, withdrawn ones included; 0 where none. The next one is one more.
-    #[must_use]
-    pub fn highest_revision(&self, unit: &UnitId) -> u64 {
-        self.index.highest_revision(unit)
-    }
-
-    /// Digest of what was last seen in a file of the watched folder, accepted or refused.
-    #[must_use]
-    pub fn seen_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.seen(path)
-    }
-
-    /// Digest of what was last refused in a file of the watched folder, where nothing else was seen in it since.
-    #[must_use]
-    pub fn refused_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.refused(path)
-    }
-
-    /// Digest of what was last refused in a file of the watched folder because of another one that names its unit.
-    #[must_use]
-    pub fn rival_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.rival(path)
-    }
-
-    /// Digest of what the watched folder said for a unit last and was taken, under whatever name: the same again, under
-    /// whatever name, is no swap.
-    #[must_use]
-    pub fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
-        self.index.said_by_folder(unit)
     }
 
     /// The file that a document is kept in; `None` where there is no state folder.

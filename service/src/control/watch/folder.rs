@@ -8,20 +8,19 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 use sha2::{Digest, Sha256};
 
-/// The `*.toml` of a folder in the order of their names, hidden files and sub-folders excepted.
+/// The files of a folder with an extension, in the order of their names, hidden files and sub-folders excepted.
 ///
-/// What cannot be read counts too, such as a pipe, or a link that leads nowhere: an operator who put it there is told. So
-/// they are to be read with [`read_document`] only.
+/// What cannot be read counts too, such as a pipe, or a link that leads nowhere: an operator who put it there is told.
 ///
 /// # Errors
 /// Where the folder cannot be read.
-pub(crate) fn documents_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+pub(crate) fn files_in(folder: &Path, extension: &str) -> std::io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
-        let document = !hidden && path.extension().is_some_and(|extension| extension == "toml");
-        if document && path.metadata().map_or(true, |metadata| !metadata.is_dir()) {
+        let wanted = !hidden && path.extension().is_some_and(|other| other == extension);
+        if wanted && path.metadata().map_or(true, |metadata| !metadata.is_dir()) {
             files.push(path);
         }
     }

@@ -60,8 +60,7 @@ impl FileStates {
                 (file, Entry { sight: Sight::Absent, told: entry(known), unrest })
             })
             .collect();
-        let grace = settings.grace.unwrap_or(settings.settle * 2);
-        Self { settle: settings.settle, grace, entries, compared: None }
+        Self { settle: settings.settle, grace: settings.grace(), entries, compared: None }
     }
 
     /// The files of which something is known.

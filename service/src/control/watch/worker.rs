@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::events::FsEvents;
-use super::folder::{self, Content, Sight, documents_in};
+use super::folder::{self, Content, Sight, files_in};
 use super::signals::Signals;
 use super::states::FileStates;
 use super::{FolderEvent, WatchSettings};
@@ -97,14 +97,10 @@ impl<S: Fn(FolderEvent)> Worker<S> {
     fn next_look(&self) -> Instant {
         let own = match &self.outage {
             None => self.states.next_due(),
-            Some(Outage { since, told: None }) => Some(*since + self.grace()),
+            Some(Outage { since, told: None }) => Some(*since + self.settings.grace()),
             Some(Outage { told: Some(_), .. }) => Some(self.last_look + AWAY),
         };
         [own, self.asked].into_iter().flatten().fold(self.next_poll, Instant::min)
-    }
-
-    fn grace(&self) -> Duration {
-        self.settings.grace.unwrap_or(self.settings.settle * 2)
     }
 
     fn look(&mut self) {
@@ -118,7 +114,7 @@ impl<S: Fn(FolderEvent)> Worker<S> {
         }
         self.tell_ears();
         self.asked = None;
-        match documents_in(&self.folder) {
+        match files_in(&self.folder, "toml") {
             Ok(files) => {
                 self.back();
                 self.see(now, files);
@@ -149,7 +145,7 @@ impl<S: Fn(FolderEvent)> Worker<S> {
 
     /// The folder cannot be read.
     fn away(&mut self, now: Instant, reason: String) {
-        let grace = self.grace();
+        let grace = self.settings.grace();
         let outage = self.outage.get_or_insert(Outage { since: now, told: None });
         if now >= outage.since + grace && outage.told.as_ref() != Some(&reason) {
             outage.told = Some(reason.clone());

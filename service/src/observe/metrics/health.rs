@@ -5,8 +5,6 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::state_folder::StateFolder;
-
 /// Longest time that a unit may give nothing out while raw ticks come, what it holds back on purpose left out.
 const LONGEST_STALL: Duration = Duration::from_secs(10);
 /// How long after an alarm the service does not count as healthy.
@@ -87,7 +85,6 @@ pub(super) struct Watch {
     stall: Duration,
     alarm: Duration,
     units: BTreeMap<String, Progress>,
-    pub(super) state_folder: StateFolder,
 }
 
 impl Default for Watch {
@@ -98,7 +95,7 @@ impl Default for Watch {
 
 impl Watch {
     pub(super) fn new(stall: Duration, alarm: Duration) -> Self {
-        Self { stall, alarm, units: BTreeMap::new(), state_folder: StateFolder::default() }
+        Self { stall, alarm, units: BTreeMap::new() }
     }
 
     /// Forgets the units that are not there any more, or not watched.

@@ -1,7 +1,6 @@
 //! What is looked at: one look at every unit, and at what the service knows of itself.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -12,7 +11,7 @@ use serde::Serialize;
 
 use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
-use crate::control::{ControlStatus, Posted, UNWRITTEN};
+use crate::control::{ControlStatus, Posted, STATE_FOLDER, UNWRITTEN};
 use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
@@ -28,7 +27,6 @@ pub(crate) struct Source {
     control_status: Arc<ControlStatus>,
     instance: String,
     started: Instant,
-    state_folder: Option<PathBuf>,
     held_back: HeldBack,
     pulse: Option<Arc<Pulse>>,
     subscribers: Arc<Subscribers>,
@@ -53,8 +51,6 @@ pub(super) struct Look {
     pub(super) late_receipts: u64,
     /// What the swap manager has posted.
     pub(super) posted: Arc<Posted>,
-    /// Whether the state folder can be written; `None` where none is configured.
-    pub(super) state_folder_writable: Option<bool>,
     /// The units, in the order of their serials.
     pub(super) units: Vec<UnitLook>,
 }
@@ -101,7 +97,6 @@ impl Look {
             log_lines_dropped: dropped_lines(),
             late_receipts: 0,
             posted: Arc::default(),
-            state_folder_writable: None,
             units: Vec::new(),
         }
     }
@@ -154,7 +149,6 @@ impl Source {
             control_status,
             instance,
             started: Instant::now(),
-            state_folder: settings.state.clone(),
             held_back: HeldBack {
                 ticks: settings.unit.navigation.ticks().into(),
                 window: Duration::from_nanos(window),
@@ -164,14 +158,9 @@ impl Source {
         }
     }
 
-    /// The same, of a service whose receive path is felt.
-    pub(crate) fn feeling(self, pulse: Arc<Pulse>) -> Self {
-        Self { pulse: Some(pulse), ..self }
-    }
-
-    /// The same, of a service that asks for receipts.
-    pub(crate) fn asking(self, subscribers: Arc<Subscribers>) -> Self {
-        Self { subscribers, ..self }
+    /// The same, of a service whose receive path is felt, and that asks for receipts.
+    pub(crate) fn at_work(self, pulse: Arc<Pulse>, subscribers: Arc<Subscribers>) -> Self {
+        Self { pulse: Some(pulse), subscribers, ..self }
     }
 
     /// Whether the receive path is alive, as far as it is felt.
@@ -213,7 +202,6 @@ impl Source {
             log_lines_dropped: dropped_lines(),
             late_receipts: self.subscribers.late_receipts(),
             posted: self.control_status.read(),
-            state_folder_writable: self.state_folder(now, watch).map(|tried| tried.is_ok()),
             units,
         }
     }
@@ -230,25 +218,12 @@ impl Source {
     fn reasons(&self, now: Instant, watch: &mut Watch, stopping: bool) -> Vec<Reason> {
         let of_service = |kind, words: &str| Reason { kind, unit: None, words: words.to_owned() };
         let stopping = stopping.then(|| of_service(Kind::Stopping, STOPPING));
-        let state_folder = self.state_folder(now, watch).and_then(Result::err);
         let posted = self.control_status.read();
-        let unwritten = posted.problems.iter().find(|problem| problem.kind == UNWRITTEN);
-        let unwritten = unwritten.map(|problem| of_service(Kind::UnwrittenDocument, &problem.words));
-        let of_units = watch.reasons(now, self.held_back);
-        [stopping, state_folder, unwritten].into_iter().flatten().chain(of_units).collect()
-    }
-
-    /// Whether the state folder can be written; `None` where none is configured.
-    fn state_folder(&self, now: Instant, watch: &mut Watch) -> Option<Result<(), Reason>> {
-        let folder = self.state_folder.as_deref()?;
-        let reason = |error| {
-            let words = format!(
-                "the state folder {} cannot be written: {error}; until then every swap is refused",
-                folder.display()
-            );
-            Reason { kind: Kind::StateFolder, unit: None, words }
-        };
-        Some(watch.state_folder.is_writable(now, folder).map_err(reason))
+        let standing = [(STATE_FOLDER, Kind::StateFolder), (UNWRITTEN, Kind::UnwrittenDocument)];
+        let standing = standing
+            .into_iter()
+            .filter_map(|(told, kind)| Some(of_service(kind, &posted.standing(told)?.words)));
+        stopping.into_iter().chain(standing).chain(watch.reasons(now, self.held_back)).collect()
     }
 }
 

@@ -4,10 +4,10 @@ use isotherm_protocol::journal::split;
 use isotherm_protocol::{codec, key};
 use zenoh::Wait;
 use zenoh::bytes::ZBytes;
-use zenoh::key_expr::keyexpr;
 use zenoh::query::Query;
 
 use super::{Asked, Look, Work};
+use crate::control::is_asked;
 
 impl Work {
     /// Replies with everything that the query's key takes in, of what is asked for.
@@ -17,14 +17,14 @@ impl Work {
             Asked::Memory => self.answer_memory(query),
             Asked::Pair => {
                 let key = key::pair(self.instance.name());
-                if takes_in(query, &key) {
+                if is_asked(query, &key) {
                     let report = serde_json::to_vec(&self.pair.report(&self.intake));
                     reply(query, &key, report.map_err(Into::into));
                 }
             }
             Asked::Configuration => {
                 let key = key::configuration(self.instance.name());
-                if takes_in(query, &key) {
+                if is_asked(query, &key) {
                     reply(query, &key, Ok(self.configuration.clone()));
                 }
             }
@@ -36,11 +36,11 @@ impl Work {
         let instance = self.instance.name();
         let statuses = self.intake.each_unit(|actor| {
             let key = key::status(actor.id());
-            (actor.speaks() && takes_in(query, &key)).then(|| (key, codec::encode(&actor.status(instance))))
+            (actor.speaks() && is_asked(query, &key)).then(|| (key, codec::encode(&actor.status(instance))))
         });
         let mut replies: Vec<_> = statuses.into_iter().flatten().collect();
         let key = key::service_status(instance);
-        if takes_in(query, &key)
+        if is_asked(query, &key)
             && let Some(status) = self.instance.status(&self.intake, Look::Always)
         {
             replies.push((key, codec::encode(&status)));
@@ -55,7 +55,7 @@ impl Work {
         let instance = self.instance.name();
         let units = self.intake.each_unit(|actor| {
             let unit = actor.id();
-            (actor.speaks() && takes_in(query, &key::journal(unit))).then(|| unit.clone())
+            (actor.speaks() && is_asked(query, &key::journal(unit))).then(|| unit.clone())
         });
         for unit in units.into_iter().flatten() {
             // A unit that has just started anew is asked once more by whoever misses its answer.
@@ -66,11 +66,6 @@ impl Work {
             }
         }
     }
-}
-
-/// Whether a query asks for a key too.
-fn takes_in(query: &Query, key: &str) -> bool {
-    keyexpr::new(key).is_ok_and(|key| query.key_expr().intersects(key))
 }
 
 fn reply(query: &Query, key: &str, payload: Result<impl Into<ZBytes>, zenoh::Error>) {

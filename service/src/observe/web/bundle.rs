@@ -72,10 +72,7 @@ impl Web {
         let (services, gone) = fleet.services();
         let mut units = worst_first(self.seen(&fleet, Instant::now(), unix_ms()));
         units.retain(|it| unit.is_none_or(|unit| unit == it.status.unit));
-        let mut lines = page::services(&services, &gone, COLUMNS);
-        lines.extend(page::pairs(&fleet.pairs, COLUMNS));
-        lines.push(page::tally(&units, COLUMNS));
-        lines.extend(page::units(&units, COLUMNS).lines());
+        let lines = page::overview((&services, &gone), &fleet.pairs, &units, COLUMNS);
         let units = units.iter().map(|it| it.status.clone()).collect();
         (tone::text(&lines, false), Report { services, units, instances: fleet.pairs.clone() })
     }

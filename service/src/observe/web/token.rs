@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Exit, failed, print, say};
+use isotherm_cli::{Exit, print, say};
 use isotherm_protocol::digest::Digest;
 
 use crate::ServiceError;
@@ -57,23 +57,12 @@ pub fn show(args: &WebArgs) -> Exit {
             };
             print(&(text + "\n"), Exit::Ok)
         }
-        Err(error) => {
-            if let ServiceError::Configuration(problems) = &error {
-                problems.iter().for_each(say);
-            }
-            failed(&error, error.exit())
-        }
+        Err(error) => error.tell(),
     }
 }
 
 fn address(args: &WebArgs) -> Result<(String, String), ServiceError> {
-    let mut settings = args.config.as_deref().map_or_else(|| Ok(Settings::default()), Settings::load)?;
-    if args.state.is_some() {
-        settings.state.clone_from(&args.state);
-    }
-    if args.metrics.is_some() {
-        settings.metrics.listen = args.metrics;
-    }
+    let mut settings = Settings::given(args.config.as_deref(), None, args.state.as_ref(), args.metrics)?;
     settings.web.enabled = true;
     settings.listen_for_web();
     let Some(file) = file(&settings) else {

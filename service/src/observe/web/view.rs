@@ -11,7 +11,8 @@ use serde::{Serialize, Serializer};
 
 use super::Web;
 use isotherm_operator::page::{
-    Lately, Level, Unit, applied, channel_in_view, is_running, knows_rates, range, said_of_pairs, state_word,
+    Lately, Level, Remark, Unit, applied, channel_in_view, is_running, knows_rates, range, said_of_pairs,
+    state_word,
 };
 use isotherm_operator::status::unix_ms;
 use isotherm_operator::{Fleet, worst_first};
@@ -125,20 +126,13 @@ struct Instance<'f> {
     /// Whether it is this service.
     own: bool,
     level: Level,
-    remarks: Vec<Said>,
+    remarks: Vec<Remark>,
     /// How long nobody has answered for it (s).
     gone_s: Option<u64>,
     /// Commands that its state takes now, by name.
     allowed: &'static [&'static str],
     status: &'f Status,
     past: Vec<Past<'f>>,
-}
-
-/// Something to be noticed.
-#[derive(Debug, Serialize)]
-struct Said {
-    level: Level,
-    words: String,
 }
 
 /// A line in columns.
@@ -229,11 +223,10 @@ impl Web {
             let age_s = now.saturating_duration_since(of.at).as_secs_f64();
             Past { age_s, of }
         });
-        let said = unit.remarks().into_iter().map(|it| Said { level: it.level, words: it.words });
         Instance {
             own: unit.status.instance == self.instance,
             level: unit.level(),
-            remarks: said.collect(),
+            remarks: unit.remarks(),
             gone_s: unit.gone.map(|gone| gone.as_secs()),
             allowed: operation::State::from(unit.status.state).allowed(),
             past: past.collect(),

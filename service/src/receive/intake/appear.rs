@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use isotherm_document::few;
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
@@ -10,7 +11,6 @@ use isotherm_protocol::status::{Fault, Output};
 
 use super::units::{Unit, Units};
 use super::{Intake, lock, read};
-use crate::control::first_of;
 use crate::receive::fault::{FaultKind, standing};
 use crate::receive::unit::{Footing, Outlet, StreamTimeoutSettings, UnitActor};
 
@@ -118,7 +118,10 @@ impl Intake {
         let (units, calibrations) = (read(&self.units), read(&self.calibrations));
         let awaited: Vec<_> = units.awaited(&calibrations).collect();
         (!awaited.is_empty()).then(|| {
-            let words = format!("calibrated, nothing received yet: {}", first_of(awaited.iter().copied()));
+            let words = format!(
+                "calibrated, nothing received yet: {}",
+                few(awaited.iter().map(|unit| unit.as_str()))
+            );
             standing("awaited_units", awaited.len() as u64, words)
         })
     }

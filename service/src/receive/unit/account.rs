@@ -22,6 +22,11 @@ pub(crate) struct SwapAccount {
     pub(crate) problem: Option<String>,
 }
 
+/// What a counter has counted; 0 where it is not there.
+pub(super) fn value_of(counters: &[Counter], name: &str) -> u64 {
+    counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value)
+}
+
 impl UnitActor {
     /// Enters what the swap manager has to say of the unit's swaps.
     pub(crate) fn tell_swaps(&mut self, account: SwapAccount) {
@@ -52,8 +57,7 @@ impl UnitActor {
 
     /// Reports ticks that the calibration in force cannot take.
     fn look_for_unfit(&mut self, counters: &[Counter]) {
-        let value = |name| counters.iter().find(|counter| counter.name == name).map_or(0, |it| it.value);
-        let values = unfit::COUNTERS.map(value);
+        let values = unfit::COUNTERS.map(|name| value_of(counters, name));
         let more = values.iter().sum::<u64>().saturating_sub(self.faults.count(FaultKind::Unfit));
         let Some((calibration, _)) = self.stream.unit().calibration().filter(|_| more > 0) else { return };
         let named = unfit::COUNTERS.into_iter().zip(values).find(|(_, value)| *value > 0);
@@ -120,9 +124,7 @@ impl UnitActor {
     #[must_use]
     pub fn totals(&self) -> UnitTotals {
         let counters = self.counters();
-        let value = |name: &str| {
-            counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value)
-        };
+        let value = |name| value_of(&counters, name);
         UnitTotals {
             ticks_in: value("gyro_ticks_in"),
             ticks_out: value("ticks_out"),

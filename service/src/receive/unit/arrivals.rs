@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use isotherm_protocol::key::{Input, RawStream};
 use isotherm_protocol::status::{Counter, InputRates};
 
+use super::account::value_of;
+
 /// Distance of messages that is assumed before two have been heard.
 const ASSUMED_INTERVAL: Duration = Duration::from_millis(250);
 /// A stream is stopped after this many times its usual distance of messages.
@@ -114,9 +116,7 @@ impl Arrivals {
     /// input of twice the rate and is none.
     #[expect(clippy::cast_precision_loss, reason = "fewer than 2⁵³ messages")]
     pub(super) fn look(&mut self, now: Instant, counters: &[Counter]) -> Option<String> {
-        let value = |name: &str| {
-            counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value)
-        };
+        let value = |name| value_of(counters, name);
         let [gyro, accel, temperature] = COUNTERS.map(value);
         let counts = [gyro, accel, temperature, self.messages];
         let (then, before) = std::mem::replace(&mut self.looked, (now, counts));

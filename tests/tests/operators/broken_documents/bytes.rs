@@ -43,8 +43,15 @@ pub(super) fn cases() -> Vec<Case> {
         Case::new("too long by one byte", vec![b'\n'; (1 << 20) + 1], 1, "", "is longer than 1048576 bytes"),
         Case::new("too deep", nested.clone(), line_of(&nested, "a = ["), "", "TOML: "),
         Case::new("half written", half, half.lines().count(), "", "TOML: "),
-        Case::new("JSON", "{\n  \"schema\": 1\n}\n", 1, "", "TOML: "),
-        Case::new("a login page", "<!doctype html>\n<title>Sign in</title>\n", 1, "", "TOML: "),
+        Case::new("JSON", "{\n  \"schema\": 1\n}\n", 1, "", "is no TOML: it looks like JSON"),
+        Case::new("a login page", "<!doctype html>\n<title>Sign in</title>\n", 1, "", "looks like HTML"),
+        Case::new(
+            "a text log",
+            "sequence,x\n".to_owned() + &"1,2\n".repeat(999),
+            1,
+            "",
+            "looks like a text log",
+        ),
         Case::new("an open conflict", conflict.clone(), line_of(&conflict, "<<<<<<<"), "", "TOML: "),
         Case::new(
             "a line of another file",

@@ -4,7 +4,7 @@ use crate::control::watch::folder::look;
 const MS: Duration = Duration::from_millis(1);
 
 fn settings() -> WatchSettings {
-    WatchSettings { settle: MS * 100, grace: Some(MS * 200), ..WatchSettings::default() }
+    WatchSettings { settle: MS * 100, ..WatchSettings::default() }
 }
 
 /// What a look at a file of this length sees.

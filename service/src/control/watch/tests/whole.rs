@@ -165,8 +165,8 @@ fn the_files_that_count_are_listed_by_name() {
     ] {
         symlink(target, path(name)).unwrap();
     }
-    let listed = documents_in(temporary.path()).unwrap();
+    let listed = files_in(temporary.path(), "toml").unwrap();
     assert_eq!(listed, ["a.toml", "b.toml", "h.toml", "i.toml", "j.toml", "k.toml"].map(path));
-    let nowhere = documents_in(&path("nowhere"));
+    let nowhere = files_in(&path("nowhere"), "toml");
     assert!(nowhere.is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound));
 }

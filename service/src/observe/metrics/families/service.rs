@@ -3,6 +3,7 @@
 use isotherm_protocol::service_status::FolderState;
 
 use super::{Family, Sample, Source, Type, Value, each, families, known, one};
+use crate::control::STATE_FOLDER;
 use crate::observe::metrics::source::Look;
 use crate::receive::fault::FaultKind;
 
@@ -32,7 +33,7 @@ families! { Service "isotherm_":
     Gauge "bad_documents" "" [] "Refused documents of that folder, at most 64"
         |look| one(look.posted.bad_documents.len() as u64);
     Gauge "state_folder_writable" "" [] "1 if the state folder can be written, 0 if every swap is refused; absent without one"
-        |look| known(look.state_folder_writable);
+        |look| known(look.posted.store.as_ref().map(|_| look.posted.standing(STATE_FOLDER).is_none()));
     Gauge "audit_entries" "" [] "Number of the last entry of the audit file; absent without a state folder"
         |look| known(look.posted.store.as_ref().map(|store| store.audit_entries));
 }
