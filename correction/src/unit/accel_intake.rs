@@ -5,14 +5,12 @@ use alloc::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::counters::Counters;
-use super::gyro_intake::{MAX_TICK_DURATION, is_possible};
+use super::gyro_intake::{LONGEST_KEPT, MAX_TICK_DURATION, is_possible};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
 use crate::units::Timestamp;
 
 /// Most accelerometer ticks that wait.
 const MAX_PENDING: usize = 8192;
-/// Longest queue whose room is kept once it is empty, in ticks: what a burst has needed beyond it goes.
-const LONGEST_KEPT: usize = 256;
 
 /// A tick that waits for its gyro tick, or has met it.
 #[derive(Debug, Serialize, Deserialize)]

@@ -14,9 +14,8 @@ use crate::units::{Span, Timestamp};
 
 /// Most gyro ticks that wait for an accelerometer tick or a missing neighbour.
 const MAX_PENDING: usize = 8192;
-/// So many batches in a row that nothing waited behind give the room back which ticks have waited in: most units need it for their
-/// first batch alone.
-const ROOM_KEPT: u16 = 256;
+/// Longest queue whose room is kept once it is empty, in ticks: what a burst has needed beyond it goes.
+pub(super) const LONGEST_KEPT: usize = 256;
 /// Longest tick (10 s).
 pub const MAX_TICK_DURATION: Span = Span::from_ns(10_000_000_000);
 /// A step of time larger than this, and than twice the ticks it claims to span, is not believed at once (1 h).
@@ -98,9 +97,9 @@ struct Newest {
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct GyroIntake {
     pending: VecDeque<Pending>,
-    /// Batches in a row that nothing waited behind: no memory, only a reason to give room back.
+    /// The first batch, which waits out its window, has left, and the room it took is given back: most units need none again.
     #[serde(skip)]
-    unused: u16,
+    began: bool,
     /// Ticks admitted from the present batch.
     batch: usize,
     /// Ticks among the pending ones at which a restart was followed.
@@ -208,16 +207,13 @@ impl GyroIntake {
     pub(super) fn end_batch(&mut self) {
         if !self.pending.is_empty() {
             self.end_waiting_batch();
-        } else if self.pending.capacity() > 0 {
-            self.unused += 1;
-            if self.unused >= ROOM_KEPT {
-                (self.pending, self.unused) = (VecDeque::new(), 0);
-            }
+        } else if !self.began || self.pending.capacity() > LONGEST_KEPT {
+            self.pending = VecDeque::new();
+            self.began = true;
         }
     }
 
     fn end_waiting_batch(&mut self) {
-        self.unused = 0;
         let mut end = None;
         for pending in self.pending.iter_mut().rev() {
             if self.batch == 0 {
