@@ -149,7 +149,7 @@ impl Run {
     /// Its readings as columns.
     ///
     /// # Errors
-    /// [`Error::Log`]; as [`Series::take`]; [`Error::Refused`] where it has no ticks, or ticks too long to be corrected.
+    /// [`Error::Log`]; [`Error::Refused`] where it has no ticks, ticks too long to be corrected, or ticks of two instruments.
     pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
         self.walk(watch, |fed| series.take(&fed))?;
