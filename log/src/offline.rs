@@ -145,7 +145,7 @@ impl Offline {
     /// Takes the corrected ticks that are ready, as rows or frames.
     pub fn give_out(&mut self, form: Form) -> Output {
         let mut output = Output::default();
-        output.give_out(&mut self.stream, form);
+        output.give_out(&mut self.stream, form, &mut Vec::new());
         output
     }
 

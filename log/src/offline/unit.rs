@@ -75,13 +75,12 @@ pub struct Output {
 }
 
 impl Output {
-    /// Takes what is ready, as rows or frames.
-    pub(super) fn give_out(&mut self, stream: &mut UnitStream, form: Form) {
+    /// Takes what is ready, as rows or frames; `frame` is a place to make them in.
+    pub(super) fn give_out(&mut self, stream: &mut UnitStream, form: Form, frame: &mut Vec<u8>) {
         // Writing to a vector does not fail.
         if form == Form::Wire {
-            let mut frame = Vec::new();
-            while stream.next_frame(&mut frame).is_some() {
-                let _ = write_frame(&mut self.bytes, &frame);
+            while stream.next_frame(frame).is_some() {
+                let _ = write_frame(&mut self.bytes, frame);
             }
         } else if form == Form::Csv {
             let mut ticks = stream.ready().ticks().iter();
@@ -247,7 +246,7 @@ impl Taker {
             self.output.ticks += u64::from(tick.ticks);
         }
         if self.form != Form::Messages {
-            self.output.give_out(stream, self.form);
+            self.output.give_out(stream, self.form, &mut self.frame);
             return;
         }
         while stream.next_frame(&mut self.frame).is_some() {

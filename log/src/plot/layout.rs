@@ -11,8 +11,7 @@ use super::reading::UnitLogs;
 use super::track::{Finished, Overall, Track};
 use super::unit::{ACCEL_FLAGS, GYRO_FLAGS, MODE_MINUS, MODE_PLUS, RawTrack, SWITCH, Since, UnitPlot};
 use super::{AXES, PlotSummary};
-use crate::date::date;
-use crate::date::seconds;
+use crate::date::{date, seconds};
 use isotherm_pages::{Axis, Chart, Content, Form, Ink, Lane, Mark, Page, Panel, Series, Stretch, Table};
 use words::{duration, figure, remarks, results};
 

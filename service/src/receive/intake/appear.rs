@@ -116,12 +116,9 @@ impl Intake {
     pub(crate) fn awaited(&self) -> Option<Fault> {
         // The units first, as everywhere: what is locked in one order locks nobody out.
         let (units, calibrations) = (read(&self.units), read(&self.calibrations));
-        let awaited: Vec<_> = units.awaited(&calibrations).collect();
+        let awaited: Vec<_> = units.awaited(&calibrations).map(UnitId::as_str).collect();
         (!awaited.is_empty()).then(|| {
-            let words = format!(
-                "calibrated, nothing received yet: {}",
-                few(awaited.iter().map(|unit| unit.as_str()))
-            );
+            let words = format!("calibrated, nothing received yet: {}", few(&awaited));
             standing("awaited_units", awaited.len() as u64, words)
         })
     }
