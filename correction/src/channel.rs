@@ -272,8 +272,9 @@ impl ChannelMemory {
         if !(low..=high).contains(&temperature) {
             return false;
         }
-        let spike =
-            self.median().is_some_and(|median| (temperature - median).abs() > channel.0.spike_limit_deg_c);
+        let is_far = |other: f64| (temperature - other).abs() > channel.0.spike_limit_deg_c;
+        // The median is one of them: it is sought where not all are near.
+        let spike = self.recent.iter().copied().any(is_far) && self.median().is_some_and(is_far);
         if self.recent.len() == MEDIAN_READINGS {
             self.recent.pop_front();
         }
