@@ -25,3 +25,4 @@ pub mod script;
 pub mod simulated;
 pub mod slope;
 pub mod streams;
+pub mod yardstick;

@@ -22,7 +22,7 @@ use zenoh::Session;
 
 use crate::documents::{base, valid};
 
-const TICK: Duration = Duration::from_millis(5);
+pub(super) const TICK: Duration = Duration::from_millis(5);
 /// How far ahead a swap is scheduled, in ticks: both services have heard of it by then.
 const AHEAD: u64 = 200;
 /// How long an instance of the pair may be silent before others give the connection up.
