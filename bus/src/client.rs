@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use isotherm_document::{Form, Reader, element, utf8};
+use isotherm_document::{Form, Reader, element, file::text};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use zenoh::{Config, Session};
@@ -343,7 +343,7 @@ fn read_user_file(path: &Path) -> Result<UserKeys, BusError> {
         }
         Err(error) => return Err(BusError::UserFile(vec![format!("{file}: cannot be read: {error}")])),
     };
-    let text = utf8(&bytes, Some(&file)).map_err(|problems| bad(&problems))?;
+    let text = text(&bytes, Some(&file)).map_err(|problems| bad(&problems))?;
     let mut reader = Reader::new(text, Some(&file));
     let mut keys: Option<UserKeys> = reader.read(&FORM);
     for (index, text) in keys.iter_mut().flat_map(|keys| &mut keys.connect).enumerate() {

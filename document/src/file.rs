@@ -4,8 +4,8 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::looks::doubt;
-use crate::problem::Problem;
-use crate::text::{MAX_BYTES, unplaced, utf8};
+use crate::problem::{Lines, Problem};
+use crate::text::{MAX_BYTES, unplaced};
 
 /// Reads a file up to one byte more than a text may have, so that a wrong file cannot fill the memory.
 ///
@@ -30,16 +30,23 @@ pub fn check_regular(file: &Path) -> std::io::Result<()> {
     }
 }
 
-/// What was read by [`read_bounded`], as text.
+/// Bytes as text, as they were read by [`read_bounded`] or came over the bus.
 ///
 /// # Errors
-/// The one problem of a file that is too long, or not UTF-8.
-pub fn text<'b>(bytes: &'b [u8], file: &str) -> Result<&'b str, Vec<Problem>> {
+/// The one problem of what is too long, or not UTF-8: the place of the first bytes that are not.
+pub fn text<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Problem>> {
     if bytes.len() > MAX_BYTES {
         let message = format!("is longer than {MAX_BYTES} bytes: {}", doubt(bytes));
-        return Err(vec![unplaced(Some(file), message)]);
+        return Err(vec![unplaced(file, message)]);
     }
-    utf8(bytes, Some(file))
+    std::str::from_utf8(bytes).map_err(|error| {
+        let valid = error.valid_up_to();
+        let before =
+            bytes.get(..valid).and_then(|before| std::str::from_utf8(before).ok()).unwrap_or_default();
+        let (line, column) = Lines::new(before).position(valid);
+        let message = format!("is not UTF-8 at byte {valid}: {}", doubt(bytes));
+        vec![Problem { line, column, ..unplaced(file, message) }]
+    })
 }
 
 #[cfg(test)]
@@ -48,8 +55,8 @@ mod tests {
 
     #[test]
     fn what_is_no_text_has_one_problem() {
-        let words = |bytes: &[u8]| text(bytes, "f").unwrap_err()[0].to_string();
-        assert_eq!(text("°".as_bytes(), "f"), Ok("°"));
+        let words = |bytes: &[u8]| text(bytes, Some("f")).unwrap_err()[0].to_string();
+        assert_eq!(text("°".as_bytes(), Some("f")), Ok("°"));
         assert!(words(b"a = 1\n\xff").starts_with("f:2:1: is not UTF-8 at byte 6"));
         assert!(words(&vec![b'#'; MAX_BYTES + 1]).contains("is longer than 1048576 bytes"));
         assert!(

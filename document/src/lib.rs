@@ -53,5 +53,5 @@ mod walk;
 pub use problem::{Problem, few, listed};
 pub use reader::{Reader, element, join, parse};
 pub use schema::{Form, published};
-pub use text::{MAX_BYTES, parse_toml, unplaced, utf8};
+pub use text::{MAX_BYTES, parse_toml, unplaced};
 pub use walk::is_complete;

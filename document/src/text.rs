@@ -4,9 +4,11 @@ use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::DeTable;
+use toml_parser::Source;
+use toml_parser::lexer::TokenKind;
 
 use crate::looks::{doubt, looks_like};
-use crate::problem::{Lines, Problem};
+use crate::problem::Problem;
 use crate::reader::{MAX_PROBLEMS, Reader};
 use crate::schema::Form;
 
@@ -44,21 +46,6 @@ pub fn parse_toml(text: &str) -> (Spanned<DeTable<'_>>, Vec<toml::de::Error>) {
     DeTable::parse_recoverable(text)
 }
 
-/// Bytes as text.
-///
-/// # Errors
-/// The place of the first bytes that are not UTF-8.
-pub fn utf8<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Problem>> {
-    std::str::from_utf8(bytes).map_err(|error| {
-        let valid = error.valid_up_to();
-        let before =
-            bytes.get(..valid).and_then(|before| std::str::from_utf8(before).ok()).unwrap_or_default();
-        let (line, column) = Lines::new(before).position(valid);
-        let message = format!("is not UTF-8 at byte {valid}: {}", doubt(bytes));
-        vec![Problem { line, column, ..unplaced(file, message) }]
-    })
-}
-
 /// A problem of the text as a whole.
 #[must_use]
 pub fn unplaced(file: Option<&str>, message: String) -> Problem {
@@ -78,26 +65,36 @@ impl<'t> Reader<'t> {
             self.report_at(0, "", format!("is no TOML: {}", doubt(text.as_bytes())));
             return None;
         }
-        let mut spaced_until = 0;
+        let open = unclosed(text).filter(|_| !errors.is_empty());
+        if let Some((opening, closing)) = open {
+            let opened = self.excerpt(opening..opening + 1);
+            let message = format!("TOML: `{opened}` is not closed: put `{closing}` where it ends");
+            self.report_at(opening, "", message);
+        }
+        let lost = open.map(|(opening, _)| {
+            let line = text.get(opening..).and_then(|rest| rest.find('\n'));
+            (opening, line.map_or(text.len(), |length| opening + length))
+        });
+        let mut told_until = 0;
         for error in &errors {
             let span = error.span().unwrap_or(0..0);
-            // The parser finds fault with each part of a number with blanks.
-            if span.start < spaced_until {
+            let number = misspelt_number(text, span.start);
+            // To the parser nothing behind an open bracket makes sense; numbers in its line are wrong all the same.
+            let is_lost = lost.is_some_and(|(opening, end)| {
+                span.start >= opening && (number.is_none() || span.start >= end)
+            });
+            // It finds fault with each part of a number.
+            if is_lost || span.start < told_until {
                 continue;
             }
-            let message = match (error.message(), spaced_number(text, span.start)) {
+            let message = match (error.message(), number) {
                 (DUPLICATE_KEY, _) => {
                     format!("TOML: {DUPLICATE_KEY} `{}`: remove one", self.excerpt(span.clone()))
                 }
-                (_, Some((item, number))) => {
-                    let spaced = text.get(item.clone()).unwrap_or_default().trim();
-                    let comma = if text.get(..item.start).is_some_and(|before| before.ends_with(['[', ','])) {
-                        ", or put a comma between"
-                    } else {
-                        ""
-                    };
-                    spaced_until = item.end;
-                    format!("TOML: `{spaced}` has blanks between its digits: write {number}{comma}")
+                (_, Some((item, advice))) => {
+                    let written = text.get(item.clone()).unwrap_or_default().trim();
+                    told_until = item.end;
+                    format!("TOML: `{written}` {advice}")
                 }
                 (other, None) => format!("TOML: {other}"),
             };
@@ -125,18 +122,57 @@ impl<'t> Reader<'t> {
     }
 }
 
-/// The number with blanks between its digits that stands at an offset: where, and as it must be written.
-fn spaced_number(text: &str, offset: usize) -> Option<(Range<usize>, String)> {
-    let is_part = |c: &char| !"[]{}=,#\r\n".contains(*c);
+/// The first bracket that is never closed, and what closes it.
+fn unclosed(text: &str) -> Option<(usize, char)> {
+    let mut open = Vec::new();
+    for token in Source::new(text).lex() {
+        let start = token.span().start();
+        match (token.kind(), open.last()) {
+            (TokenKind::LeftSquareBracket, _) => open.push((start, ']')),
+            (TokenKind::LeftCurlyBracket, _) => open.push((start, '}')),
+            (TokenKind::RightSquareBracket, Some((_, ']')))
+            | (TokenKind::RightCurlyBracket, Some((_, '}'))) => {
+                open.pop();
+            }
+            (TokenKind::RightSquareBracket | TokenKind::RightCurlyBracket, top) => return top.copied(),
+            _ => {}
+        }
+    }
+    open.first().copied()
+}
+
+/// A number that is written as people write it, at the offset of an error: where, and what to write.
+fn misspelt_number(text: &str, offset: usize) -> Option<(Range<usize>, String)> {
     let (before, after) = text.split_at_checked(offset)?;
-    let before: usize =
-        before.chars().rev().take(LONGEST_NUMBER).take_while(is_part).map(char::len_utf8).sum();
-    let after: usize = after.chars().take(LONGEST_NUMBER).take_while(is_part).map(char::len_utf8).sum();
-    let place = offset - before..offset + after;
-    let item = text.get(place.clone())?.trim();
-    let number: String = item.split_whitespace().collect();
-    let is_number = number.contains(|c: char| c.is_ascii_digit()) && number.parse::<f64>().is_ok();
-    (is_number && item.contains(char::is_whitespace)).then_some((place, number))
+    let length = |characters: &mut dyn Iterator<Item = char>, ends: &str| -> usize {
+        characters.take(LONGEST_NUMBER).take_while(|c| !ends.contains(*c)).map(char::len_utf8).sum()
+    };
+    let start = offset - length(&mut before.chars().rev(), "[]{}=,#\r\n");
+    let end = offset + length(&mut after.chars(), "[]{}=,#\r\n");
+    let item = text.get(start..end)?.trim();
+    let number = |written: &str| {
+        (written.contains(|c: char| c.is_ascii_digit()) && written.parse::<f64>().is_ok())
+            .then(|| written.to_owned())
+    };
+    if item.contains(char::is_whitespace)
+        && let Some(number) = number(&item.split_whitespace().collect::<String>())
+    {
+        let in_list = text.get(..start).is_some_and(|before| before.ends_with(['[', ',']));
+        let comma = if in_list { ", or put a comma between" } else { "" };
+        return Some((start..end, format!("has blanks between its digits: write {number}{comma}")));
+    }
+    let prefix = |(end, _)| {
+        number(item.get(..end)?).map(|number| (number, item.get(end..).unwrap_or_default().trim()))
+    };
+    if let Some((first, unit)) = item.char_indices().rev().find_map(prefix)
+        && unit.starts_with(|c: char| c.is_alphabetic() || "°%″′\"".contains(c))
+        && !unit.contains(|c: char| c.is_ascii_digit())
+    {
+        return Some((start..end, format!("is a number with a unit: write {first}, the key names the unit")));
+    }
+    let end = offset + length(&mut after.chars(), "[]{}=#\r\n");
+    let with_point = number(&text.get(start..end)?.trim().replacen(',', ".", 1))?;
+    after.starts_with(',').then(|| (start..end, format!("has a decimal comma: write {with_point}")))
 }
 
 #[cfg(test)]
@@ -144,21 +180,59 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_with_blanks_between_its_digits_is_told_once_with_what_to_write() {
-        for (text, spaced, number) in [
-            ("a = 1\nb = 1 440\n", "1 440", "1440"),
-            ("a = 1\nb = 12\u{202f}345.5 # pasted\n", "12\u{202f}345.5", "12345.5"),
-            ("a = 1\nb = [1, -1\u{a0}440, 2]\n", "-1\u{a0}440", "-1440, or put a comma between"),
-            ("a = 1\nb = [-40 60 80]\n", "-40 60 80", "-406080, or put a comma between"),
+    fn a_number_as_people_write_it_is_told_once_with_what_to_write() {
+        const BLANKS: &str = "has blanks between its digits";
+        for (value, written, told, number) in [
+            ("1 440", "1 440", BLANKS, "1440"),
+            ("12\u{202f}345.5 # pasted", "12\u{202f}345.5", BLANKS, "12345.5"),
+            ("[1, -1\u{a0}440, 2]", "-1\u{a0}440", BLANKS, "-1440, or put a comma between"),
+            ("[-40 60 80]", "-40 60 80", BLANKS, "-406080, or put a comma between"),
+            ("25,5", "25,5", "has a decimal comma", "25.5"),
+            ("-0,5e-3 # V", "-0,5e-3", "has a decimal comma", "-0.5e-3"),
+            ("25.0°C", "25.0°C", "is a number with a unit", "25.0, the key names the unit"),
+            ("[1, 25 ppm]", "25 ppm", "is a number with a unit", "25, the key names the unit"),
         ] {
+            let text = &format!("a = 1\nb = {value}\n");
             let mut reader = Reader::new(text, Some("f"));
             assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
             let problems = reader.into_problems().unwrap();
-            let words = format!("TOML: `{spaced}` has blanks between its digits: write {number}");
+            let words = format!("TOML: `{written}` {told}: write {number}");
             assert_eq!(problems.len(), 1, "{problems:?}");
             assert_eq!((problems[0].line, &problems[0].message), (2, &words));
         }
-        assert_eq!(spaced_number("a = 1 b\n", 6), None);
+        assert_eq!(misspelt_number("a = b 1\n", 4), None);
+    }
+
+    #[test]
+    fn a_bracket_that_is_not_closed_is_told_where_it_stands_and_nothing_of_what_follows() {
+        let rest = "\n[accel]\nscale = [\n1,\n2]\n[[sensor]]\nname = \"x\"\n";
+        for (line, column, told) in [
+            ("b = { kind = \"a}\", c = [1, 2]", 5, ["`{` is not closed: put `}`"].as_slice()),
+            ("b = [1, 2 # ]", 5, &["`[` is not closed: put `]`"]),
+            ("b = { c = [1, 2 }", 11, &["`[` is not closed: put `]`"]),
+            ("b = { c = 1 440", 5, &["`{` is not closed: put `}`", "`1 440` has blanks"]),
+        ] {
+            for (text, at) in [
+                (format!("a = 1\n{line}{rest}"), 2),
+                (format!("a = 1\n{line}"), 2),
+                (format!("a = =\n{line}{rest}"), 2),
+            ] {
+                let mut reader = Reader::new(&text, Some("f"));
+                assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
+                let problems = reader.into_problems().unwrap();
+                let here: Vec<_> = problems.iter().filter(|problem| problem.line == at).collect();
+                assert_eq!(
+                    problems.len() - here.len(),
+                    usize::from(text.starts_with("a = =")),
+                    "{problems:?}"
+                );
+                assert_eq!((here.len(), here[0].column), (told.len(), column), "{text}: {here:?}");
+                assert!(
+                    here.iter().zip(told).all(|(problem, told)| problem.message.contains(told)),
+                    "{here:?}"
+                );
+            }
+        }
     }
 
     /// As fast as they are listed: a service reads what anyone sends.

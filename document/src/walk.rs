@@ -162,7 +162,12 @@ impl<'r, 't, 's> Walk<'r, 't, 's> {
                 continue;
             }
             let free: Vec<_> = known.iter().copied().filter(|known| !entries.contains_key(*known)).collect();
-            let advice = match closest(name, free.iter().copied()) {
+            // A table that is there already may be meant: it is written in several pieces.
+            let is_table = |known: &&str| {
+                entries.get(*known).is_some_and(|value| matches!(value.get_ref(), DeValue::Table(_)))
+            };
+            let tables = known.iter().copied().filter(is_table);
+            let advice = match closest(name, free.iter().copied()).or_else(|| closest(name, tables)) {
                 Some(word) => format!("did you mean `{word}`?"),
                 None if free.is_empty() => "remove it".into(),
                 None => format!("remove it; keys not used here: {}", free.join(", ")),

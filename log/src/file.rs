@@ -18,7 +18,7 @@ use crate::error::Error;
 pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Error> {
     let failed = |source| Error::file(path, action, source);
     let bytes = read_bounded(path).map_err(failed)?;
-    let text = isotherm_document::file::text(&bytes, "").map(ToOwned::to_owned);
+    let text = isotherm_document::file::text(&bytes, None).map(ToOwned::to_owned);
     text.map_err(|problems| {
         failed(io::Error::other(problems.into_iter().map(|problem| problem.message).collect::<String>()))
     })

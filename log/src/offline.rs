@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use isotherm_correction::sample::CorrectedTick;
 use isotherm_correction::unit::{Event, Unit, UnitSettings};
-use isotherm_document::file::{read_bounded, text};
+use isotherm_document::file::read_bounded;
 use isotherm_protocol::document::{Document, Parsed, Problem};
 use isotherm_protocol::key::{RawStream, UnitId};
 use isotherm_protocol::stream::{UnitStream, unfit};
@@ -51,8 +51,7 @@ pub fn read_document(path: &Path) -> Result<Parsed, Error> {
     let bytes =
         read_bounded(path).map_err(|source| Error::file(path, "read the calibration document", source))?;
     let name = path.display().to_string();
-    text(&bytes, &name)
-        .and_then(|text| Document::parse(text, Some(&name)))
+    Document::parse_bytes(&bytes, Some(&name))
         .map_err(|problems| Error::Calibration(problems.iter().map(ToString::to_string).collect()))
 }
 

@@ -38,7 +38,7 @@ use std::sync::LazyLock;
 
 use isotherm_correction::calibration::Calibration;
 pub use isotherm_document::Problem;
-use isotherm_document::{Form, Reader, published, unplaced, utf8};
+use isotherm_document::{Form, Reader, file, published, unplaced};
 use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
@@ -128,8 +128,8 @@ impl Document {
     ///
     /// # Errors
     /// Every [`Problem`], in the order of the text; the first bytes that are not UTF-8 are the only one.
-    pub fn parse_bytes(bytes: &[u8], file: Option<&str>) -> Result<Parsed, Vec<Problem>> {
-        Self::parse(utf8(bytes, file)?, file)
+    pub fn parse_bytes(bytes: &[u8], name: Option<&str>) -> Result<Parsed, Vec<Problem>> {
+        Self::parse(file::text(bytes, name)?, name)
     }
 
     /// Writes the document as text that [`Document::parse`] reads back as an equal document.

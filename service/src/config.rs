@@ -145,7 +145,7 @@ impl Settings {
     pub fn load(path: &Path) -> Result<Self, ServiceError> {
         let read = |source| ServiceError::Read { path: path.to_owned(), source };
         let bytes = read_bounded(path).map_err(read)?;
-        file::text(&bytes, &path.display().to_string())
+        file::text(&bytes, Some(&path.display().to_string()))
             .and_then(|text| Self::parse(text, path))
             .map(|settings| Self { digest: Some(Digest::of(&bytes)), ..settings })
             .map_err(ServiceError::Configuration)

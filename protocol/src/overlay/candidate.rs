@@ -5,7 +5,7 @@ use isotherm_correction::calibration::Calibration;
 use super::{Overlay, ParsedOverlay, is_overlay};
 use crate::digest::Digest;
 use crate::document::{Document, Parsed, Problem, Side};
-use isotherm_document::{unplaced, utf8};
+use isotherm_document::unplaced;
 
 /// A calibration that holds, with the text that it is known by.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,18 +66,6 @@ impl Candidate {
         };
         let warnings = on_overlay(parsed.warnings.iter().filter(|warning| new(warning)).cloned().collect());
         Ok(Self::new(parsed, effective, base_digest, Some(overlay), warnings))
-    }
-
-    /// Reads a document of either kind from bytes that may not be UTF-8.
-    ///
-    /// # Errors
-    /// As [`Candidate::parse`]; the first bytes that are not UTF-8 are the only problem.
-    pub fn parse_bytes(
-        bytes: &[u8],
-        file: Option<&str>,
-        active_base: Option<&str>,
-    ) -> Result<Self, Vec<Problem>> {
-        Self::parse(utf8(bytes, file)?, file, active_base)
     }
 
     fn new(

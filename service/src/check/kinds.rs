@@ -36,7 +36,7 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
     };
     let recognised = recognise(path, &bytes);
     let kind = forced.or(recognised.ok());
-    let checked = text(&bytes, &file).and_then(|text| match kind {
+    let checked = text(&bytes, Some(&file)).and_then(|text| match kind {
         Some(FileKind::Calibration) => check_calibration(text, &file, trusted),
         Some(FileKind::Overlay) => check_overlay(text, &file, trusted),
         Some(FileKind::Service) => check_service(text, path),

@@ -49,7 +49,7 @@ impl Worker {
         read: Option<&Result<Document, Vec<Problem>>>,
     ) -> Decision {
         let asked = Decision { unit: request.unit.clone(), ..Decision::default() };
-        let text = match file::text(bytes, &request.name) {
+        let text = match file::text(bytes, Some(&request.name)) {
             Ok(text) => text,
             Err(problems) => return Decision { problems, ..asked },
         };

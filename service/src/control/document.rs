@@ -93,7 +93,7 @@ impl Document {
         let problem = |message: String| vec![unplaced(Some(&name), message)];
         let bytes = store.document(&set.digest).map_err(|error| problem(error.to_string()))?;
         let bytes = bytes.ok_or_else(|| problem("is no longer in the state folder".to_owned()))?;
-        let text = file::text(&bytes, &name)?;
+        let text = file::text(&bytes, Some(&name))?;
         let parsed = document::Document::parse(text, Some(&name))?;
         let label = Label { overlay: set.overlay, ..Label::of(&parsed.document, set.digest, "") };
         let found = Self::new(shared(&parsed.calibration), label, CompressedText::new(text));

@@ -38,7 +38,7 @@ impl Read {
     pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
         let name = path.display().to_string();
         let digest = Digest::of(bytes);
-        let text = file::text(bytes, &name).ok();
+        let text = file::text(bytes, Some(&name)).ok();
         let read =
             |text: &str| Candidate::parse(text, Some(&name), None).map(|it| Document::of(it, None, bytes));
         let found = text.map(read);

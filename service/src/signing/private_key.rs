@@ -22,7 +22,7 @@ pub(super) fn read(path: &Path) -> Result<(PrivateKey, Option<Problem>), (Proble
     let bytes = read_bounded(path)
         .map_err(|error| (unplaced(Some(&file), format!("cannot be read: {error}")), Exit::Failed))?;
     let bad = |message: String| (unplaced(Some(&file), message), Exit::BadConfiguration);
-    let text = text(&bytes, &file).map_err(|_| bad("is not text, so not a PEM key".to_owned()))?;
+    let text = text(&bytes, Some(&file)).map_err(|_| bad("is not text, so not a PEM key".to_owned()))?;
     let key = PrivateKey::from_pem(text).map_err(|error| bad(error.to_string()))?;
     Ok((key, exposed(path, &file)))
 }

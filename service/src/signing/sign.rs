@@ -107,7 +107,7 @@ fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> 
             return (Outcome { failure: Some(format!("cannot be read: {error}")), ..outcome }, None);
         }
     };
-    let text = match text(&bytes, &outcome.file) {
+    let text = match text(&bytes, Some(&outcome.file)) {
         Ok(text) => text,
         Err(problems) => return (Outcome { problems, ..outcome }, None),
     };

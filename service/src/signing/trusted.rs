@@ -110,7 +110,7 @@ fn read_key(path: &Path) -> Result<(String, PublicKey), String> {
     }
     let bytes = read_bounded(path).map_err(cannot)?;
     let text =
-        text(&bytes, "").map_err(|_| "is not text, so not a PEM key: is it the right file?".to_owned())?;
+        text(&bytes, None).map_err(|_| "is not text, so not a PEM key: is it the right file?".to_owned())?;
     let key = PublicKey::from_pem(text).map_err(|error| error.to_string())?;
     let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
     if name.chars().count() > LONGEST_NAME || name.chars().any(char::is_control) || name.is_empty() {

@@ -147,8 +147,12 @@ fn table_at<'a>(tree: &'a mut Table, path: &str) -> Option<&'a mut Table> {
 }
 
 fn set(table: &mut Table, key: &str, value: Option<Value>) {
-    drop(match value {
-        Some(value) => table.insert(key.to_owned(), value),
-        None => table.remove(key),
-    });
+    match value {
+        Some(value) => {
+            table.insert(key.to_owned(), value);
+        }
+        None => {
+            table.remove(key);
+        }
+    }
 }
