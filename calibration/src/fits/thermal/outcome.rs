@@ -132,6 +132,7 @@ impl Outcome {
             }
         };
         let table = compared.table(&self, &curves);
+        self.warnings.extend(compared.warnings());
         self.say(&mut verdicts);
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
