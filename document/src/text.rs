@@ -181,58 +181,45 @@ mod tests {
 
     #[test]
     fn a_number_as_people_write_it_is_told_once_with_what_to_write() {
-        const BLANKS: &str = "has blanks between its digits";
-        for (value, written, told, number) in [
-            ("1 440", "1 440", BLANKS, "1440"),
-            ("12\u{202f}345.5 # pasted", "12\u{202f}345.5", BLANKS, "12345.5"),
-            ("[1, -1\u{a0}440, 2]", "-1\u{a0}440", BLANKS, "-1440, or put a comma between"),
-            ("[-40 60 80]", "-40 60 80", BLANKS, "-406080, or put a comma between"),
-            ("25,5", "25,5", "has a decimal comma", "25.5"),
-            ("-0,5e-3 # V", "-0,5e-3", "has a decimal comma", "-0.5e-3"),
-            ("25.0°C", "25.0°C", "is a number with a unit", "25.0, the key names the unit"),
-            ("[1, 25 ppm]", "25 ppm", "is a number with a unit", "25, the key names the unit"),
-        ] {
+        let told = [
+            "1 440",
+            "12\u{202f}345.5 # pasted",
+            "[1, -1\u{a0}440, 2]",
+            "[-40 60 80]",
+            "25,5",
+            "-0,5e-3 # V",
+            "25.0°C",
+            "[1, 25 ppm]",
+        ]
+        .map(|value| {
             let text = &format!("a = 1\nb = {value}\n");
             let mut reader = Reader::new(text, Some("f"));
             assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
             let problems = reader.into_problems().unwrap();
-            let words = format!("TOML: `{written}` {told}: write {number}");
             assert_eq!(problems.len(), 1, "{problems:?}");
-            assert_eq!((problems[0].line, &problems[0].message), (2, &words));
-        }
+            problems[0].to_string()
+        });
+        insta::assert_snapshot!(told.join("\n"));
         assert_eq!(misspelt_number("a = b 1\n", 4), None);
     }
 
     #[test]
     fn a_bracket_that_is_not_closed_is_told_where_it_stands_and_nothing_of_what_follows() {
         let rest = "\n[accel]\nscale = [\n1,\n2]\n[[sensor]]\nname = \"x\"\n";
-        for (line, column, told) in [
-            ("b = { kind = \"a}\", c = [1, 2]", 5, ["`{` is not closed: put `}`"].as_slice()),
-            ("b = [1, 2 # ]", 5, &["`[` is not closed: put `]`"]),
-            ("b = { c = [1, 2 }", 11, &["`[` is not closed: put `]`"]),
-            ("b = { c = 1 440", 5, &["`{` is not closed: put `}`", "`1 440` has blanks"]),
-        ] {
-            for (text, at) in [
-                (format!("a = 1\n{line}{rest}"), 2),
-                (format!("a = 1\n{line}"), 2),
-                (format!("a = =\n{line}{rest}"), 2),
-            ] {
+        let mut told = String::new();
+        for line in
+            ["b = { kind = \"a}\", c = [1, 2]", "b = [1, 2 # ]", "b = { c = [1, 2 }", "b = { c = 1 440"]
+        {
+            for text in
+                [format!("a = 1\n{line}{rest}"), format!("a = 1\n{line}"), format!("a = =\n{line}{rest}")]
+            {
                 let mut reader = Reader::new(&text, Some("f"));
                 assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
                 let problems = reader.into_problems().unwrap();
-                let here: Vec<_> = problems.iter().filter(|problem| problem.line == at).collect();
-                assert_eq!(
-                    problems.len() - here.len(),
-                    usize::from(text.starts_with("a = =")),
-                    "{problems:?}"
-                );
-                assert_eq!((here.len(), here[0].column), (told.len(), column), "{text}: {here:?}");
-                assert!(
-                    here.iter().zip(told).all(|(problem, told)| problem.message.contains(told)),
-                    "{here:?}"
-                );
+                told += &problems.iter().map(|problem| format!("{problem}\n")).collect::<String>();
             }
         }
+        insta::assert_snapshot!(told);
     }
 
     /// As fast as they are listed: a service reads what anyone sends.
