@@ -226,11 +226,7 @@ fn rates_are_fitted_written_and_reported() {
     )
     .unwrap();
     let by_file = succeeds(&["rates", logs[2], "--steps", text(&steps), "--remove-mean", "--json"]);
-    assert!(
-        by_file.contains("gyro z increment weight")
-            && by_file.contains("gyros x, y: the input axis is across"),
-        "{by_file}"
-    );
+    assert!(by_file.contains("gyro z increment weight"), "{by_file}");
     let wrong = [&["rates", logs[0], "--axis", "x", "--rates", "36,-36,108"][..], &attitude].concat();
     let without = [&["rates", logs[0]][..], &attitude].concat();
     insta::assert_snapshot!([wrong, without].map(|arguments| told(folder.path(), &arguments)).concat());
