@@ -94,24 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_slip_is_told_with_what_to_write() {
-        for (line, at, value, words) in [
-            ("a = 1 440", "1 440", "1 440", "write 1440"),
-            ("a = 12\u{202f}345.5 # pasted", "12", "12\u{202f}345.5", "write 12345.5"),
-            ("a = [1, -1\u{a0}440, 2]", "-1", "-1\u{a0}440", "write -1440, or put a comma between"),
-            ("a = [-40 60 80]", "-40", "-40 60 80", "write -406080, or put a comma between"),
-            ("a = [0.45 0.008, 2]", "0.008", "0.45 0.008", "write 0.45, 0.008"),
-            ("a = −1.5", "−", "−1.5", "write -1.5"),
-            ("a = “MEMS-0001”", "“", "“MEMS-0001”", "write \"MEMS-0001\""),
-            ("a = 21.11.2026", ".2026", "21.11.2026", "write 2026-11-21"),
-            ("a = 25.0°C", "°C", "25.0°C", "write 25.0, the key names the unit"),
-            ("a = [1, 25 ppm]", "25", "25 ppm", "write 25, the key names the unit"),
-            ("a = [0,45, 0,008]", "008", "008", "write a point there"),
-            ("a = -0,5e-3 # V", ",", "-0,5e-3", "write -0.5e-3"),
-        ] {
-            let (place, advice) = slip(line, line.find(at).unwrap()).unwrap();
-            assert_eq!((line[place].trim(), advice.ends_with(words)), (value, true), "{line}: {advice}");
-        }
+    fn what_is_no_slip_has_no_advice() {
         for (line, at) in
             [("a = b 1", "b"), ("a = 2026-11-21", "-11"), ("a = [1, x]", "x"), ("a = 0x1G", "G")]
         {
