@@ -314,7 +314,9 @@ fn what_is_no_private_key_is_refused_by_name() {
 fn every_bad_file_among_the_trusted_keys_is_named() {
     let place = Place::new();
     let anna = place.keygen("anna");
-    ["anna", "anna-again"].iter().for_each(|name| place.trust("anna", name));
+    for name in ["anna", "anna-again"] {
+        place.trust("anna", name);
+    }
     place.write("trusted/secret.pub", &place.text("anna.key"));
     place.write("trusted/text.pub", "ssh-ed25519 AAAA\n");
     symlink("nowhere", place.path("trusted/gone.pub")).unwrap();
