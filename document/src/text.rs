@@ -195,7 +195,7 @@ mod tests {
     fn a_table_that_should_be_one_of_several_is_told_once() {
         let sensor = |name: &str| format!("[gyro.sensor]\nname = \"{name}\"\nchannel = \"c\"\n");
         let text = sensor("x") + &sensor("y") + &sensor("z") + "[accel]\na = 1\na = 2\n";
-        let told: String = problems(&text).iter().map(|problem| format!("{problem}\n")).collect();
+        let told: String = problems(&text).iter().map(|problem| problem.to_string() + "\n").collect();
         insta::assert_snapshot!(told);
     }
 
@@ -209,7 +209,7 @@ mod tests {
             for text in
                 [format!("a = 1\n{line}{rest}"), format!("a = 1\n{line}"), format!("a = =\n{line}{rest}")]
             {
-                told += &problems(&text).iter().map(|problem| format!("{problem}\n")).collect::<String>();
+                told += &problems(&text).iter().map(|problem| problem.to_string() + "\n").collect::<String>();
             }
         }
         insta::assert_snapshot!(told);

@@ -191,8 +191,8 @@ fn positions_with_swapped_columns_name_them() {
     for plan in ["twelve", "six"] {
         // The gyros do not matter for what is found, but for whoever corrects with that mapping.
         let none = |_: &mut LogEvent| {};
-        let changes: [(&dyn Fn(&mut LogEvent), i32); 3] = [(&none, 0), (&accelerometers, 1), (&gyros, 0)];
-        for (change, expected) in changes {
+        let changes: [&dyn Fn(&mut LogEvent); 3] = [&none, &accelerometers, &gyros];
+        for (change, expected) in changes.into_iter().zip([0, 1, 0]) {
             let (code, said) = call(plan, &[], change);
             assert_eq!(code, Some(expected), "{said}");
             told += &said;

@@ -298,7 +298,7 @@ mod tests {
             (times.clone(), vec![vec![f64::NAN; 1000]]),
             (times, vec![vec![0.0; 1000]; 3]),
         ] {
-            told += &format!("{}\n", Grid::of(columns(times, values)).unwrap_err());
+            told += &(Grid::of(columns(times, values)).unwrap_err().to_string() + "\n");
         }
         insta::assert_snapshot!(told);
     }
