@@ -60,9 +60,10 @@ faults:
     tests/namespaces.sh
 
 # Change the corrector's and the protocol's code, one place at a time, and see whether a test notices (needs cargo-mutants; SHARD=7/100:
-# a hundredth; minutes to days)
+# each hundredth place; minutes to days)
 mutants shard="7/100":
-    cargo mutants -p isotherm-correction -p isotherm-protocol --shard {{shard}} --output target/mutants --minimum-test-timeout 120 -- --lib --tests
+    cargo mutants -p isotherm-correction -p isotherm-protocol --profile mutants --shard {{shard}} --sharding round-robin \
+        --output target/mutants --minimum-test-timeout 120 -- --lib --tests
 
 # Fuzz every reader, 10⁸ executions each (hours; ISOTHERM_FUZZ_SECONDS=N: seconds each; fuzz/run TARGET: one)
 fuzz: fuzz-c

@@ -118,6 +118,11 @@ impl Verdict {
         samples.into_iter().filter_map(move |(sample, sizes)| Some((sample, sizes.filter(counts)?)))
     }
 
+    /// Whether it rests on anything.
+    pub(super) fn has_samples(&self) -> bool {
+        self.samples().next().is_some()
+    }
+
     /// The sizes that decide: out of sample where they are known.
     pub fn deciding(&self) -> [Size; 2] {
         self.out_of_sample.unwrap_or(self.in_sample)

@@ -6,12 +6,13 @@ use std::path::Path;
 use isotherm_calibration::fits::thermal::{Method, Settings, fit};
 use isotherm_calibration::report::residuals;
 use isotherm_calibration::runs::Run;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogReader;
-use isotherm_protocol::document::Sample;
+use isotherm_protocol::document::{Curve, Document, Sample, Shape};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::presets::fibre_optic_chamber;
 use isotherm_simulator::{Scenario, Simulation};
@@ -92,5 +93,29 @@ fn the_residual_of_the_report_is_that_of_the_service() {
             let stated = residuals.iter().find(|r| r.of == name && r.sample == Sample::In).unwrap().rms_after;
             assert!((stated / rms - 1.0).abs() < 1e-9, "{method:?} {name}: {stated} {rms}");
         }
+    }
+}
+
+/// A document may have its constants from elsewhere: from positions, or from turns about the north.
+#[test]
+fn a_level_that_the_run_cannot_tell_stays_what_it_was() {
+    const LEVELS_DEG_PER_H: [f64; 3] = [3.0, -2.0, 0.5];
+    let folder = tempfile::tempdir().unwrap();
+    let (log, mapping) = text_log(folder.path());
+    let settings = Settings { window_s: Some(10.0), ..Settings::default() };
+    let fitted = |base: Option<&Document>| {
+        fit(base, (&[run_of(&log, &mapping)], &[]), &settings, ()).unwrap().written.document
+    };
+    let mut base = fitted(None);
+    for (sensor, value) in base.gyro.sensor.iter_mut().zip(LEVELS_DEG_PER_H) {
+        sensor.set(Feature::One, Curve::new(Shape::Constant { value }));
+    }
+    let again = fitted(Some(&base));
+    for (sensor, level) in again.gyro.sensor.iter().zip(LEVELS_DEG_PER_H) {
+        let bias = sensor.terms.curve(Feature::One).unwrap();
+        let Shape::Polynomial { reference, coefficients, .. } = bias.shape() else { panic!("{bias:?}") };
+        assert!(coefficients.len() > 1, "{bias:?}");
+        let kept = bias.shape().at(*reference).unwrap();
+        assert!((kept - level).abs() < 1e-9, "{}: {kept}, {level} before", sensor.name);
     }
 }
