@@ -157,6 +157,7 @@ impl Timestamp {
 
     /// Signed time from `other` to `self` (ns), as `saturating_sub` gives it, with a branch that is never taken in place of what that
     /// always computes.
+    #[inline]
     const fn ns_from(self, other: Self) -> i64 {
         match self.0.checked_sub(other.0) {
             Some(ns) => ns,

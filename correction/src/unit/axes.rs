@@ -135,6 +135,8 @@ impl Axes {
             // Two sums, rather than one of a copy.
             let axes = match inverse {
                 Some(known) => sum_of_columns(&known, readings),
+                // By themselves: else the share is worked out for both.
+                None if self.stands => from.apply_to(to, 1.0, readings),
                 None => from.apply_to(to, self.share(time), readings),
             };
             return (axes, true);

@@ -9,6 +9,7 @@ mod accels;
 mod gyros;
 mod held;
 mod motion;
+mod needs;
 mod sigma;
 
 use alloc::boxed::Box;
@@ -32,7 +33,8 @@ use crate::servo::ServoMemory;
 use crate::units::{Span, Timestamp};
 
 pub(super) use motion::MotionInUse;
-use motion::{Follows, MotionMemory};
+use motion::MotionMemory;
+use needs::Needs;
 
 /// What is presently subtracted from a unit's readings, in case axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -69,22 +71,12 @@ pub(super) struct Corrector {
 /// What a tick finds as the last one did, until a temperature reading falls due or one is too old, the drift estimator moves on, a swap
 /// does, or a new series begins.
 #[derive(Debug, Clone, Copy, Default)]
-#[expect(clippy::struct_excessive_bools, reason = "each holds, or not, without the others")]
 struct Calm {
     /// Ticks that end later look for what has changed; all do without.
     until: Option<Timestamp>,
     /// Whether the temperatures have nothing to say of any gyro, of any accelerometer.
     sound: [bool; 2],
-    /// Whether any sensor needs more than four lanes.
-    wide: bool,
-    /// Whether the gyros have terms that change their sign.
-    modal: bool,
-    /// Whether the terms of the gyros are not what the bank gives, or a switch of the mode is given up.
-    special: bool,
-    /// Whether a gyro's drift is estimated.
-    drifts: bool,
-    /// What follows motion.
-    follows: Follows,
+    needs: Needs,
 }
 
 /// When a corrector begins, as seen from the one before it.
@@ -201,11 +193,11 @@ impl Corrector {
         out: &mut CorrectedTick,
     ) {
         let time = tick.gyro.end_time;
-        if tick.before.restart || self.calm.until.is_none_or(|until| time > until) {
+        if tick.before.restart || Some(time) > self.calm.until {
             self.renew(calibration, tick, (waiting, delay), counters);
         }
         // Four lanes fill two registers of every x86-64, and suffice for most units.
-        if self.calm.wide {
+        if self.calm.needs.contains(Needs::WIDE) {
             self.correct_lanes::<MAX_SENSORS>(calibration, tick, counters, out);
         } else {
             self.correct_lanes::<4>(calibration, tick, counters, out);
@@ -245,16 +237,10 @@ impl Corrector {
         }
         let sound = [&self.thermal.gyro_footing, &self.thermal.accel_footing].map(|it| it.sound_from(time));
         let due = sound.into_iter().flatten().fold(waiting.due_after(delay), Timestamp::min);
-        let slews = self.slew.is_some();
-        let given_up = calibration.reversal.is_none() && !self.substitution.is_settled();
         self.calm = Calm {
-            until: self.drift.rests_until().map(|rests| rests.min(due)).filter(|_| !slews),
+            until: self.drift.rests_until().map(|rests| rests.min(due)).filter(|_| self.slew.is_none()),
             sound: sound.map(|until| until.is_some()),
-            drifts: !self.drift.is_idle(),
-            wide: calibration.gyros.len().max(calibration.accels.len()) > 4,
-            modal: slews || self.thermal.gyros.has_any([2, 3]),
-            special: slews || given_up || calibration.trends.is_some() || self.drift.subtracts(),
-            follows: self.follow_motion(calibration),
+            needs: self.needs(calibration),
         };
     }
 
@@ -296,8 +282,9 @@ impl Corrector {
         let mut each = None;
         let shares = self.thermal.paces.shares(raw.end_time, &mut each);
         let felt = self.accels_feel::<N>(calibration, tick, shares, counters, out);
-        self.gyros::<N>(calibration, tick, shares, counters, out);
-        let per_second = 1.0 / raw.duration.as_s();
+        let duration_s = raw.duration.as_s();
+        self.gyros::<N>(calibration, (tick, duration_s), shares, counters, out);
+        let per_second = 1.0 / duration_s;
         let seen = &mut self.seen;
         seen.duration = raw.duration;
         seen.angular_rate = out.delta_angle.map(|angle| angle * per_second);
@@ -313,7 +300,7 @@ impl Corrector {
         if restart {
             seen.flags |= TickFlags::RESTART;
         }
-        if self.calm.drifts {
+        if self.calm.needs.contains(Needs::DRIFTS) {
             self.drift.add::<N>(&self.seen);
         }
     }

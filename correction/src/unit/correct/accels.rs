@@ -2,6 +2,7 @@
 
 use core::array;
 
+use super::needs::Needs;
 use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, put, within};
@@ -113,18 +114,18 @@ impl Corrector {
         put(&mut seen.reading, *readings);
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
-        if self.calm.follows.squares | self.calm.follows.delays {
+        if self.calm.needs.intersects(Needs::SQUARES.union(Needs::DELAYS)) {
             let (mut left, mut counted) = (forces, usable);
-            if self.calm.follows.squares {
+            if self.calm.needs.contains(Needs::SQUARES) {
                 self.remove_squares(shares, &mut left);
             }
-            if self.calm.follows.delays {
+            if self.calm.needs.contains(Needs::DELAYS) {
                 self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
             }
             (forces, usable) = (left, counted);
         }
         let mut felt = Felt { forces, usable, duration_s, inverse: None };
-        if self.calm.follows.force & within {
+        if self.calm.needs.contains(Needs::FORCE) & within {
             felt.inverse = self.note_force(orientation, forces, time);
         }
         Some(felt)
@@ -141,7 +142,7 @@ impl Corrector {
         out: &mut CorrectedTick,
     ) {
         let Some(orientation) = &calibration.accel_orientation else { return };
-        let forces = if self.calm.follows.positions {
+        let forces = if self.calm.needs.contains(Needs::POSITIONS) {
             self.remove_size_effect(calibration, orientation, out, forces)
         } else {
             forces

@@ -2,6 +2,7 @@
 
 use core::array;
 
+use super::needs::Needs;
 use super::{Corrector, Paired, of_sensors};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, put, within};
@@ -54,8 +55,12 @@ impl Corrector {
         duration_s: f64,
     ) -> ([f64; N], SensorMask) {
         let mut clamped = SensorMask::NONE;
-        let mut drift = if self.calm.follows.force { self.drift_with_force::<N>(shares) } else { [0.0; N] };
-        if self.calm.follows.rates {
+        let mut drift = if self.calm.needs.contains(Needs::FORCE) {
+            self.drift_with_force::<N>(shares)
+        } else {
+            [0.0; N]
+        };
+        if self.calm.needs.contains(Needs::RATES) {
             let limits = narrow::<N>(&calibration.gyro_limits);
             let within = array::from_fn(|lane| readings[lane].max(-limits[lane]).min(limits[lane]));
             let rates = scale.angles(within).map(|angle| angle / duration_s);
@@ -64,27 +69,27 @@ impl Corrector {
         (drift, clamped)
     }
 
-    /// Corrects the gyros' readings of a tick.
+    /// Corrects the gyros' readings of a tick that lasted `duration_s`.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     pub(super) fn gyros<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        tick: &Paired<'_>,
+        (tick, duration_s): (&Paired<'_>, f64),
         shares: Shares<'_>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
         let (raw, count) = (tick.gyro, calibration.gyros.len());
-        let (time, duration_s) = (raw.end_time, raw.duration.as_s());
+        let time = raw.end_time;
         let reversal = calibration.reversal.as_ref().map(|reversal| (reversal, input(tick)));
         let lost = reversal.is_some_and(|(reversal, input)| self.substitution.is_lost(reversal, &input));
 
         let [mut weight, mut bias] = self.thermal.gyros.at::<N, 2>(shares);
-        if self.calm.modal | self.calm.special {
+        if self.calm.needs.intersects(Needs::MODAL.union(Needs::SPECIAL)) {
             let mut terms = self.thermal.gyros.at::<N, 4>(shares);
             // What few ticks need is given copies: lanes of which nobody has the address stay in registers.
-            if self.calm.special {
+            if self.calm.needs.contains(Needs::SPECIAL) {
                 let mut special = terms;
                 self.special_terms(calibration, &mut special, time.seconds_from(tick.turn_on));
                 terms = special;
@@ -92,7 +97,7 @@ impl Corrector {
             let (mode_sign, meander_sign) = (sign(raw.mode), sign(raw.meander));
             let [_, plain, magnetic, meander] = terms;
             (weight, bias) = (terms[0], plain);
-            if self.calm.modal {
+            if self.calm.needs.contains(Needs::MODAL) {
                 bias = array::from_fn(|i| plain[i] + mode_sign * magnetic[i] + meander_sign * meander[i]);
             }
         }
@@ -100,12 +105,12 @@ impl Corrector {
         let scale =
             Scale { weight, times_s: (calibration.gyro_output == OutputKind::Mean).then_some(duration_s) };
         let mut clamped = SensorMask::NONE;
-        if self.calm.follows.force | self.calm.follows.rates {
+        if self.calm.needs.intersects(Needs::FORCE.union(Needs::RATES)) {
             let drift;
             (drift, clamped) = self.drift_with_motion(calibration, shares, scale, readings, duration_s);
             bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
-        if reversal.is_some() || self.calm.special {
+        if reversal.is_some() || self.calm.needs.contains(Needs::SPECIAL) {
             self.servo.advance(lost, time, raw.duration);
         }
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)
@@ -116,7 +121,7 @@ impl Corrector {
             bias = disturbed;
         }
         let mut subtrahend = bias;
-        if self.calm.special && self.drift.subtracts() {
+        if self.calm.needs.contains(Needs::SPECIAL) && self.drift.subtracts() {
             let drift: [f64; N] = array::from_fn(|i| self.drift.subtrahend(i, time));
             put(&mut self.seen.gyros.drift, drift);
             subtrahend = array::from_fn(|i| bias[i] + drift[i]);
@@ -165,7 +170,7 @@ impl Corrector {
                 put(&mut of_sensors, counted);
                 self.substitution.pass(&input, of_sensors);
             }
-            None if !self.calm.special => {}
+            None if !self.calm.needs.contains(Needs::SPECIAL) => {}
             _ => {
                 let mut bridged = increments;
                 out.flags |= self.substitute(reversal, &mut bridged[..count]);
@@ -175,7 +180,7 @@ impl Corrector {
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
         }
-        if self.calm.follows.delays {
+        if self.calm.needs.contains(Needs::DELAYS) {
             let (mut held, mut counted) = (increments, usable);
             let given = self.hold_gyros_back(calibration, tick, &mut out.flags, (&mut held, &mut counted));
             (increments, usable, rates) = (held, counted, given.unwrap_or(rates));

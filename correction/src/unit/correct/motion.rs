@@ -8,17 +8,18 @@ use serde::{Deserialize, Serialize};
 
 use super::Corrector;
 use super::held::HeldBack;
+use super::needs::Needs;
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow};
 use crate::orientation::{Orientation, SensorMask, sum_of_columns};
 use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
-use crate::thermal::{Bank, Motion, MotionBanks, Shares};
+use crate::thermal::{Bank, Motion, Shares};
 use crate::unit::slew::between;
 use crate::units::Timestamp;
 use crate::vector::{minus, plus};
 
 /// Place of the asymmetry among the lines of a gyro's terms that follow motion.
-const ASYMMETRY: usize = 3;
+pub(super) const ASYMMETRY: usize = 3;
 
 /// What was in use when a swap took effect, for a slew away from it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -39,27 +40,6 @@ pub(super) struct MotionMemory {
     slope: Option<([f64; 3], f64)>,
     /// What is held back; `None` where nothing is.
     pub(super) held: Option<Box<HeldBack>>,
-}
-
-/// What of a unit follows motion, under its calibration or one that a swap leads away from.
-#[derive(Debug, Clone, Copy, Default)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "terms that a unit has or has not, each asked for by its name"
-)]
-pub(super) struct Follows {
-    /// Drift with the specific force.
-    pub(super) force: bool,
-    /// Weights of gyros over their rate.
-    curves: bool,
-    /// Any weights of gyros that are not the same at every rate.
-    pub(super) rates: bool,
-    /// Second-order terms of accelerometers.
-    pub(super) squares: bool,
-    /// Accelerometers away from the reference point.
-    pub(super) positions: bool,
-    /// Sensors that lag less than another, or of which something is still held back.
-    pub(super) delays: bool,
 }
 
 impl MotionMemory {
@@ -95,7 +75,7 @@ impl Corrector {
         Some(MotionInUse { motion: motion.clone(), gyros, accels })
     }
 
-    fn slew_from_motion(&self) -> Option<&MotionInUse> {
+    pub(super) fn slew_from_motion(&self) -> Option<&MotionInUse> {
         self.slewing().and_then(|slewing| slewing.from.motion.as_ref())
     }
 
@@ -129,22 +109,6 @@ impl Corrector {
         let mut slewed = terms;
         slewing.terms(&mut slewed, old.unwrap_or(&[[0.0; MAX_SENSORS]; T]));
         slewed
-    }
-
-    /// What follows motion, or did before a swap that is on its way.
-    pub(super) fn follow_motion(&self, calibration: &Calibration) -> Follows {
-        let old = self.slew_from_motion().map(|old| &old.motion);
-        let motions = || calibration.motion.as_deref().into_iter().chain(old);
-        let curves = motions().any(Motion::has_curves);
-        let is_asymmetric = |banks: &MotionBanks| banks.gyros.has_any([ASYMMETRY; 2]);
-        Follows {
-            force: motions().any(|motion| motion.feels_force),
-            curves,
-            rates: curves || old.is_some() || self.thermal.motion.as_deref().is_some_and(is_asymmetric),
-            squares: motions().any(|motion| !motion.accels.is_empty()),
-            positions: motions().any(|motion| motion.has_positions),
-            delays: motions().any(|motion| motion.holds_back) || self.motion.held.is_some(),
-        }
     }
 
     /// A number of each sensor, on its way from the old one.
@@ -184,7 +148,7 @@ impl Corrector {
     ) -> SensorMask {
         let asymmetry = self.gyro_motion::<N>(shares)[ASYMMETRY];
         let (mut clamped, mut errors) = (SensorMask::NONE, [0.0; N]);
-        if self.calm.follows.curves {
+        if self.calm.needs.contains(Needs::CURVES) {
             clamped = self.errors_over_rate(calibration, rates, &mut errors);
         }
         *drift = array::from_fn(|lane| {
