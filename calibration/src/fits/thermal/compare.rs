@@ -174,12 +174,14 @@ impl Outcome {
     /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
     pub(super) fn take_simpler(&mut self, compared: &Compared) -> bool {
         let sensors = [accelerometers(&self.base).len(), self.base.gyro.sensor.len()];
-        let mut changed = false;
+        let (mut changed, stepwise) = (false, self.settings.method.is_stepwise());
         for (sensor, _, found) in &mut self.found {
             // Of more than three sensors none stands for an axis.
             let axis = axis_of(sensor).filter(|_| sensors[usize::from(sensor.gyro)] == 3);
             let Some((words, of)) = axis.and_then(|axis| compared.prefers(axis)) else { continue };
-            let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some()) else { continue };
+            let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some() && !stepwise) else {
+                continue;
+            };
             let simpler = of(rivals);
             if found.refused.is_none() && found.terms != *simpler && !simpler.is_empty() {
                 found.terms.clone_from(simpler);

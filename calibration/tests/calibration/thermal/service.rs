@@ -75,6 +75,8 @@ fn the_residual_of_the_report_is_that_of_the_service() {
         let out = folder.path().join(format!("{}.toml", method.name()));
         made.written.save(&out, false).unwrap();
         assert!(made.report.verdicts.iter().any(|verdict| verdict.accepted), "{}", made.report.to_text());
+        let curves: usize = made.written.document.gyro.sensor.iter().map(super::over_derivatives).sum();
+        assert_eq!(curves > 0, method == Method::Sequential, "{}", made.report.headline());
 
         // As isotherm-replay correct does it: the document from its file, the log event by event.
         let mut unit = Offline::new(&load_calibration(&out).unwrap(), UnitSettings::default());
