@@ -57,7 +57,7 @@ mod tests {
     fn what_is_no_text_has_one_problem() {
         let words = |bytes: &[u8]| text(bytes, Some("f")).unwrap_err()[0].to_string();
         assert_eq!(text("°".as_bytes(), Some("f")), Ok("°"));
-        let long = [b'#'; MAX_BYTES + 1];
+        let long = vec![b'#'; MAX_BYTES + 1];
         insta::assert_snapshot!(
             [b"a = 1\n\xff".as_slice(), &long, b"\x89MCAP0\r\n\xff"].map(words).join("\n")
         );

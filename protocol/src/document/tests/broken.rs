@@ -40,7 +40,7 @@ fn each_error_is_told_with_its_line_key_and_limit() {
         assert!(found, "{name}: no problem at line {line}, {key:?} in\n{}", listed(&problems));
         // A key that is taken for another one is missing as well, and what needs it may say so.
         assert!(problems.len() <= 3, "{name}: one error, but\n{}", listed(&problems));
-        told += &format!("{name}\n{}\n", listed(&problems));
+        told += &[name, &listed(&problems), ""].join("\n");
     }
     insta::assert_snapshot!(told);
 }

@@ -119,7 +119,7 @@ fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
         write(&folder, &changed);
         let found = verified(&folder);
         assert!(!found.holds);
-        let breaks: String = found.breaks.iter().map(|broken| format!("{broken}\n")).collect();
+        let breaks: String = found.breaks.iter().map(|broken| broken.to_string() + "\n").collect();
         told += &breaks.replace(folder.path().to_str().unwrap(), "FOLDER");
         let places = found.breaks.into_iter().map(|broken| (broken.line, broken.number.unwrap()));
         places.collect::<Vec<_>>()
