@@ -113,8 +113,7 @@ fn methods_reach_what_they_must_on_a_simulated_coil() {
 
 #[test]
 fn the_sequential_fit_reaches_on_the_programme_of_000_what_the_paper_states() {
-    // From 1.68 to 0.19 °/h peak to peak, of the log that was fitted: gyro y, whose coil is heated through one face alone. What heats
-    // the others through both takes several lags.
+    // From 1.68 to 0.19 °/h peak to peak, of the log that was fitted: gyro y reaches that, and the others what stands here.
     let least = [3.8, 1.68 / 0.19, 3.2];
     let log = run(&Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(303, paper_profile()) });
     let Fitted { report, written, .. } =
