@@ -29,6 +29,7 @@ use isotherm_document::file::{self, read_bounded};
 use keys::{PreLaunchKeys, SessionKeys, UnitKeys};
 pub use metrics::MetricsSettings;
 pub use pair::{PairSettings, chunk};
+pub(crate) use pair::{chunks, includes};
 pub use swap::{FolderSettings, Severity, SwapSettings};
 use units::{As, Congestion, Ms, PathText};
 pub use web::WebSettings;

@@ -14,7 +14,7 @@ mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use isotherm_operator::status::unix_ms;
@@ -22,9 +22,10 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{Member, Mode, PairReport};
 use zenoh::Session;
+use zenoh::key_expr::OwnedKeyExpr;
 
 use crate::ServiceError;
-use crate::config::{PairSettings, Settings};
+use crate::config::{PairSettings, Settings, chunks, includes};
 use crate::receive::intake::Intake;
 use crate::receive::unit::{Footing, Standing, UnitActor};
 pub(crate) use ask::{Asker, Questions};
@@ -57,6 +58,8 @@ pub(crate) struct Pair {
     /// Whether there were others once.
     was_accompanied: AtomicBool,
     passed_over: Mutex<BTreeMap<String, Instant>>,
+    /// What instances of other groups take, by instance; `None` where they have not said it yet.
+    elsewhere: Mutex<BTreeMap<String, Option<Vec<OwnedKeyExpr>>>>,
 }
 
 impl Pair {
@@ -91,6 +94,7 @@ impl Pair {
             beat: AtomicU64::new(0),
             still_us: AtomicU64::new(0),
             passed_over: Mutex::default(),
+            elsewhere: Mutex::default(),
         }
     }
 
@@ -114,12 +118,34 @@ impl Pair {
         self.accompanied.load(Ordering::Acquire)
     }
 
+    /// An instance of another group has come; whether it is one.
+    fn come_elsewhere(&self, member: &Member) -> bool {
+        let is_elsewhere = member.group != self.me.group;
+        if is_elsewhere {
+            lock(&self.elsewhere).entry(member.instance.clone()).or_default();
+        }
+        is_elsewhere
+    }
+
+    /// An instance has said what it takes.
+    fn takes_elsewhere(&self, report: &PairReport) {
+        if let Some(takes) = lock(&self.elsewhere).get_mut(&report.member.instance) {
+            *takes = Some(chunks(&report.takes));
+        }
+    }
+
+    /// Whether an instance of another group takes a unit, or may.
+    pub(crate) fn is_taken_elsewhere(&self, unit: &UnitId) -> bool {
+        let may_take = |takes: &Option<Vec<_>>| takes.as_ref().is_none_or(|it| includes(it, unit.as_str()));
+        lock(&self.elsewhere).values().any(may_take)
+    }
+
     /// An instance has come; whether it is new.
     fn come(&self, member: Member) -> bool {
         if member.instance == self.me.instance || member.group != self.me.group {
             return false;
         }
-        *self.alone_since.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *lock(&self.alone_since) = None;
         let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
         if !self.accompanied.load(Ordering::Acquire) {
             // Looked seldom while it was alone.
@@ -132,13 +158,14 @@ impl Pair {
 
     /// An instance has gone, or the connection to it; whether it was there.
     fn go(&self, instance: &str) -> bool {
+        lock(&self.elsewhere).remove(instance);
         let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
         let gone = others.remove(instance).is_some();
         if gone && others.is_empty() {
             // Whoever stood still for longer than the lease finds the others gone before it looks again.
             self.still_us.fetch_max(self.stands_still_us(Instant::now()), Ordering::AcqRel);
             self.accompanied.store(false, Ordering::Release);
-            *self.alone_since.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
+            *lock(&self.alone_since) = Some(Instant::now());
         }
         gone
     }
@@ -165,7 +192,7 @@ impl Pair {
             takeover: self.takeover,
             active: self.me.mode == Mode::Active,
             yields: self.yields(),
-            alone_since: *self.alone_since.lock().unwrap_or_else(PoisonError::into_inner),
+            alone_since: *lock(&self.alone_since),
             deserted: !self.has_others() && self.was_accompanied.load(Ordering::Acquire),
         }
     }
@@ -224,7 +251,7 @@ impl Pair {
 
     /// A message of a unit came that is not taken.
     pub(crate) fn pass_over(&self, serial: &str) {
-        let mut passed_over = self.passed_over.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut passed_over = lock(&self.passed_over);
         if let Some(at) = passed_over.get_mut(serial) {
             *at = Instant::now();
         } else if passed_over.len() < MOST_PASSED_OVER {
@@ -235,7 +262,7 @@ impl Pair {
     /// What this instance says of itself and its units.
     pub(crate) fn report(&self, intake: &Intake) -> PairReport {
         let now = Instant::now();
-        let mut passed_over = self.passed_over.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut passed_over = lock(&self.passed_over);
         passed_over.retain(|_, at| now.saturating_duration_since(*at) < PASSED_OVER);
         PairReport {
             member: self.me.clone(),
@@ -244,6 +271,10 @@ impl Pair {
             passed_over: passed_over.keys().cloned().collect(),
         }
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Of the units that an instance takes.

@@ -13,3 +13,4 @@ mod restart;
 mod said;
 mod schedule;
 pub(crate) mod stand;
+mod taken;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use isotherm_protocol::pair::Mode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use zenoh::key_expr::OwnedKeyExpr;
+use zenoh::key_expr::{OwnedKeyExpr, keyexpr};
 
 use super::units::{As, Ms, OneEndpoint};
 
@@ -63,6 +63,16 @@ pub fn chunk(pattern: &str) -> Option<OwnedKeyExpr> {
     OwnedKeyExpr::new(chunk).ok()
 }
 
+/// The chunks for which patterns of serials stand; what is no pattern is left out.
+pub(crate) fn chunks(patterns: &[String]) -> Vec<OwnedKeyExpr> {
+    patterns.iter().filter_map(|pattern| chunk(pattern)).collect()
+}
+
+/// Whether one of the patterns stands for a serial.
+pub(crate) fn includes(chunks: &[OwnedKeyExpr], serial: &str) -> bool {
+    keyexpr::new(serial).is_ok_and(|serial| chunks.iter().any(|chunk| chunk.intersects(serial)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,9 +84,8 @@ mod tests {
             ("*-0042", "ZLG-0042", "ZLG-0043"),
             ("ZLG-0042", "ZLG-0042", "ZLG-00421"),
         ] {
-            let chunk = chunk(pattern).unwrap();
-            let includes = |serial: &str| chunk.intersects(&OwnedKeyExpr::new(serial.to_owned()).unwrap());
-            assert!(includes(fits) && !includes(does_not), "{pattern}");
+            let chunks = chunks(&[pattern.to_owned()]);
+            assert!(includes(&chunks, fits) && !includes(&chunks, does_not), "{pattern}");
         }
         assert!(chunk("*").is_some());
         for pattern in ["", "a/b", "**", "a**", "$*", "a b"] {

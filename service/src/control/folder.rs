@@ -214,6 +214,10 @@ impl Worker {
             return false;
         }
         let named = self.folder.files.get(path).and_then(|file| file.unit.clone());
+        if let Some((words, _)) = named.as_ref().and_then(|unit| self.intake.is_not_taken(unit)) {
+            tracing::info!("{} is left alone: {words}", path.display());
+            return true;
+        }
         if named.is_some_and(|unit| !self.intake.speaks_for(&unit)) {
             tracing::info!("{} is left to the instance that publishes its unit", path.display());
             return true;

@@ -49,6 +49,13 @@ impl Request {
 impl Worker {
     /// A query.
     pub(super) fn answer(&mut self, asked: Asked, query: &Query, origin: Origin) {
+        let unit = one_unit(query.key_expr().as_str(), asked).ok();
+        if let Some((words, is_left)) = unit.and_then(|unit| self.intake.is_not_taken(&unit)) {
+            if !is_left {
+                refuse(query, &words);
+            }
+            return;
+        }
         let answered = match asked {
             Asked::Calibration if query.payload().is_none() => self.tell_documents(query),
             Asked::Calibration => self.answer_swap(query, origin),
@@ -90,6 +97,12 @@ impl Worker {
             tracing::warn!("{key} names no unit: the document is ignored");
             return;
         };
+        if let Some((words, is_left)) = self.intake.is_not_taken(&unit) {
+            if !is_left {
+                tracing::warn!(%unit, "a document is ignored: {words}");
+            }
+            return;
+        }
         if !self.intake.answers_for(&unit) {
             return;
         }

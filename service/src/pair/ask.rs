@@ -36,6 +36,7 @@ const ENTRIES: u32 = 1000;
 pub(crate) struct Questions {
     memories: UnboundedSender<UnitId>,
     records: UnboundedSender<Option<UnitId>>,
+    takes: UnboundedSender<String>,
 }
 
 impl Questions {
@@ -47,6 +48,11 @@ impl Questions {
     /// The histories of a unit, or of all, and the documents in them.
     pub(super) fn records(&self, unit: Option<UnitId>) {
         let _ = self.records.send(unit);
+    }
+
+    /// What an instance of another group takes.
+    pub(super) fn takes(&self, instance: String) {
+        let _ = self.takes.send(instance);
     }
 }
 
@@ -67,16 +73,18 @@ impl Asker {
         pair: &Arc<Pair>,
         intake: &Arc<Intake>,
         inbox: Inbox,
-    ) -> (Questions, [JoinHandle<()>; 2]) {
+    ) -> (Questions, [JoinHandle<()>; 3]) {
         let (memories, memories_due) = unbounded_channel();
         let (records, records_due) = unbounded_channel();
+        let (takes, takes_due) = unbounded_channel();
         let asker =
             Self { session: session.clone(), pair: Arc::clone(pair), intake: Arc::clone(intake), inbox };
         let tasks = [
             tokio::spawn(asker.clone().ask_memories(memories_due)),
+            tokio::spawn(asker.clone().ask_takes(takes_due)),
             tokio::spawn(asker.ask_records(records_due)),
         ];
-        (Questions { memories, records }, tasks)
+        (Questions { memories, records, takes }, tasks)
     }
 
     async fn ask_memories(self, mut questions: UnboundedReceiver<UnitId>) {
@@ -87,6 +95,16 @@ impl Asker {
             }
             let answered = tokio::spawn(self.clone().memories(units));
             let _ = tokio::time::timeout(NEXT_MEMORY, answered).await;
+        }
+    }
+
+    async fn ask_takes(self, mut questions: UnboundedReceiver<String>) {
+        while let Some(instance) = questions.recv().await {
+            for sample in self.ask(&key::pair(&instance)).await {
+                if let Ok(report) = serde_json::from_slice(&sample.payload().to_bytes()) {
+                    self.pair.takes_elsewhere(&report);
+                }
+            }
         }
     }
 
@@ -206,6 +224,9 @@ impl Asker {
         for sample in samples {
             let serial = key::parse_history(sample.key_expr().as_str());
             let Some(unit) = serial.and_then(|serial| UnitId::new(serial).ok()) else { continue };
+            if !self.intake.takes(&unit) {
+                continue;
+            }
             let Ok(entries) = serde_json::from_slice::<Vec<AuditEntry>>(&sample.payload().to_bytes()) else {
                 continue;
             };

@@ -136,7 +136,9 @@ impl Work {
             Event::Came(member) => {
                 let (name, mode, priority) = (member.name.clone(), member.mode.name(), member.priority);
                 let instance = member.instance.clone();
-                if self.pair.come(member) {
+                if self.pair.come_elsewhere(&member) {
+                    self.questions.takes(instance);
+                } else if self.pair.come(member) {
                     tracing::info!(name, mode, priority, "another service instance has appeared");
                     self.questions.records(None);
                     self.intake.each_unit(|actor| actor.introduce(&instance));

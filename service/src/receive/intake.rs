@@ -12,8 +12,9 @@ use std::time::Instant;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::status::{Fault, Status};
+use zenoh::key_expr::OwnedKeyExpr;
 
-use crate::config::Settings;
+use crate::config::{Settings, chunks, includes};
 use crate::control::Inbox;
 use crate::control::change::Change;
 use crate::control::revision::{Calibrations, Plan};
@@ -27,6 +28,8 @@ use units::{Outlets, Unit, Units};
 /// All units, and what belongs to none.
 pub struct Intake {
     settings: Settings,
+    /// Chunks of the serials that are taken.
+    taken: Vec<OwnedKeyExpr>,
     /// Locked after the units, where both are.
     calibrations: RwLock<Calibrations>,
     outlets: Outlets,
@@ -56,6 +59,7 @@ impl Intake {
     pub fn new(settings: Settings, calibrations: Calibrations, outlets: OutletMaker) -> Self {
         let calibrations = RwLock::new(calibrations);
         Self {
+            taken: chunks(&settings.units),
             settings,
             calibrations,
             outlets: Outlets::new(outlets),
@@ -81,7 +85,10 @@ impl Intake {
 
     /// Makes the outlet of every unit that has a calibration, as far as there is a place for it; gives how many.
     pub(crate) fn prepare(&self) -> usize {
-        let units: Vec<_> = read(&self.calibrations).units().take(self.settings.max_units).cloned().collect();
+        let calibrations = read(&self.calibrations);
+        let taken = calibrations.units().filter(|unit| self.takes(unit));
+        let units: Vec<_> = taken.take(self.settings.max_units).cloned().collect();
+        drop(calibrations);
         let made = units.iter().filter(|unit| match self.outlets.prepare(unit) {
             Ok(()) => true,
             Err(error) => {
@@ -127,6 +134,11 @@ impl Intake {
                 actor.end();
             });
         }
+    }
+
+    /// Whether a unit is one of those that this service takes (`units`).
+    pub(crate) fn takes(&self, unit: &UnitId) -> bool {
+        includes(&self.taken, unit.as_str())
     }
 
     /// Whether a unit has appeared.

@@ -6,7 +6,7 @@ use std::time::Instant;
 use isotherm_bus::DeclaredKeys;
 use isotherm_bus::receipt::Receipt;
 use isotherm_protocol::key::{self, RawStream, UnitId};
-use zenoh::key_expr::{OwnedKeyExpr, keyexpr};
+use zenoh::key_expr::OwnedKeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
@@ -15,7 +15,7 @@ use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 use crate::ServiceError;
-use crate::config::chunk;
+use crate::config::{chunks, includes};
 use crate::control::{Asked as Order, Inbox, Origin};
 use crate::observe::status_publisher::{Asked, Bell};
 use crate::pair::Pair;
@@ -140,7 +140,7 @@ async fn inputs(
     taken: &[String],
     pair: &Arc<Pair>,
 ) -> Result<Vec<Subscriber<()>>, ServiceError> {
-    let chunks: Vec<_> = taken.iter().filter_map(|pattern| chunk(pattern)).collect();
+    let chunks = chunks(taken);
     if chunks.iter().any(|chunk| chunk.as_str() == "*") {
         let raw = subscribe(session, key::ALL_RAW, take(intake, bell, pulse)).await?;
         return Ok(vec![raw, subscribe(session, key::ALL_REFERENCE, take(intake, bell, pulse)).await?]);
@@ -176,8 +176,7 @@ async fn inputs(
 
 /// Whether a message is of a unit that one of the patterns takes.
 fn is_of(chunks: &[OwnedKeyExpr], sample: &Sample) -> bool {
-    let serial = key::unit_of(sample.key_expr().as_str()).and_then(|serial| keyexpr::new(serial).ok());
-    serial.is_some_and(|serial| chunks.iter().any(|chunk| chunk.intersects(serial)))
+    key::unit_of(sample.key_expr().as_str()).is_some_and(|serial| includes(chunks, serial))
 }
 
 /// Hears what other processes put on a key.

@@ -11,6 +11,7 @@ use isotherm_protocol::status::{Fault, Output};
 
 use super::units::{Unit, Units};
 use super::{Intake, lock, read};
+use crate::control::revision::Calibrations;
 use crate::receive::fault::{FaultKind, standing};
 use crate::receive::unit::{Footing, Outlet, StreamTimeoutSettings, UnitActor};
 
@@ -109,14 +110,23 @@ impl Intake {
         let limit = self.settings.max_units;
         // Most of the time there is room for all of them, whoever has appeared.
         units.len() < limit
-            && (calibrated || units.len() + units.awaited(&read(&self.calibrations)).count() < limit)
+            && (calibrated || units.len() + self.awaited_of(units, &read(&self.calibrations)).count() < limit)
+    }
+
+    /// Those that are taken and have a calibration, and have not appeared, in the order of their serials.
+    fn awaited_of<'u>(
+        &self,
+        units: &Units,
+        calibrations: &'u Calibrations,
+    ) -> impl Iterator<Item = &'u UnitId> {
+        calibrations.units().filter(|unit| self.takes(unit) && !units.by_serial.contains_key(*unit))
     }
 
     /// That units with a calibration have not appeared: their serial may be misspelt, or their producer be off.
     pub(crate) fn awaited(&self) -> Option<Fault> {
         // The units first, as everywhere: what is locked in one order locks nobody out.
         let (units, calibrations) = (read(&self.units), read(&self.calibrations));
-        let awaited: Vec<_> = units.awaited(&calibrations).map(UnitId::as_str).collect();
+        let awaited: Vec<_> = self.awaited_of(&units, &calibrations).map(UnitId::as_str).collect();
         (!awaited.is_empty()).then(|| {
             let words = format!("calibrated, nothing received yet: {}", few(&awaited));
             standing("awaited_units", awaited.len() as u64, words)

@@ -20,6 +20,19 @@ impl Intake {
         Self { pair: Some(pair), ..self }
     }
 
+    /// Where swaps and commands of a unit are for another service: what to tell whoever asks, and whether to leave that to the
+    /// service that takes the unit.
+    pub(crate) fn is_not_taken(&self, unit: &UnitId) -> Option<(String, bool)> {
+        let is_elsewhere = || self.pair.as_ref().is_some_and(|pair| pair.is_taken_elsewhere(unit));
+        (!self.takes(unit)).then(|| {
+            let units = &self.settings.units;
+            let words = format!(
+                "unit {unit} is not taken by this service (units = {units:?}): ask the service that takes it"
+            );
+            (words, is_elsewhere())
+        })
+    }
+
     /// Whether swaps and commands of a unit are this instance's.
     pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
         let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());

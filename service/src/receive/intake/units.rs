@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex};
 use isotherm_protocol::key::UnitId;
 
 use super::lock;
-use crate::control::revision::Calibrations;
 use crate::receive::unit::{Outlet, UnitActor};
 
 /// A unit, for whoever holds it at the moment.
@@ -28,11 +27,6 @@ impl Units {
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.by_serial.len()
-    }
-
-    /// Those that have a calibration and have not appeared, in the order of their serials.
-    pub(super) fn awaited<'u>(&self, calibrations: &'u Calibrations) -> impl Iterator<Item = &'u UnitId> {
-        calibrations.units().filter(|unit| !self.by_serial.contains_key(*unit))
     }
 
     /// Takes one in.
