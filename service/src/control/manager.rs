@@ -186,7 +186,12 @@ impl Worker {
         let documents = documents.map(CompressedText::read);
         let overlays = layers.map(|layers| layers.text.read());
         let lost = match self.store.keep(SystemTime::now(), documents, overlays) {
-            Ok(false) => self.store.write_failure().map(ToOwned::to_owned),
+            // A trial that goes well is less than a document that does not.
+            Ok(false) => self
+                .store
+                .write_failure()
+                .map(ToOwned::to_owned)
+                .or_else(|| self.lost.clone().filter(|_| !self.folder.unwritten().is_empty())),
             Ok(true) => {
                 tracing::warn!(
                     "the state folder was replaced: what is in force was written into the new one; earlier documents \
@@ -196,7 +201,8 @@ impl Worker {
             }
             Err(error) => Some(error.to_string()),
         };
-        if let Some(words) = lost.as_ref().filter(|_| lost != self.lost) {
+        // Told once: what fails first changes by turns.
+        if let Some(words) = lost.as_ref().filter(|_| self.lost.is_none()) {
             tracing::error!("swaps are refused, the state folder cannot be written: {words}");
         } else if self.lost.is_some() && lost.is_none() {
             tracing::info!("the state folder can be written: swaps are accepted again");

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use isotherm_protocol::control::SwapOptions;
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::service_status::ServiceStatus;
 
@@ -126,6 +127,35 @@ async fn the_beginning_of_a_document_is_refused_though_it_is_one_by_itself() {
     stand.until_accepted(UNIT, 2).await;
     let forced = SwapOptions { force: true, ..options };
     assert_accepted(&stand.swap(UNIT, torn, &forced).await, 3);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_state_folder_is_not_written_again_before_the_document_is() {
+    let folders = Folders::new();
+    let text = document(UNIT, 1.0);
+    // As a disk with little room would have it: less than the document can be written.
+    let place = folders.state.join(format!("documents/{}.toml", Digest::of(text.as_bytes())));
+    std::fs::create_dir_all(place.join("in the way")).unwrap();
+    folders.put("a.toml", &text);
+    let stand = Stand::start(folders.settings()).await;
+    let told = |status: &ServiceStatus| {
+        ["state_folder", "unwritten_documents"]
+            .map(|kind| status.faults.iter().any(|fault| fault.kind == kind))
+    };
+    until_service(&stand, |status| told(status) == [true; 2]).await;
+    // Longer than until the next trial.
+    let end = tokio::time::Instant::now() + Duration::from_millis(4500);
+    while tokio::time::Instant::now() < end {
+        until_service(&stand, |status| {
+            assert_eq!(told(status), [true; 2]);
+            true
+        })
+        .await;
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    std::fs::remove_dir_all(&place).unwrap();
+    until_service(&stand, |status| told(status) == [false; 2]).await;
     stand.stop().await;
 }
 
