@@ -236,8 +236,8 @@ fn doubts(
     doubts.extend(unlikely.into_iter().flatten().map(|words| Doubt::new("", Severity::Warn, "", words)));
     if let Some(present) = present {
         doubts.extend(range(settings, candidate, present));
-        doubts.extend(active.into_iter().flat_map(|active| jump(settings, candidate, active, present)));
     }
+    doubts.extend(active.into_iter().flat_map(|active| jump(settings, candidate, active, present)));
     doubts
 }
 
@@ -311,14 +311,21 @@ fn range<'a>(
     })
 }
 
-fn jump(settings: &SwapSettings, candidate: &Document, active: &Revision, present: &Present) -> Vec<Doubt> {
+/// A unit of which no temperature is known is at the assumed one, as it corrects then.
+fn jump(
+    settings: &SwapSettings,
+    candidate: &Document,
+    active: &Revision,
+    present: Option<&Present>,
+) -> Vec<Doubt> {
     if settings.max_jump_rad_per_s.is_none() && settings.max_jump_m_per_s2.is_none() {
         return Vec::new();
     }
     let doubt = |words| Doubt::new("", settings.jump, "jump", words);
-    let thermal = |name: &_| present.thermal(name);
-    let before = active.document.calibration.steady(thermal, present.mode);
-    let Some(jump) = before.jump(&candidate.calibration.steady(thermal, present.mode)) else {
+    let thermal = |name: &_| present?.thermal(name);
+    let mode = present.and_then(|present| present.mode);
+    let before = active.document.calibration.steady(thermal, mode);
+    let Some(jump) = before.jump(&candidate.calibration.steady(thermal, mode)) else {
         return vec![doubt(
             "has other sensors or another kind of output than the document in force: the jump of the output is \
              unknown"
@@ -327,6 +334,13 @@ fn jump(settings: &SwapSettings, candidate: &Document, active: &Revision, presen
     };
     let deg_per_h = |rate: f64| AngularRate::from_rad_per_s(rate).as_deg_per_h();
     let milli_g = |force: f64| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
+    let assumed = candidate.content().filter(|_| present.is_none_or(|present| present.words().is_empty()));
+    let at = assumed.map_or_else(String::new, |document| {
+        format!(
+            " at the assumed {} °C (no temperature of the unit is known)",
+            document.temperature.assumed_deg_c
+        )
+    });
     let mut doubts = Vec::new();
     let mut check =
         |steps: [f64; 3], limit: Option<f64>, what: &str, shown: &dyn Fn(f64) -> f64, unit: &str| {
@@ -334,7 +348,7 @@ fn jump(settings: &SwapSettings, candidate: &Document, active: &Revision, presen
             for (axis, step) in AXES.iter().zip(steps).filter(|(_, step)| step.abs() > limit) {
                 let (step, limit) = (shown(step), shown(limit));
                 doubts.push(doubt(format!(
-                    "{what} {axis} would jump by {step:+.4} {unit}, more than {limit} {unit}"
+                    "{what} {axis} would jump by {step:+.4} {unit}{at}, more than {limit} {unit}"
                 )));
             }
         };

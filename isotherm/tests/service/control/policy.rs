@@ -86,6 +86,23 @@ async fn a_jump_of_the_output_is_warned_about_or_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_jump_of_a_unit_that_was_not_heard_is_judged_at_the_assumed_temperature() {
+    let folders = Folders::new();
+    let mut settings = folders.settings();
+    // 2 °/h
+    settings.swap.max_jump_rad_per_s = Some(2.0_f64.to_radians() / 3600.0);
+    let stand = Stand::start(settings).await;
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &PLAIN).await, 1);
+    let far = document(UNIT, 4.5);
+    for dry_run in [true, false] {
+        let reply = stand.swap(UNIT, &far, &SwapOptions { dry_run, ..PLAIN }).await;
+        assert_refused(&reply, &["-3.5000 °/h", "25 °C"]);
+    }
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.5), &PLAIN).await, 2);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_refused() {
     let folders = Folders::new();
     let keys = tempfile::tempdir().unwrap();
