@@ -390,33 +390,19 @@ mod tests {
     #[test]
     fn what_is_wrong_in_variable_and_file_is_said_with_its_place() {
         let nothing = ClientOptions::default();
-        let error = nothing.resolved(Some("a:1,nonsense"), None).unwrap_err();
-        assert!(
-            error.to_string().starts_with("ISOTHERM_CONNECT is \"nonsense\", must be HOST:PORT"),
-            "{error}"
-        );
+        let mut told = vec![nothing.resolved(Some("a:1,nonsense"), None).unwrap_err().to_string()];
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("client.toml");
-        std::fs::write(&file, "connect = [\"a:1\", \"a:70000\"]\nnamespaces = \"x\"\n").unwrap();
-        let BusError::UserFile(problems) = nothing.resolved(None, Some(&file)).unwrap_err() else { panic!() };
-        let [port, key] = &*problems else { panic!("{problems:?}") };
-        assert!(port.contains("client.toml:1:19: connect[1]: is \"a:70000\", has the port"), "{port}");
-        assert!(
-            key.contains("client.toml:2:1: namespaces") && key.contains("did you mean `namespace`?"),
-            "{key}"
-        );
-        for (text, part) in [
-            ("namespace = \"a//b\"\n", "namespace = \"a//b\" is not valid"),
-            ("zenoh_config = \"none.json5\"\n", "none.json5"),
+        for text in [
+            "connect = [\"a:1\", \"a:70000\"]\nnamespaces = \"x\"\n",
+            "namespace = \"a//b\"\n",
+            "zenoh_config = \"none.json5\"\n",
         ] {
             std::fs::write(&file, text).unwrap();
             let error = nothing.resolved(None, Some(&file)).unwrap_err();
-            let words = error.to_string();
-            assert!(
-                error.is_configuration() && words.starts_with(&format!("{}: ", file.display())),
-                "{words}"
-            );
-            assert!(words.contains(part), "{words}");
+            assert!(error.is_configuration(), "{error}");
+            told.push(error.to_string());
         }
+        insta::assert_snapshot!(told.join("\n").replace(folder.path().to_str().unwrap(), "FOLDER"));
     }
 }

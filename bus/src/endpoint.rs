@@ -81,19 +81,10 @@ mod tests {
         ] {
             assert_eq!(endpoint(text).as_deref(), Ok(expected), "{text}");
         }
-        for (text, expected) in [
-            ("", MUST_BE),
-            ("nonsense", MUST_BE),
-            (":7447", MUST_BE),
-            ("tcp/", MUST_BE),
-            ("unixsock-stream/", MUST_BE),
-            ("127.0.0.1:99999", "has the port \"99999\", must be 0 to 65535"),
-            ("tcp/127.0.0.1:", "has the port \"\", must be 0 to 65535"),
-            ("udp/127.0.0.1:1", "has the protocol \"udp\", must have one of tcp, tls, unixsock-stream"),
-            ("::1", "must have its IPv6 address in brackets, and a port: [::1]:7447"),
-            ("imu::1:7447", "must have its IPv6 address in brackets: [imu::1]:7447"),
-        ] {
-            assert_eq!(endpoint(text).unwrap_err(), expected, "{text}");
+        for text in ["", "nonsense", ":7447", "tcp/", "unixsock-stream/"] {
+            assert_eq!(endpoint(text).unwrap_err(), MUST_BE, "{text}");
         }
+        let wrong = ["127.0.0.1:99999", "tcp/127.0.0.1:", "udp/127.0.0.1:1", "::1", "imu::1:7447"];
+        insta::assert_snapshot!(wrong.map(|text| endpoint(text).unwrap_err()).join("\n"));
     }
 }

@@ -279,18 +279,9 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_text_is_told_without_its_wrapping() {
         let option = zenoh::Config::default().insert_json5("namespace", "\"a//b\"").unwrap_err();
-        let problem = Json5Problem::of(&option);
-        assert!(problem.message.starts_with("Invalid Key Expr `a//b`"), "{problem:?}");
-        assert!(
-            !problem.message.contains("Json5Err") && !problem.message.contains("Location"),
-            "{problem:?}"
-        );
         let word = zenoh::Config::from_json5("{\n  mode: \"peerx\" }").unwrap_err();
-        let problem = Json5Problem::of(&word);
-        assert!(problem.message.starts_with("unknown variant `peerx`"), "{problem:?}");
         let syntax = zenoh::Config::from_json5("{bad: ").unwrap_err();
-        let expected = "expected array, boolean, null, number, object, or string".to_owned();
-        assert_eq!(Json5Problem::of(&syntax), Json5Problem { place: Some((1, 7)), message: expected });
+        insta::assert_debug_snapshot!([option, word, syntax].map(|error| Json5Problem::of(&error)));
     }
 
     #[test]

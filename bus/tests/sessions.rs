@@ -225,7 +225,7 @@ async fn waits_end_with_a_sentence() {
     let short = Duration::from_millis(20);
     let options = ProducerOptions { match_timeout: short, ..ProducerOptions::default() };
     let error = Producer::declare(&alone, &unit("X"), options).await.unwrap_err();
-    assert!(error.to_string().starts_with("nobody subscribes to imu/X/raw/gyro after 20 ms"), "{error}");
+    assert!(matches!(&error, BusError::NoSubscriber { key, .. } if key == "imu/X/raw/gyro"), "{error}");
     let error = presence::wait_for_service(&alone, short).await.unwrap_err();
     assert!(matches!(error, BusError::NoService { .. }), "{error}");
 
@@ -269,9 +269,7 @@ async fn sites_in_different_namespaces_do_not_hear_each_other() {
     let other = connected(&service).await;
     let error = presence::wait_for_service(&other, Duration::from_millis(50)).await.unwrap_err();
     assert!(matches!(error, BusError::NoService { .. }), "{error}");
-    let words =
-        format!("no service at {} answers on imu/*/status within 50 ms: start", locators(&service)[0]);
-    assert!(error.to_string().starts_with(&words), "{error}");
+    insta::assert_snapshot!(error.to_string().replace(&locators(&service)[0], "ENDPOINT"));
 }
 
 #[tokio::test(flavor = "multi_thread")]

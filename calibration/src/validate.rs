@@ -245,7 +245,7 @@ fn missing(document: &Document, report: &mut Report) -> Result<(), Error> {
             report.warnings.push(format!(
                 "{kind} {axes}: no window is complete and without flags, so {} cannot be judged: check the flags \
                  with isotherm-replay correct, and choose a shorter --window if the log has gaps",
-                if with == 1 { "it" } else { "them" }
+                if with == 1 { "it" } else { "they" }
             ));
         }
     }

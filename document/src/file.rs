@@ -57,10 +57,9 @@ mod tests {
     fn what_is_no_text_has_one_problem() {
         let words = |bytes: &[u8]| text(bytes, Some("f")).unwrap_err()[0].to_string();
         assert_eq!(text("°".as_bytes(), Some("f")), Ok("°"));
-        assert!(words(b"a = 1\n\xff").starts_with("f:2:1: is not UTF-8 at byte 6"));
-        assert!(words(&vec![b'#'; MAX_BYTES + 1]).contains("is longer than 1048576 bytes"));
-        assert!(
-            words(b"\x89MCAP0\r\n\xff").ends_with("it looks like a recording (MCAP), which is no document")
+        let long = vec![b'#'; MAX_BYTES + 1];
+        insta::assert_snapshot!(
+            [b"a = 1\n\xff".as_slice(), &long, b"\x89MCAP0\r\n\xff"].map(words).join("\n")
         );
         let zero = read_bounded(Path::new("/dev/zero")).unwrap();
         assert_eq!(zero.len(), MAX_BYTES + 1);

@@ -45,6 +45,7 @@ mod number;
 mod problem;
 mod reader;
 mod schema;
+mod slips;
 mod stand_in;
 mod suggest;
 mod text;

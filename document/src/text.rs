@@ -1,7 +1,5 @@
 //! From bytes to the root of a TOML text: size, UTF-8, syntax, version. What is wrong here ends the matter.
 
-use std::ops::Range;
-
 use toml::Spanned;
 use toml::de::DeTable;
 use toml_parser::Source;
@@ -11,15 +9,13 @@ use crate::looks::{doubt, looks_like};
 use crate::problem::Problem;
 use crate::reader::{MAX_PROBLEMS, Reader};
 use crate::schema::Form;
+use crate::slips::slip;
 
 /// Longest text that is read, in bytes.
 pub const MAX_BYTES: usize = 1 << 20;
 
 /// What the TOML parser says of a key that is given twice.
 const DUPLICATE_KEY: &str = "duplicate key";
-
-/// How far from an error a number with blanks is looked for (characters).
-const LONGEST_NUMBER: usize = 40;
 
 /// Length up to which a text is read in one go (bytes).
 const FIRST_PART: usize = 1 << 12;
@@ -78,19 +74,25 @@ impl<'t> Reader<'t> {
         let mut told_until = 0;
         for error in &errors {
             let span = error.span().unwrap_or(0..0);
-            let number = misspelt_number(text, span.start);
-            // To the parser nothing behind an open bracket makes sense; numbers in its line are wrong all the same.
-            let is_lost = lost.is_some_and(|(opening, end)| {
-                span.start >= opening && (number.is_none() || span.start >= end)
-            });
-            // It finds fault with each part of a number.
+            let slip = slip(text, span.start);
+            // To the parser nothing behind an open bracket makes sense; slips in its line are wrong all the same.
+            let is_lost = lost
+                .is_some_and(|(opening, end)| span.start >= opening && (slip.is_none() || span.start >= end));
+            // It finds fault with each part of a value.
             if is_lost || span.start < told_until {
                 continue;
             }
-            let message = match (error.message(), number) {
-                (DUPLICATE_KEY, _) => {
-                    format!("TOML: {DUPLICATE_KEY} `{}`: remove one", self.excerpt(span.clone()))
-                }
+            let message = match (error.message(), slip) {
+                (DUPLICATE_KEY, _) => match header(text, span.start) {
+                    Some((path, end)) => {
+                        // All its keys stand there already.
+                        told_until = end;
+                        format!(
+                            "TOML: a second table `{path}`: where there are several, write [[{path}]] for each"
+                        )
+                    }
+                    None => format!("TOML: {DUPLICATE_KEY} `{}`: remove one", self.excerpt(span.clone())),
+                },
                 (_, Some((item, advice))) => {
                     let written = text.get(item.clone()).unwrap_or_default().trim();
                     told_until = item.end;
@@ -141,98 +143,76 @@ fn unclosed(text: &str) -> Option<(usize, char)> {
     open.first().copied()
 }
 
-/// A number that is written as people write it, at the offset of an error: where, and what to write.
-fn misspelt_number(text: &str, offset: usize) -> Option<(Range<usize>, String)> {
-    let (before, after) = text.split_at_checked(offset)?;
-    let length = |characters: &mut dyn Iterator<Item = char>, ends: &str| -> usize {
-        characters.take(LONGEST_NUMBER).take_while(|c| !ends.contains(*c)).map(char::len_utf8).sum()
-    };
-    let start = offset - length(&mut before.chars().rev(), "[]{}=,#\r\n");
-    let end = offset + length(&mut after.chars(), "[]{}=,#\r\n");
-    let item = text.get(start..end)?.trim();
-    let number = |written: &str| {
-        (written.contains(|c: char| c.is_ascii_digit()) && written.parse::<f64>().is_ok())
-            .then(|| written.to_owned())
-    };
-    if item.contains(char::is_whitespace)
-        && let Some(number) = number(&item.split_whitespace().collect::<String>())
-    {
-        let in_list = text.get(..start).is_some_and(|before| before.ends_with(['[', ',']));
-        let comma = if in_list { ", or put a comma between" } else { "" };
-        return Some((start..end, format!("has blanks between its digits: write {number}{comma}")));
-    }
-    let prefix = |(end, _)| {
-        number(item.get(..end)?).map(|number| (number, item.get(end..).unwrap_or_default().trim()))
-    };
-    if let Some((first, unit)) = item.char_indices().rev().find_map(prefix)
-        && unit.starts_with(|c: char| c.is_alphabetic() || "°%″′\"".contains(c))
-        && !unit.contains(|c: char| c.is_ascii_digit())
-    {
-        return Some((start..end, format!("is a number with a unit: write {first}, the key names the unit")));
-    }
-    let end = offset + length(&mut after.chars(), "[]{}=#\r\n");
-    let with_point = number(&text.get(start..end)?.trim().replacen(',', ".", 1))?;
-    after.starts_with(',').then(|| (start..end, format!("has a decimal comma: write {with_point}")))
+/// The path of a table whose header stands at an offset, and where the next table begins.
+fn header(text: &str, offset: usize) -> Option<(&str, usize)> {
+    let (before, _) = text.split_at_checked(offset)?;
+    let start = before.rfind('\n').map_or(0, |end| end + 1);
+    let line = text.get(start..)?.lines().next()?;
+    let (path, _) = line.trim_start().strip_prefix('[')?.split_once(']')?;
+    let next = text.get(offset..)?.find("\n[").map_or(text.len(), |next| offset + next);
+    Some((path, next))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// What is wrong with the syntax of a text.
+    fn problems(text: &str) -> Vec<Problem> {
+        let mut reader = Reader::new(text, Some("f"));
+        let _ = reader.root(&Form { schema: serde_json::Value::Null, versions: None });
+        reader.into_problems().unwrap_or_default()
+    }
+
+    /// The parser finds fault with each part of it.
     #[test]
-    fn a_number_as_people_write_it_is_told_once_with_what_to_write() {
-        const BLANKS: &str = "has blanks between its digits";
-        for (value, written, told, number) in [
-            ("1 440", "1 440", BLANKS, "1440"),
-            ("12\u{202f}345.5 # pasted", "12\u{202f}345.5", BLANKS, "12345.5"),
-            ("[1, -1\u{a0}440, 2]", "-1\u{a0}440", BLANKS, "-1440, or put a comma between"),
-            ("[-40 60 80]", "-40 60 80", BLANKS, "-406080, or put a comma between"),
-            ("25,5", "25,5", "has a decimal comma", "25.5"),
-            ("-0,5e-3 # V", "-0,5e-3", "has a decimal comma", "-0.5e-3"),
-            ("25.0°C", "25.0°C", "is a number with a unit", "25.0, the key names the unit"),
-            ("[1, 25 ppm]", "25 ppm", "is a number with a unit", "25, the key names the unit"),
-        ] {
-            let text = &format!("a = 1\nb = {value}\n");
-            let mut reader = Reader::new(text, Some("f"));
-            assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
-            let problems = reader.into_problems().unwrap();
-            let words = format!("TOML: `{written}` {told}: write {number}");
+    fn a_slip_is_told_once_with_what_to_write() {
+        let told = [
+            "1 440",
+            "12\u{202f}345.5 # pasted",
+            "[1, -1\u{a0}440, 2]",
+            "[-40 60 80]",
+            "[0.45 0.008]",
+            "25,5",
+            "-0,5e-3 # V",
+            "25.0°C",
+            "[1, 25 ppm]",
+            "−1",
+            "“x”",
+            "21.11.2026",
+        ]
+        .map(|value| {
+            let text = format!("a = 1\nb = {value}\n");
+            let problems = problems(&text);
+            // The parser finds fault with each part of some of them.
             assert_eq!(problems.len(), 1, "{problems:?}");
-            assert_eq!((problems[0].line, &problems[0].message), (2, &words));
-        }
-        assert_eq!(misspelt_number("a = b 1\n", 4), None);
+            problems[0].to_string()
+        });
+        insta::assert_snapshot!(told.join("\n"));
+    }
+
+    #[test]
+    fn a_table_that_should_be_one_of_several_is_told_once() {
+        let sensor = |name: &str| format!("[gyro.sensor]\nname = \"{name}\"\nchannel = \"c\"\n");
+        let text = sensor("x") + &sensor("y") + &sensor("z") + "[accel]\na = 1\na = 2\n";
+        let told: String = problems(&text).iter().map(|problem| problem.to_string() + "\n").collect();
+        insta::assert_snapshot!(told);
     }
 
     #[test]
     fn a_bracket_that_is_not_closed_is_told_where_it_stands_and_nothing_of_what_follows() {
         let rest = "\n[accel]\nscale = [\n1,\n2]\n[[sensor]]\nname = \"x\"\n";
-        for (line, column, told) in [
-            ("b = { kind = \"a}\", c = [1, 2]", 5, ["`{` is not closed: put `}`"].as_slice()),
-            ("b = [1, 2 # ]", 5, &["`[` is not closed: put `]`"]),
-            ("b = { c = [1, 2 }", 11, &["`[` is not closed: put `]`"]),
-            ("b = { c = 1 440", 5, &["`{` is not closed: put `}`", "`1 440` has blanks"]),
-        ] {
-            for (text, at) in [
-                (format!("a = 1\n{line}{rest}"), 2),
-                (format!("a = 1\n{line}"), 2),
-                (format!("a = =\n{line}{rest}"), 2),
-            ] {
-                let mut reader = Reader::new(&text, Some("f"));
-                assert!(reader.root(&Form { schema: serde_json::Value::Null, versions: None }).is_none());
-                let problems = reader.into_problems().unwrap();
-                let here: Vec<_> = problems.iter().filter(|problem| problem.line == at).collect();
-                assert_eq!(
-                    problems.len() - here.len(),
-                    usize::from(text.starts_with("a = =")),
-                    "{problems:?}"
-                );
-                assert_eq!((here.len(), here[0].column), (told.len(), column), "{text}: {here:?}");
-                assert!(
-                    here.iter().zip(told).all(|(problem, told)| problem.message.contains(told)),
-                    "{here:?}"
-                );
+        let mut told = String::new();
+        for line in
+            ["b = { kind = \"a}\", c = [1, 2]", "b = [1, 2 # ]", "b = { c = [1, 2 }", "b = { c = 1 440"]
+        {
+            for text in
+                [format!("a = 1\n{line}{rest}"), format!("a = 1\n{line}"), format!("a = =\n{line}{rest}")]
+            {
+                told += &problems(&text).iter().map(|problem| problem.to_string() + "\n").collect::<String>();
             }
         }
+        insta::assert_snapshot!(told);
     }
 
     /// As fast as they are listed: a service reads what anyone sends.

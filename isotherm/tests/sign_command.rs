@@ -95,19 +95,14 @@ fn a_document_signed_with_a_new_key_is_known_as_its_signers() {
 
     let (code, out, err) = said(&place.run(&["sign", "unit.toml", "--key", "bench-2.key"]));
     assert_eq!((code, err.as_str()), (Some(0), ""));
-    assert!(
-        out.starts_with(&format!("unit.toml: calibration of unit ZLG-0001, signed by key {id}, sha256 ")),
-        "{out}"
-    );
     let text = place.text("unit.toml");
     assert!(text.strip_prefix(&document()).unwrap().starts_with(&format!("{MARK}{id} ")));
 
     let (code, checked, err) = said(&place.run(&["check", "--trusted-keys", "trusted", "unit.toml"]));
     assert_eq!((code, err.as_str()), (Some(0), ""));
-    assert!(checked.trim_end().ends_with(&format!(", signed by Anna ({id})")), "{checked}");
     // The digest is that of the signed text, the one that outputs will name.
     let digest = out.trim_end().rsplit(' ').next().unwrap();
-    assert!(checked.contains(&format!("sha256 {digest}")), "{out}{checked}");
+    insta::assert_snapshot!(format!("{out}{checked}").replace(digest, "DIGEST").replace(id, "KEY-ID"));
 }
 
 #[test]
@@ -117,8 +112,8 @@ fn check_tells_unsigned_unverified_and_wrong_apart() {
     let trusted = ["--trusted-keys", "trusted"];
     let (code, out, _) = check(&trusted);
     assert_eq!(code, Some(0));
-    assert!(out.trim_end().ends_with(", unsigned"), "{out}");
-    assert!(!check(&[]).1.contains("signed"), "{out}");
+    let digest = out.rsplit_once("sha256 ").unwrap().1.split(',').next().unwrap().to_owned();
+    let mut told = out + &check(&[]).1;
 
     place.run(&["sign", "unit.toml", "--key", "anna.key"]);
     let signature = |arguments: &[&str]| {
@@ -131,39 +126,27 @@ fn check_tells_unsigned_unverified_and_wrong_apart() {
     assert_eq!((&signed_by["state"], &signed_by["name"]), (&"signed".into(), &"anna".into()));
 
     let signed = place.text("unit.toml");
-    let line = signed.lines().count();
-    for (changed, start, part) in [
-        (
-            signed.replacen("schema = 1", "schema = 1 ", 1),
-            format!("unit.toml:{line}:1: the signature of anna"),
-            "changed",
-        ),
-        (
-            signed.replace('\n', "\r\n"),
-            format!("unit.toml:{line}:136: the signature line ends with CRLF"),
-            "changed",
-        ),
-        (format!("{signed}# ok\n"), format!("unit.toml:{}:1: something was put after", line + 1), "changed"),
-        (
-            format!("{signed}{signed}"),
-            format!("unit.toml:{}:1: is a second signature line", 2 * line),
-            "keep one",
-        ),
+    for changed in [
+        signed.replacen("schema = 1", "schema = 1 ", 1),
+        signed.replace('\n', "\r\n"),
+        format!("{signed}# ok\n"),
+        format!("{signed}{signed}"),
     ] {
         place.write("unit.toml", &changed);
         let (code, out, err) = check(&trusted);
         assert_eq!((code, out.as_str()), (Some(78), ""), "{err}");
-        let problem = err.lines().last().unwrap();
-        assert!(problem.starts_with(&start) && problem.contains(part), "{err}");
+        told += &(err.lines().last().unwrap().to_owned() + "\n");
     }
 
     place.write("unit.toml", &signed);
     std::fs::remove_file(place.path("trusted/anna.pub")).unwrap();
-    place.keygen("bert");
+    let bert = place.keygen("bert");
     place.trust("bert", "bert");
     let (code, _, err) = check(&trusted);
     assert_eq!(code, Some(78));
-    assert!(err.contains("unit.toml:") && err.contains("bert ("), "{err}");
+    let anna = signed.lines().last().unwrap().strip_prefix(MARK).unwrap().split(' ').next().unwrap();
+    let told = (told + &err).replace(&digest, "DIGEST").replace(anna, "KEY-OF-ANNA");
+    insta::assert_snapshot!(told.replace(bert["key_id"].as_str().unwrap(), "KEY-OF-BERT"));
 }
 
 #[test]
@@ -172,12 +155,7 @@ fn a_document_that_is_bad_is_not_signed_and_neither_are_those_beside_it() {
     place.write("bad.toml", "schema = 1\nunit = \"a b\"\n");
     let (code, out, err) = said(&place.run(&["sign", "unit.toml", "bad.toml", "--key", "anna.key"]));
     assert_eq!((code, out.as_str()), (Some(78), ""));
-    assert!(err.lines().any(|line| line.starts_with("bad.toml:2:8: unit: is \"a b\"")), "{err}");
-    assert!(
-        err.lines().any(|line| line.starts_with("bad.toml:1:1: gyro: is missing")),
-        "every problem: {err}"
-    );
-    assert!(err.ends_with("isotherm: none of the documents was signed\n"), "{err}");
+    insta::assert_snapshot!(err);
     assert_eq!(place.text("unit.toml"), document());
     for (name, bytes) in [("empty.toml", &b""[..]), ("binary.toml", b"\xff\0")] {
         std::fs::write(place.path(name), bytes).unwrap();
@@ -195,7 +173,8 @@ fn a_signature_is_replaced_only_when_told() {
     let once = place.text("unit.toml");
     let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "bert.key"]));
     assert_eq!(code, Some(1));
-    assert!(err.starts_with("unit.toml: is already signed, by key ") && err.contains("--overwrite"), "{err}");
+    let key = once.lines().last().unwrap().strip_prefix(MARK).unwrap().split(' ').next().unwrap();
+    insta::assert_snapshot!(err.replace(key, "KEY-ID"));
     assert_eq!(place.text("unit.toml"), once);
 
     assert_eq!(place.run(&["sign", "--overwrite", "unit.toml", "--key", "bert.key"]).status.code(), Some(0));
@@ -220,7 +199,7 @@ fn the_original_stays_where_an_output_is_named() {
     assert_eq!(place.run(&two).status.code(), Some(2), "one output for two documents");
     let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "anna.key", "--out", "no/x.toml"]));
     assert_eq!(code, Some(1));
-    assert!(err.starts_with("unit.toml: cannot write no/x.toml: its folder does not exist"), "{err}");
+    insta::assert_snapshot!(err);
     assert_eq!(place.run(&["sign", "unit.toml", "--key", "anna.key", "--out", "."]).status.code(), Some(1));
     assert_eq!(place.names(), ["anna.key", "anna.pub", "signed.toml", "trusted", "unit.toml"]);
 }
@@ -242,7 +221,7 @@ fn a_pair_of_keys_is_private_and_never_overwritten() {
     let place = Place::new();
     let (code, out, err) = said(&place.run(&["keygen", "v1.2"]));
     assert_eq!((code, err.as_str()), (Some(0), ""));
-    assert!(out.contains("v1.2.key") && out.contains("v1.2.pub") && out.contains("key id "), "{out}");
+    assert!(out.contains("v1.2.key") && out.contains("v1.2.pub"), "{out}");
     assert_eq!(place.mode("v1.2.key"), 0o600);
     let (private, public) = (place.text("v1.2.key"), place.text("v1.2.pub"));
     let (code, _, err) = said(&place.run(&["keygen", "v1.2"]));
@@ -310,41 +289,34 @@ fn a_key_that_others_can_read_is_warned_about() {
     std::fs::set_permissions(place.path("anna.key"), Permissions::from_mode(0o644)).unwrap();
     let (code, _, err) = said(&place.run(&["sign", "unit.toml", "--key", "anna.key"]));
     assert_eq!(code, Some(0));
-    assert_eq!(
-        err,
-        "anna.key:1:1: is a private key that others can read (mode 644): `chmod 600 anna.key` (warning)\n"
-    );
-
+    let told = err;
     std::fs::set_permissions(place.path("trusted/anna.pub"), Permissions::from_mode(0o666)).unwrap();
     let (code, _, err) = said(&place.run(&["check", "unit.toml", "--trusted-keys", "trusted"]));
     assert_eq!(code, Some(0));
-    assert!(
-        err.starts_with("trusted/anna.pub:1:1: decides who is trusted, but everybody may write to it"),
-        "{err}"
-    );
+    insta::assert_snapshot!(told + &err);
 }
 
 #[test]
 fn what_is_no_private_key_is_refused_by_name() {
     let place = Place::with_signer("anna");
     place.write("garbage.key", "-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n");
-    for (key, code, part) in [
-        ("anna.pub", 78, "anna.pub:1:1: has a block \"PUBLIC KEY\", must be \"PRIVATE KEY\""),
-        ("garbage.key", 78, "garbage.key:1:1: is damaged: "),
-        ("unit.toml", 78, "unit.toml:1:1: is not PEM text"),
-        ("missing.key", 1, "missing.key:1:1: cannot be read: "),
-    ] {
+    let mut told = String::new();
+    for (key, code) in [("anna.pub", 78), ("garbage.key", 78), ("unit.toml", 78), ("missing.key", 1)] {
         let (exit, out, err) = said(&place.run(&["sign", "unit.toml", "--key", key]));
         assert_eq!((exit, out.as_str()), (Some(code), ""), "{key}");
-        assert!(err.starts_with(part), "{err}");
+        told += &err;
     }
+    insta::assert_snapshot!(told);
     assert_eq!(place.text("unit.toml"), document());
 }
 
 #[test]
 fn every_bad_file_among_the_trusted_keys_is_named() {
-    let place = Place::with_signer("anna");
-    place.trust("anna", "anna-again");
+    let place = Place::new();
+    let anna = place.keygen("anna");
+    for name in ["anna", "anna-again"] {
+        place.trust("anna", name);
+    }
     place.write("trusted/secret.pub", &place.text("anna.key"));
     place.write("trusted/text.pub", "ssh-ed25519 AAAA\n");
     symlink("nowhere", place.path("trusted/gone.pub")).unwrap();
@@ -353,20 +325,11 @@ fn every_bad_file_among_the_trusted_keys_is_named() {
     let check = ["check", "unit.toml", "--trusted-keys", "trusted"];
     let (code, out, err) = said(&place.run(&check));
     assert_eq!((code, out.as_str()), (Some(78), ""));
-    let problems: Vec<_> = err.lines().collect();
-    for (problem, start) in problems.iter().zip([
-        "trusted/anna.pub:1:1: is the same key as anna-again (",
-        "trusted/gone.pub:1:1: cannot be read: ",
-        "trusted/secret.pub:1:1: has a block \"PRIVATE KEY\", must be \"PUBLIC KEY\": this is the secret half",
-        "trusted/text.pub:1:1: is not PEM text",
-    ]) {
-        assert!(problem.starts_with(start), "{problem}\nnot {start}");
-    }
-    assert_eq!(problems.len(), 4, "{err}");
+    let told = err.replace(anna["key_id"].as_str().unwrap(), "KEY-ID");
 
     let (code, _, err) = said(&place.run(&["check", "unit.toml", "--trusted-keys", "missing"]));
     assert_eq!(code, Some(78));
-    assert!(err.starts_with("missing:1:1: cannot be read: "), "{err}");
+    insta::assert_snapshot!(told + &err);
 }
 
 #[test]

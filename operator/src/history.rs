@@ -194,9 +194,6 @@ mod tests {
             [accepted(12_345, "/home/ann/bench/units/ZLG-0001.toml", change), accepted(1, "/u.toml", "x")];
         let text = table(&entries);
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
-        assert!(
-            text.contains("ZLG-0001.toml") && text.contains("0.45 -> 0.41") && !text.contains("/home"),
-            "{text}"
-        );
+        insta::assert_snapshot!(text);
     }
 }

@@ -189,14 +189,11 @@ mod tests {
             report.units.retain(|status| status.unit != "ZLG-0002");
             error
         };
-        let error = refused(&mut report, "ZLG-9999");
-        assert!(error.contains("no unit ZLG-9999; it has heard ZLG-0001, ZLG-0002"), "{error}");
-        let error = refused(&mut report, "ZLG-0002");
-        assert!(error.contains("did not answer"), "its service has it: {error}");
+        // The second of them its service has.
+        insta::assert_snapshot!(["ZLG-9999", "ZLG-0002"].map(|unit| refused(&mut report, unit)).join("\n"));
         select(&mut report, &serial("ZLG-0003"), "here").unwrap();
         assert_eq!((report.units.len(), report.services.len()), (1, 1));
-        let page = tone::text(&pages(&report, 80), false);
-        assert!(page.starts_with("○ ZLG-0003  standby"), "{page}");
+        assert_eq!(report.units[0].unit, "ZLG-0003");
     }
 
     #[test]
@@ -204,7 +201,6 @@ mod tests {
         let units = vec![samples::faulty("ZLG-0005")];
         let services = vec![samples::service(&units)];
         let report = Report { services, units, instances: Vec::new() };
-        let text = tone::text(&table(&report, TABLE_COLUMNS), false);
-        assert!(text.contains("! 1 faulty") && text.contains("last 3 s ago"), "{text}");
+        insta::assert_snapshot!(tone::text(&table(&report, TABLE_COLUMNS), false));
     }
 }

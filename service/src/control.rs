@@ -17,6 +17,7 @@
 //! | `start` | what holds when the service starts |
 //! | `command`, `pre_launch` | commands, rollback among them; the result of a pre-launch calibration |
 //! | `carry` | what another instance has written down, written down here too |
+//! | `unlikely` | what a document changes too much to be meant |
 //! | `refusals` | refused documents, written down once |
 //! | `control_status` | what the service's own status shows |
 //! | [`compressed`] | texts that are kept for long and read seldom |
@@ -38,6 +39,7 @@ mod request;
 pub mod revision;
 mod start;
 pub mod store;
+mod unlikely;
 pub mod watch;
 
 pub(crate) use carry::Carried;

@@ -5,7 +5,7 @@ mod mems;
 mod shared;
 mod zeeman;
 
-pub use fibre_optic::{fibre_optic_chamber, judging_profile, training_profile};
+pub use fibre_optic::{fibre_optic_chamber, judging_profile, paper_profile, training_profile};
 pub use mems::{mems_chamber, skewed_six};
 pub use zeeman::{zeeman_rest, zeeman_sine};
 

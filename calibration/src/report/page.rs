@@ -29,8 +29,12 @@ impl Report {
             page.heading("Warnings");
             self.warnings.iter().for_each(|warning| page.paragraph(warning));
         }
-        let summary = if self.summary.is_some() { "Summary" } else { "Before and after" };
-        section(&mut page, summary, &self.rows(false));
+        // A document that is shown was not judged.
+        let was_judged = self.verdicts.iter().any(Verdict::has_samples);
+        if self.summary.is_some() || was_judged {
+            let summary = if self.summary.is_some() { "Summary" } else { "Before and after" };
+            section(&mut page, summary, &self.rows(false));
+        }
         self.over_time(&mut page);
         self.over_temperature(&mut page);
         for (heading, chart) in &self.charts {

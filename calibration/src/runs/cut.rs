@@ -59,9 +59,7 @@ mod tests {
         cut.note("log.csv.gz", &LogReport::Text(ReadReport { skipped_rows: 3, ..ReadReport::default() }));
         assert_eq!(copy.words(), None, "rows that are passed over are no cut");
         cut.note("log.csv.gz", &LogReport::Text(ReadReport { cut_short: true, ..ReadReport::default() }));
-        assert!(
-            copy.words().is_some_and(|words| words.contains("log.csv.gz") && words.contains("cut short"))
-        );
+        insta::assert_snapshot!(copy.words().unwrap());
         // The first place counts.
         copy.recording("other.mcap: ends in the middle");
         let other = Cut::default();

@@ -86,6 +86,6 @@ mod tests {
         let wanted = [None, None, Some(Fault::Dead(2.5)), Some(Fault::Missing([200, 200])), twin(0), twin(1)];
         assert_eq!(found, wanted);
         assert_eq!(Fault::of(&[]), None);
-        assert!(Fault::Twin(3).words("gyro", 6).contains("as gyro 4: "));
+        insta::assert_snapshot!(Fault::Twin(3).words("gyro", 6));
     }
 }

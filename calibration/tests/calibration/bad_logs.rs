@@ -38,15 +38,16 @@ fn nothing_is_replaced_without_overwrite() {
         &["diff", &mems, &mems],
         &["validate", &fog, &log],
     ];
+    let mut told = String::new();
     for command in commands {
         let html = |more: &[&'static str]| [command, &["--html", &notes], more].concat();
-        let refused = fails(&html(&[]), 2);
-        assert!(refused.contains("notes.txt exists") && refused.contains("--overwrite"), "{refused}");
+        told += &fails(&html(&[]), 2);
         assert_eq!(std::fs::read_to_string(&notes).unwrap(), "mine", "{command:?}");
         calibrate(&html(&["--overwrite"]));
         assert!(std::fs::read_to_string(&notes).unwrap().contains("<html"), "{command:?}");
         std::fs::write(&notes, "mine").unwrap();
     }
+    insta::assert_snapshot!(told.replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
 
 #[test]
@@ -65,16 +66,10 @@ fn outputs_are_checked_before_anything_is_read() {
         &["impact", &log, "--html", &page],
         &["merge", &document, &document, "--out", &out],
     ];
-    for command in commands {
-        let refused = fails(command, 2);
-        assert!(
-            refused.contains(&format!("first create the folder with mkdir -p {}", path("made"))),
-            "{refused}"
-        );
-    }
     let both = path("both");
-    let refused = fails(&["thermal", &log, "--out", &both, "--html", &both], 2);
-    assert!(refused.contains("would be overwritten"), "{refused}");
+    let told = commands.map(|command| fails(command, 2)).concat()
+        + &fails(&["thermal", &log, "--out", &both, "--html", &both], 2);
+    insta::assert_snapshot!(told.replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
 
 #[test]
@@ -94,13 +89,9 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
     ];
     for command in commands {
         let (code, said, errors) = words(&calibrate(command));
-        assert!(code == Some(3) && errors.contains("finished with data loss:"), "{command:?}: {errors}");
-        assert!(
-            said.contains("cut short") && said.contains("isotherm-replay recover"),
-            "{command:?}: {said}"
-        );
+        assert!(code == Some(3) && said.contains("cut.mcap"), "{command:?}: {said}{errors}");
     }
-    assert!(std::fs::read_to_string(&page).unwrap().contains("cut short"));
+    assert!(std::fs::read_to_string(&page).unwrap().contains("cut.mcap"));
     // A batch, of which one log is cut.
     let other = path("other.mcap");
     record(Path::new(&other), &fibre_optic(6, "FOG-0002", 3000.0));
@@ -126,13 +117,10 @@ fn a_recording_that_is_cut_short_is_told_by_every_command_and_ends_with_3() {
         &["rates", &nothing, "--axis", "z", "--rates", "1,-1", "--remove-mean"],
         &["drift", &nothing, "--unit", "FOG-0001"],
     ];
-    for command in commands {
-        let refused = fails(command, 1);
-        assert!(refused.contains("cut short") && refused.contains("nothing.mcap"), "{command:?}: {refused}");
-    }
+    let mut told = commands.map(|command| fails(command, 1)).concat();
     std::fs::write(&nothing, "").unwrap();
-    let refused = fails(&["drift", &nothing], 1);
-    assert!(refused.contains("nothing.mcap is empty"), "{refused}");
+    told += &fails(&["drift", &nothing], 1);
+    insta::assert_snapshot!(told.replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
 
 #[test]
@@ -150,22 +138,20 @@ fn swapped_columns_are_pointed_out_where_the_attitude_is_stated() {
         let stated = ["--latitude", "55.75", "--heading", "30", "--pitch", "0", "--roll", "0", "--json"];
         let (_, said, errors) = words(&calibrate(&[&["validate", &fog(), &log][..], &stated].concat()));
         let report: Value = serde_json::from_str(&said).unwrap_or_default();
-        format!("{}{errors}", report["warnings"])
+        format!("{:#}\n{errors}", report["warnings"])
     };
     let sound = warnings(&|_| ());
-    assert!(!sound.contains("look swapped"), "{sound}");
     let gyros = warnings(&|event| {
         if let LogEvent::Gyro { tick, .. } = event {
             tick.readings.swap(0, 2);
         }
     });
-    assert!(gyros.contains("swapped.mcap: gyros x and z look swapped"), "{gyros}");
     let accelerometers = warnings(&|event| {
         if let LogEvent::Accel { tick, .. } = event {
             tick.readings.swap(1, 2);
         }
     });
-    assert!(accelerometers.contains("accelerometers y and z look swapped"), "{accelerometers}");
+    insta::assert_snapshot!([sound, gyros, accelerometers].join("\n"));
 }
 
 #[test]
@@ -201,20 +187,20 @@ fn positions_with_swapped_columns_name_them() {
             tick.readings.swap(0, 2);
         }
     };
+    let mut told = String::new();
     for plan in ["twelve", "six"] {
-        let (code, sound) = call(plan, &[], &|_| ());
-        assert!(code == Some(0) && !sound.contains("swapped") && !sound.contains("is found"), "{sound}");
-        let (code, refused) = call(plan, &[], &accelerometers);
-        let hint = "with accelerometers x and y swapped they would agree; check the columns";
-        assert!(code == Some(1) && refused.contains(hint), "{refused}");
         // The gyros do not matter for what is found, but for whoever corrects with that mapping.
-        let (code, told) = call(plan, &[], &gyros);
-        assert!(code == Some(0) && told.contains("with gyros x and z swapped they would agree"), "{told}");
+        let none = |_: &mut LogEvent| {};
+        let changes: [&dyn Fn(&mut LogEvent); 3] = [&none, &accelerometers, &gyros];
+        for (change, expected) in changes.into_iter().zip([0, 1, 0]) {
+            let (code, said) = call(plan, &[], change);
+            assert_eq!(code, Some(expected), "{said}");
+            told += &said;
+        }
     }
     // Where the times are stated nothing is matched: what is found is far from what the document states.
     let (_, turned) = call("twelve", &["--times", &times], &accelerometers);
-    assert!(turned.contains("accelerometers x and y look swapped: "), "{turned}");
-    assert!(!turned.contains("of accelerometer z along"), "{turned}");
+    insta::assert_snapshot!((told + &turned).replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
 
 #[test]
@@ -238,21 +224,17 @@ fn modes_point_out_swapped_columns_where_the_attitude_is_stated() {
         let call = ["modes", log.to_str().unwrap(), "--calibration", base.to_str().unwrap()];
         let (_, said, errors) = words(&calibrate(&[&call[..], &stated].concat()));
         let report: Value = serde_json::from_str(&said).unwrap_or_default();
-        format!("{}{errors}", report["warnings"])
+        format!("{:#}\n{errors}", report["warnings"])
     };
-    let sound = warnings([false, false]);
-    assert!(!sound.contains("swapped"), "{sound}");
-    let both = warnings([true, true]);
-    for sensors in ["gyros x and z look swapped", "accelerometers x and z look swapped"] {
-        assert!(both.contains(sensors), "{both}");
-    }
+    let told = warnings([false, false]) + &warnings([true, true]);
     // The right columns, and the heading of another log.
     let _ = std::fs::remove_file(&log);
     record_events(&log, "ZLG-0001", events_of(&[zeeman(1, chamber())]));
     let call =
         ["modes", log.to_str().unwrap(), "--calibration", base.to_str().unwrap(), "--latitude", "55.75"];
     let (_, said, _) = words(&calibrate(&[&call[..], &["--heading", "210", "--json"]].concat()));
-    assert!(said.contains("the gyros do not fit the attitude"), "{said}");
+    let turned: Value = serde_json::from_str(&said).unwrap();
+    insta::assert_snapshot!(format!("{told}{:#}", turned["warnings"]));
 }
 
 #[test]
@@ -264,9 +246,9 @@ fn thermal_refuses_a_log_in_another_attitude_than_the_stated_one() {
     let call =
         ["thermal", &log, "--calibration", &fog, "--latitude", "55.75", "--heading", "30", "--pitch", "0"];
     let (_, said, errors) = words(&calibrate(&[&call[..], &["--roll", "0"]].concat()));
-    assert!(!format!("{said}{errors}").contains("do not fit the attitude"), "{said}{errors}");
+    assert!(!format!("{said}{errors}").contains("run.mcap: "), "{said}{errors}");
     let refused = fails(&[&call[..], &["--roll", "180"]].concat(), 1);
-    assert!(refused.contains("run.mcap: the accelerometers do not fit the attitude"), "{refused}");
+    insta::assert_snapshot!(refused.replace(folder.path().to_str().unwrap(), "FOLDER"));
     // A run that only judges is told of.
     let judge = folder.path().join("judge.mcap");
     let mut swapped = events_of(&[fibre_optic(6, "FOG-0001", 3000.0)]);
@@ -279,8 +261,7 @@ fn thermal_refuses_a_log_in_another_attitude_than_the_stated_one() {
     let with_judge = [&call[..], &["--roll", "0", "--judge", judge.to_str().unwrap()]].concat();
     let (_, said, errors) = words(&calibrate(&with_judge));
     let told = format!("{said}{errors}");
-    assert!(told.contains("judge.mcap: accelerometers x and z look swapped"), "{told}");
-    assert!(!told.contains("run.mcap: accelerometers"), "{told}");
+    assert!(told.contains("judge.mcap: ") && !told.contains("run.mcap: "), "{told}");
 }
 
 #[test]
@@ -293,7 +274,5 @@ fn a_log_that_is_too_short_for_a_drift_says_so_in_its_first_line() {
     (scenario.tick_ns, scenario.duration_s) = (100_000_000, 800.0);
     record(Path::new(&log), &scenario);
     let said = succeeds(&["drift", &log]);
-    let first = said.lines().next().unwrap();
-    assert!(first.contains("a drift slower than this log of 0.222 h can show"), "{first}");
-    assert!(!first.contains("drift σ"), "{first}");
+    insta::assert_snapshot!(said.lines().next().unwrap());
 }

@@ -46,6 +46,12 @@ pub(crate) fn words(output: &Output) -> (Option<i32>, String, String) {
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }
 
+/// What the program says, with its exit code, but for where its files are: for a snapshot.
+pub(crate) fn told(folder: &Path, arguments: &[&str]) -> String {
+    let (code, results, errors) = words(&calibrate(arguments));
+    format!("exit code {}\n{errors}{results}\n", code.unwrap()).replace(folder.to_str().unwrap(), "FOLDER")
+}
+
 /// Runs the program, which must succeed, and gives its results.
 #[track_caller]
 pub(crate) fn succeeds(arguments: &[&str]) -> String {

@@ -114,7 +114,7 @@ fn several_units_on_one_stand_end_with_one_table() {
     let done = within(folder.path(), &[&logs[..], &rest].concat());
     assert!(done.status.success(), "{}", text(&done.stderr));
     let said = text(&done.stdout);
-    assert!(said.contains("\n2 units: 8 of 8 sensors accepted.\n"), "{said}");
+    insta::assert_snapshot!(said);
     for unit in ["MEMS-0001", "MEMS-0002"] {
         let written = Written::read(&at(&format!("new-{unit}.toml"))).unwrap();
         assert_eq!(written.document.unit, unit);
@@ -139,9 +139,6 @@ fn several_units_on_one_stand_end_with_one_table() {
 fn the_budget_prints_the_examples_of_the_paper() {
     let folder = tempfile::tempdir().unwrap();
     let said = text(&within(folder.path(), &["positions", "--budget"]).stdout);
-    for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "16.4″"] {
-        assert!(said.contains(words), "{words} is not in\n{said}");
-    }
     let json = within(
         folder.path(),
         &["positions", "--budget", "--json", "--axis-rate", "6", "--positioning", "1", "--run-out", "0"],
@@ -156,19 +153,9 @@ fn the_budget_prints_the_examples_of_the_paper() {
         assert!(done.status.success());
         text(&done.stdout).lines().next().unwrap().to_owned()
     };
-    assert!(first("twelve").contains(" 2.9″ (one sigma) by the plan's 12 positions"), "{}", first("twelve"));
-    assert!(
-        first("six").contains(" by the plan's 6 positions") && !first("six").contains(" 2.9″"),
-        "{}",
-        first("six")
-    );
     std::fs::write(folder.path().join("flat.csv"), "name,axis_1_deg,axis_2_deg\na,0,0\nb,90,0\nc,0,180\n")
         .unwrap();
-    let flat = first("flat.csv");
-    assert!(
-        flat.contains("the plan's 3 positions will not determine C: none has x up, x down, z up, z down."),
-        "{flat}"
-    );
+    insta::assert_snapshot!(said + &["twelve", "six", "flat.csv"].map(first).join("\n"));
 }
 
 #[test]
@@ -198,6 +185,5 @@ fn a_judging_log_in_another_unit_of_measure_is_refused() {
     ];
     let done = within(folder.path(), &call);
     assert_eq!(done.status.code(), Some(1));
-    let report = text(&done.stdout);
-    assert!(report.contains("% of g remain in the log that judges, at most 2 % is accepted"), "{report}");
+    insta::assert_snapshot!(text(&done.stdout));
 }

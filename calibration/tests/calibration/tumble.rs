@@ -251,9 +251,7 @@ fn a_simulated_unit_gives_its_own_constants() {
 fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let refused = |track: &Track| analyse(track, &settings()).unwrap_err().join("\n");
     let (_, few, _) = tumbled(8, &how(5));
-    assert!(refused(&few).contains("8 still poses were found, 12 are needed"), "{}", refused(&few));
     let (_, restless, _) = tumbled(20, &Stand { start_s: 0.0, ..how(6) });
-    assert!(refused(&restless).contains("must be still for the first 30 s"), "{}", refused(&restless));
     // Turned about one level axis only.
     let instrument = mems_chamber(0).instrument;
     let wheel: Vec<Matrix3<f64>> = (0..24)
@@ -262,21 +260,22 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
         })
         .collect();
     let (flat, _) = track(&instrument, &wheel, &how(7));
-    assert!(refused(&flat).contains("lie in one plane: along x"), "{}", refused(&flat));
     let (_, good, _) = tumbled(20, &how(8));
     let changed = |change: &dyn Fn(&mut Track)| {
         let mut track = good.clone();
         change(&mut track);
         refused(&track)
     };
-    let dead = changed(&|track| track.gyros[2].fill(0.0));
-    assert!(dead.contains("gyro z: every reading is 0: the sensor is dead"), "{dead}");
-    let clipped = changed(&|track| track.outputs[1].iter_mut().for_each(|x| *x = x.min(5.0)));
-    assert!(clipped.contains("accelerometer y reads exactly 5"), "{clipped}");
-    let holes = changed(&|track| track.outputs[0].iter_mut().step_by(30).for_each(|x| *x = f64::NAN));
-    assert!(holes.contains("are not numbers"), "{holes}");
-    let four = changed(&|track| track.outputs.push(track.outputs[0].clone()));
-    assert!(four.contains("isotherm-calibrate positions"), "{four}");
+    let told = [
+        refused(&few),
+        refused(&restless),
+        refused(&flat),
+        changed(&|track| track.gyros[2].fill(0.0)),
+        changed(&|track| track.outputs[1].iter_mut().for_each(|x| *x = x.min(5.0))),
+        changed(&|track| track.outputs[0].iter_mut().step_by(30).for_each(|x| *x = f64::NAN)),
+        changed(&|track| track.outputs.push(track.outputs[0].clone())),
+    ];
+    insta::assert_snapshot!(told.join("\n\n"));
 }
 
 #[test]
@@ -290,17 +289,12 @@ fn gyros_that_do_not_follow_the_turns_are_refused_and_the_accelerometers_stand()
         assert_eq!(found.accel, sound.accel);
         found.gyro.unwrap_err()
     };
-    let left = |words: &str| -> f64 {
-        let (_, rest) = words.split_once("miss the direction of gravity by ").unwrap();
-        rest.split_once("° rms, at most 3° is accepted").unwrap().0.parse().unwrap()
-    };
     // At their limit in the turns: the fit is far better than before, and still none.
     let clipped =
         refused(&|track| track.gyros.iter_mut().flatten().for_each(|rate| *rate = rate.clamp(-0.5, 0.5)));
-    assert!(left(&clipped) > 3.0 && clipped.contains("at their limit"), "{clipped}");
     // Rates of another moment.
     let late = refused(&|track| track.gyros.iter_mut().for_each(|column| column.rotate_right(40)));
-    assert!(left(&late) > 3.0 && late.contains("time stamps"), "{late}");
+    insta::assert_snapshot!(format!("{clipped}\n{late}"));
 }
 
 #[test]
@@ -314,36 +308,24 @@ fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
     let mut mirrored = track.clone();
     mirrored.outputs[0].iter_mut().for_each(|reading| *reading = -*reading);
     mirrored.gyros.iter_mut().flatten().for_each(|rate| *rate = -*rate);
-    let said = complete(&plain, &analyse(&mirrored, &settings()).unwrap()).unwrap().1;
-    let [one] = &said[..] else { panic!("{said:?}") };
-    assert!(one.starts_with("gyro x is found with the other sign: ") && one.contains("K = -1.00"), "{one}");
+    let mut told = complete(&plain, &analyse(&mirrored, &settings()).unwrap()).unwrap().1;
     // What fits of other logs come to.
     let of = |base: &Document, change: &dyn Fn(&mut Tumble)| {
         let mut tumble = good.clone();
         change(&mut tumble);
         complete(base, &tumble).unwrap().1
     };
-    let swapped = of(&plain, &|tumble| tumble.gyro.as_mut().unwrap().rows.swap(0, 1));
-    let [one] = &swapped[..] else { panic!("{swapped:?}") };
-    assert!(one.starts_with("gyros x and y look swapped: "), "{one}");
+    told.extend(of(&plain, &|tumble| tumble.gyro.as_mut().unwrap().rows.swap(0, 1)));
     let degrees = |tumble: &mut Tumble| tumble.gyro.as_mut().unwrap().weight[1] *= 57.3;
-    let other = of(&plain, &degrees);
-    let [one] = &other[..] else { panic!("{other:?}") };
-    assert!(
-        one.starts_with("gyro ")
-            && one.contains(" and gyro y: ")
-            && one.contains("check the unit of measure of each column"),
-        "{one}"
-    );
+    told.extend(of(&plain, &degrees));
     // A document that states it is believed.
     let mut stated = plain.clone();
     stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(57.1);
     assert!(of(&stated, &degrees).is_empty(), "{:?}", of(&stated, &degrees));
     stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(-57.1);
-    assert!(of(&stated, &degrees)[0].starts_with("gyro y is found with the other sign"));
-    let accel = of(&plain, &|tumble| tumble.accel.scale[0] *= 9.8);
-    let [one] = &accel[..] else { panic!("{accel:?}") };
-    assert!(one.starts_with("accelerometer x and accelerometer "), "{one}");
+    told.extend(of(&stated, &degrees));
+    told.extend(of(&plain, &|tumble| tumble.accel.scale[0] *= 9.8));
+    insta::assert_snapshot!(told.join("\n"));
 }
 
 #[test]
@@ -371,11 +353,7 @@ fn a_unit_on_its_six_faces_only_does_not_state_angles() {
         track(&instrument, &(0..18).map(put).collect::<Vec<_>>(), &how(11)).0
     };
     let refused = analyse(&on_faces(0.0), &settings()).unwrap_err().join("\n");
-    assert!(refused.contains("the angle between accelerometers x and y is known only to "), "{refused}");
-    assert!(
-        refused.contains("at most 0.5° is accepted") && refused.contains("edges and corners too"),
-        "{refused}"
-    );
+    insta::assert_snapshot!(refused);
     let slanting = analyse(&on_faces(0.6), &settings()).unwrap();
     assert!(
         slanting.accel.sigma[6..].iter().all(|sigma| sigma.to_degrees() < 0.1),
@@ -422,20 +400,12 @@ fn poses_that_are_put_down_alike_do_not_vouch_for_each_other() {
 #[test]
 fn poses_that_end_long_before_the_log_are_pointed_out() {
     let (_, good, held) = tumbled(30, &how(12));
-    let early =
-        |found: &[String]| found.iter().any(|words| words.starts_with("no still pose is found after "));
-    assert!(!early(&analyse(&good, &settings()).unwrap().warnings));
+    assert_eq!(analyse(&good, &settings()).unwrap().warnings, [""; 0]);
     // From the sixteenth pose on everything is ten times as large: noise too.
     let mut changed = good.clone();
     let first = (0..good.len()).find(|tick| good.start_s(*tick) > held[15][1]).unwrap();
     changed.outputs.iter_mut().flat_map(|column| &mut column[first..]).for_each(|reading| *reading *= 10.0);
     let found = analyse(&changed, &settings()).unwrap();
     assert_eq!(found.poses.len(), 16);
-    assert!(early(&found.warnings), "{:?}", found.warnings);
-    let from = format!("after {:.0} s of {:.0} s", found.poses[15].span_s[1], good.start_s(good.len() - 1));
-    assert!(
-        found.warnings.iter().any(|words| words.contains(&from) && words.contains("--threshold")),
-        "{:?}",
-        found.warnings
-    );
+    insta::assert_snapshot!(found.warnings.join("\n"));
 }

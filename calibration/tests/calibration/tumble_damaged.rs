@@ -49,32 +49,20 @@ fn gyros_in_another_order_and_unit_are_found_and_named() {
         assert!(gyro.sigma[one] < 1e-3 / 57.3 && gyro.sigma[3 + 2 * one] < 1e-3, "{:?}", gyro.sigma);
     }
     assert_eq!([0, 1, 2].map(|axis| gyro.across(axis)), [[0, 1], [0, 2], [1, 2]]);
-    let said = complete(&plain, &tumble).unwrap().1;
-    let [order, unit] = &said[..] else { panic!("{said:?}") };
-    assert!(
-        order.starts_with("gyros x, y and z are far from where the document at hand has them: "),
-        "{order}"
-    );
-    assert!(unit.contains("as for °/s taken as rad/s"), "{unit}");
-    let swapped = self::said(22, &|track| track.gyros.swap(0, 1));
-    assert!(
-        swapped.starts_with("gyros x and y look swapped: check the columns in the mapping."),
-        "{swapped}"
-    );
-    let shifted = self::said(22, &|track| track.gyros[2].iter_mut().for_each(|rate| *rate += 5.2));
-    assert!(shifted.starts_with("gyro z: at rest it reads 29") && shifted.contains("mid_scale"), "{shifted}");
+    let mut told = complete(&plain, &tumble).unwrap().1;
+    told.push(said(22, &|track| track.gyros.swap(0, 1)));
+    told.push(said(22, &|track| track.gyros[2].iter_mut().for_each(|rate| *rate += 5.2)));
+    insta::assert_snapshot!(told.join("\n"));
 }
 
 #[test]
 fn accelerometers_in_another_order_or_unit_are_named() {
     let (plain, swapped) = changed(23, &|track| track.outputs.swap(0, 1));
-    let refused = complete(&plain, &swapped).unwrap_err().join("\n");
-    assert!(refused.starts_with("accelerometers x and y look swapped: check the columns"), "{refused}");
+    let mut told = complete(&plain, &swapped).unwrap_err();
     let (plain, flipped) = changed(23, &|track| times(&mut track.outputs[2..], -1.0));
-    let refused = complete(&plain, &flipped).unwrap_err().join("\n");
-    assert!(refused.contains("is the sign of accelerometer z missing in the mapping"), "{refused}");
-    let grams = said(23, &|track| times(&mut track.outputs, 1.0 / 9.81));
-    assert!(grams.contains("as for readings in g taken as m/s²: correct the unit of measure"), "{grams}");
+    told.extend(complete(&plain, &flipped).unwrap_err());
+    told.push(said(23, &|track| times(&mut track.outputs, 1.0 / 9.81)));
+    insta::assert_snapshot!(told.join("\n"));
 }
 
 #[test]
@@ -86,17 +74,11 @@ fn what_is_left_far_beyond_the_noise_is_told_with_what_it_follows() {
             column.iter_mut().zip(&ends).for_each(|(reading, end)| *reading += later(*end));
         }
     });
-    let [before, after] = drift.split_once(" times the noise of the poses").map(|(a, b)| [a, b]).unwrap();
-    let times: f64 = before.rsplit(' ').next().unwrap().parse().unwrap();
-    assert!(times > 20.0 && after.contains("follows the time since the log's beginning"), "{drift}");
     let touched = said(24, &|track| {
         let quiet = track.len() / 7;
         times_of(track, 3 * quiet..4 * quiet, 1.008);
     });
-    assert!(
-        touched.contains(" times the noise of the poses") && touched.contains("was it moved or touched"),
-        "{touched}"
-    );
+    insta::assert_snapshot!(format!("{drift}\n{touched}"));
 }
 
 fn times_of(track: &mut Track, ticks: std::ops::Range<usize>, factor: f64) {
@@ -127,17 +109,13 @@ fn poses_that_the_fit_has_not_seen_decide() {
     let good = of(0.9, 1e-3, 1.4e-3);
     assert!(good.iter().all(|verdict| verdict.accepted) && good[0].reason.is_empty(), "{}", words(&good));
     let same = of(1e-3, 1e-3, 1.4e-3);
-    assert!(same[0].accepted && same[0].reason == "it changes nothing", "{}", words(&same));
+    assert!(same[0].accepted, "{}", words(&same));
     let as_good = of(1e-3, 8e-4, 1.4e-3);
-    assert!(as_good[0].accepted && as_good[0].reason.contains("no better than"), "{}", words(&as_good));
+    assert!(as_good[0].accepted, "{}", words(&as_good));
     let worse = of(1e-3, 3e-4, 5e-3);
-    assert!(!worse[0].accepted && worse[0].reason.contains("fits these poses better"), "{}", words(&worse));
-    assert!(
-        !worse[1].accepted && worse[1].reason.contains("relative to the accelerometers"),
-        "{}",
-        words(&worse)
-    );
+    assert!(worse.iter().all(|verdict| !verdict.accepted), "{}", words(&worse));
     let far = of(0.9, 0.1, 0.3);
-    assert!(!far[0].accepted && far[0].reason.starts_with("3.06 % of g remain"), "{}", words(&far));
+    assert!(!far[0].accepted, "{}", words(&far));
+    insta::assert_snapshot!([good, same, as_good, worse, far].map(|verdicts| words(&verdicts)).join("\n\n"));
     assert!(!of(0.9, 0.1, f64::NAN)[0].accepted, "no held-out fit at all");
 }

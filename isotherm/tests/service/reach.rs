@@ -14,19 +14,17 @@ fn isotherm(arguments: &[&str], set: &[(&str, &str)]) -> Output {
     command.env("XDG_CONFIG_HOME", "/nonexistent").envs(set.iter().copied()).output().unwrap()
 }
 
-/// One sentence on stderr that holds the parts, and the exit code.
-fn refused(arguments: &[&str], set: &[(&str, &str)], code: i32, parts: &[&str]) {
+/// The one sentence on stderr, where it ends with this exit code.
+fn refused(arguments: &[&str], set: &[(&str, &str)], code: i32) -> String {
     let output = isotherm(arguments, set);
     let stderr = String::from_utf8(output.stderr).unwrap();
     let own: Vec<_> = stderr.lines().filter(|line| !line.contains("no state folder is configured")).collect();
     assert_eq!(output.status.code(), Some(code), "{stderr}");
     assert_eq!(own.len(), 1, "{stderr}");
-    for part in parts {
-        assert!(own[0].contains(part), "{part} in {stderr}");
-    }
     for foreign in ["Json5Err", ".rs:", "Location", "Single("] {
         assert!(!stderr.contains(foreign), "{foreign} in {stderr}");
     }
+    own[0].to_owned() + "\n"
 }
 
 #[test]
@@ -45,18 +43,12 @@ fn environment_and_the_users_file_say_where_the_service_is() {
     // What stands in the variable counts before the file.
     let nobody = free();
     let both = [("XDG_CONFIG_HOME", home), ("ISOTHERM_CONNECT", nobody.as_str())];
-    refused(&status, &both, 1, &[&format!("tcp/{nobody} (from ISOTHERM_CONNECT): nothing listens there")]);
+    let mut told = refused(&status, &both, 1);
     std::fs::write(user.join("client.toml"), format!("connect = [\"{nobody}\"]\n")).unwrap();
-    let file = user.join("client.toml").display().to_string();
-    let parts = [&*format!("tcp/{nobody} (from {file}): nothing listens there")];
-    refused(&status, &[("XDG_CONFIG_HOME", home)], 1, &parts);
+    told += &refused(&status, &[("XDG_CONFIG_HOME", home)], 1);
     std::fs::write(user.join("client.toml"), "conect = [\"a:1\"]\n").unwrap();
-    refused(
-        &status,
-        &[("XDG_CONFIG_HOME", home)],
-        78,
-        &["client.toml:1:1: conect", "did you mean `connect`?"],
-    );
+    told += &refused(&status, &[("XDG_CONFIG_HOME", home)], 78);
+    insta::assert_snapshot!(told.replace(home, "HOME").replace(&nobody, "NOBODY"));
     assert_eq!(served.stop("-INT").0, Some(0));
 }
 
@@ -84,12 +76,7 @@ fn free() -> String {
 fn what_cannot_be_reached_is_said_with_its_address_and_the_next_step() {
     let nobody = free();
     let begun = Instant::now();
-    let parts = [
-        &*format!("tcp/{nobody}: nothing listens there"),
-        "isotherm serve",
-        "--connect HOST:PORT or ISOTHERM_CONNECT",
-    ];
-    refused(&["status", "--connect", &nobody], &[], 1, &parts);
+    let mut told = refused(&["status", "--connect", &nobody], &[], 1);
     assert!(
         begun.elapsed() < Duration::from_secs(4),
         "at once, not after the time-out: {:?}",
@@ -98,64 +85,36 @@ fn what_cannot_be_reached_is_said_with_its_address_and_the_next_step() {
 
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = silent.local_addr().unwrap().to_string();
-    let parts = [&*format!("tcp/{address}: something listens there but does not answer within 500 ms")];
-    refused(&["status", "--connect", &address, "--timeout", "0.5"], &[], 1, &parts);
-
-    let parts = ["tcp/no.such.host.invalid:7447: the host name is not known"];
-    refused(&["status", "--connect", "no.such.host.invalid:7447", "--timeout", "2"], &[], 1, &parts);
+    told += &refused(&["status", "--connect", &address, "--timeout", "0.5"], &[], 1);
+    told += &refused(&["status", "--connect", "no.such.host.invalid:7447", "--timeout", "2"], &[], 1);
 
     // Of several addresses each has its reason, and what to do comes once.
     let both = format!("{nobody},no.such.host.invalid:7447");
-    let parts = [&*format!(
-        "tcp/{nobody} (from ISOTHERM_CONNECT): nothing listens there; tcp/no.such.host.invalid:7447"
-    )];
-    refused(&["status", "--timeout", "2"], &[("ISOTHERM_CONNECT", &both)], 1, &parts);
-    let output = isotherm(&["status", "--timeout", "2"], &[("ISOTHERM_CONNECT", &both)]);
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(stderr.matches("--connect HOST:PORT").count(), 1, "{stderr}");
+    told += &refused(&["status", "--timeout", "2"], &[("ISOTHERM_CONNECT", &both)], 1);
 
-    let parts =
-        ["cannot listen on tcp/no.such.host.invalid:7447: the host name is not known", "--listen HOST:PORT"];
-    refused(&["serve", "--listen", "no.such.host.invalid:7447"], &[], 1, &parts);
-    let parts =
-        [&*format!("cannot listen on tcp/{address}: another program listens there"), "--listen HOST:PORT"];
-    refused(&["serve", "--listen", &address], &[], 1, &parts);
+    told += &refused(&["serve", "--listen", "no.such.host.invalid:7447"], &[], 1);
+    told += &refused(&["serve", "--listen", &address], &[], 1);
+    insta::assert_snapshot!(told.replace(&nobody, "NOBODY").replace(&address, "SILENT"));
 }
 
 #[test]
 fn wrong_addresses_are_a_wrong_call() {
-    for (option, value, says) in [
-        ("--connect", "nonsense", "must be HOST:PORT"),
-        ("--connect", "127.0.0.1:99999", "has the port \"99999\", must be 0 to 65535"),
-        ("--connect", "udp/127.0.0.1:1", "must have one of tcp, tls, unixsock-stream"),
-    ] {
-        let output = isotherm(&["status", option, value], &[]);
-        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(
-            output.status.code() == Some(2) && stderr.contains(says) && stderr.contains(value),
-            "{stderr}"
-        );
+    let mut told = String::new();
+    for value in ["nonsense", "127.0.0.1:99999", "udp/127.0.0.1:1"] {
+        let output = isotherm(&["status", "--connect", value], &[]);
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        told += &String::from_utf8(output.stderr).unwrap();
     }
-    refused(
-        &["status"],
-        &[("ISOTHERM_CONNECT", "nonsense")],
-        2,
-        &["ISOTHERM_CONNECT is \"nonsense\", must be HOST:PORT"],
-    );
-    refused(&["status", "--namespace", "a//b"], &[], 2, &["namespace = \"a//b\"", "Invalid Key Expr"]);
+    told += &refused(&["status"], &[("ISOTHERM_CONNECT", "nonsense")], 2);
+    told += &refused(&["status", "--namespace", "a//b"], &[], 2);
     let folder = tempfile::tempdir().unwrap();
     let zenoh = folder.path().join("z.json5");
     std::fs::write(&zenoh, "{ mode: \"peerx\" }").unwrap();
     let zenoh = path(&zenoh);
     let missing = folder.path().join("none.json5");
-    let parts = ["cannot read the Zenoh configuration", "none.json5"];
-    refused(&["status", "--zenoh-config", path(&missing)], &[], 1, &parts);
-    refused(
-        &["status", "--zenoh-config", zenoh],
-        &[],
-        78,
-        &["unknown variant `peerx`", &format!("isotherm check {zenoh}")],
-    );
+    told += &refused(&["status", "--zenoh-config", path(&missing)], &[], 1);
+    told += &refused(&["status", "--zenoh-config", zenoh], &[], 78);
+    insta::assert_snapshot!(told.replace(path(folder.path()), "FOLDER"));
 }
 
 #[test]
@@ -169,10 +128,7 @@ fn log_and_calibrate_are_the_programs_beside() {
         };
         let missing = run();
         let stderr = String::from_utf8_lossy(&missing.stderr).into_owned();
-        assert!(
-            missing.status.code() == Some(1) && stderr.contains(&format!("cannot run {program}")),
-            "{stderr}"
-        );
+        assert!(missing.status.code() == Some(1) && stderr.contains(program), "{stderr}");
         let beside = folder.path().join(program);
         std::fs::write(&beside, "#!/bin/sh\necho \"$@\"\nexit 3\n").unwrap();
         std::fs::set_permissions(&beside, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();

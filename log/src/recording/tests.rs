@@ -251,7 +251,7 @@ fn a_file_that_is_being_written_is_nobody_elses() {
     writer.write(&messages()[0]).unwrap();
     assert!(is_being_written(&path));
     let error = RecordingWriter::create(&path, overwrite).unwrap_err().to_string();
-    assert!(error.contains("being written"), "{error}");
+    insta::assert_snapshot!(error.replace(folder.path().to_str().unwrap(), "FOLDER"));
     writer.finish().unwrap();
     assert!(!is_being_written(&path));
     assert_eq!(read(&[&path]).0.len(), 1);

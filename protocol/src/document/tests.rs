@@ -126,27 +126,14 @@ fn units_become_si() {
 
 #[test]
 fn doubts_are_warnings() {
-    for (from, to, key, message) in [
-        ("smoothing_s = 20.0", "smoothing_s = 20.4", "temperature.filter.smoothing_s", "20 s is used"),
-        ("channel = \"coil\"\n", "", "temperature.channel[1].name", "is \"coil\", followed by no sensor"),
-        ("channel = \"coil\"\n", "", "gyro.sensor[3].lag[0]", "has no effect"),
-        (
-            "range_deg_c = [-65.0, 110.0]",
-            "range_deg_c = [-30.0, 60.0]",
-            "gyro.sensor[0].static_bias",
-            "rejects readings",
-        ),
-    ] {
-        let warnings = accept(&FULL.replacen(from, to, 1)).warnings;
-        let found = warnings.iter().any(|warning| warning.key == key && warning.message.contains(message));
-        assert!(found, "{key}: {message}\nin\n{}", listed(&warnings));
-    }
     let single_mode = OTHER.split("[mode_reversal]\n").next().unwrap().to_owned();
-    let warnings = listed(&accept(&single_mode).warnings);
-    assert!(
-        warnings.contains("gyro.sensor[0].magnetic_bias: changes its sign with the lasing mode"),
-        "{warnings}"
-    );
+    let doubtful = [
+        FULL.replacen("smoothing_s = 20.0", "smoothing_s = 20.4", 1),
+        FULL.replacen("channel = \"coil\"\n", "", 1),
+        FULL.replacen("range_deg_c = [-65.0, 110.0]", "range_deg_c = [-30.0, 60.0]", 1),
+        single_mode,
+    ];
+    insta::assert_snapshot!(doubtful.map(|text| listed(&accept(&text).warnings)).join("\n\n"));
 }
 
 #[test]
@@ -155,20 +142,15 @@ fn bytes_that_are_no_text_are_placed() {
     let at = FULL.find("unit =").unwrap();
     bytes[at + 8] = 0xff;
     let problems = Document::parse_bytes(&bytes, None).unwrap_err();
-    let line = FULL[..at].matches('\n').count() + 1;
-    assert_eq!(
-        listed(&problems),
-        format!("{line}:9: is not UTF-8 at byte {}: is it the right file, saved as UTF-8?", at + 8)
-    );
+    assert_eq!((problems.len(), problems[0].column), (1, 9));
+    assert_eq!(problems[0].line, FULL[..at].matches('\n').count() + 1);
 }
 
 #[test]
 fn problems_are_serialised_field_by_field() {
     let problem = &refuse("schema = 2")[0];
     let json = serde_json::to_value(problem).unwrap();
-    let message = "is version 2; this release reads 1: the rest was not read";
-    let expected = serde_json::json!({"file": "test.toml", "line": 1, "column": 10, "key": "schema", "message": message});
-    assert_eq!(json, expected);
+    insta::assert_snapshot!(json);
 }
 
 #[test]

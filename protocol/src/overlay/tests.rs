@@ -163,16 +163,11 @@ fn the_revision_names_base_and_overlay_and_is_the_same_every_time() {
 fn a_wrong_base_is_refused_with_what_to_do() {
     let text = overlay_of(FULL);
     let problems = refuse(&text, None);
-    assert_eq!((problems[0].line, problems[0].key.as_str()), (2, "overlay_of"));
-    assert!(problems[0].message.contains("the unit has no document in force: first put"), "{}", problems[0]);
-
     let other = FULL.replacen("# Every key", "# every key", 1);
-    let problems = refuse(&text, Some(&other));
-    assert_eq!(problems.len(), 1, "{}", listed(&problems));
-    let shown = problems[0].to_string();
-    assert!(shown.starts_with("field.toml:2:14: overlay_of: is "), "{shown}");
-    assert!(shown.contains(&hex(&digest(FULL))) && shown.contains(&hex(&digest(&other))), "{shown}");
-    assert!(shown.contains("first put the document of the overlay in force"), "{shown}");
+    let told = format!("{}\n{}", listed(&problems), listed(&refuse(&text, Some(&other))));
+    // The digests are those of the shipped example.
+    let told = told.replace(&hex(&digest(FULL)), "ITS-BASE").replace(&hex(&digest(&other)), "IN-FORCE");
+    insta::assert_snapshot!(told);
 
     let problems = refuse(&overlay_of("schema = 1"), Some("schema = 1"));
     assert!(problems.iter().all(|problem| problem.file.as_deref() == Some("document in force")));
@@ -194,102 +189,55 @@ fn what_does_not_fit_the_base_is_told_at_once_with_its_place() {
         .replacen("name = \"y\"", "name = \"yy\"", 1)
         .replacen(", 30.5]", "]", 1);
     let problems = refuse(&text, Some(&single_mode));
-    let places: Vec<_> = problems.iter().map(|problem| (problem.line, problem.key.as_str())).collect();
-    assert_eq!(
-        places,
-        [
-            (3, "unit"),
-            (11, "gyro[0].magnetic_bias_change_deg_per_h"),
-            (15, "gyro[1].name"),
-            (26, "pre_launch.mean_temperature_deg_c"),
-        ],
-        "{}",
-        listed(&problems)
-    );
-    assert!(problems[2].message.contains("not a gyro of the document; its gyros are: x, y, z, s"));
+    insta::assert_snapshot!(listed(&problems));
 }
 
-/// An overlay that is broken in one place: text to replace, replacement, text on the line of the problem, key, part
-/// of the message.
-type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);
+/// An overlay that is broken in one place: text to replace, replacement, text on the line of the problem, key.
+type Case = (&'static str, &'static str, &'static str, &'static str);
 
 const BROKEN: [Case; 19] = [
-    ("schema = 1", "schema = = 1", "schema", "", "TOML: "),
-    ("schema = 1", "schema = 2", "schema", "schema", "is version 2; this release reads 1"),
-    ("schema = 1\n", "", "overlay_of", "schema", "is missing"),
-    ("\"BASE\"", "\"27FB\"", "overlay_of", "overlay_of", "must be 64 lower-case hexadecimal digits"),
-    ("EXAMPLE-0001", "EXAMPLE/0001", "unit", "unit", "must be 1 to 64 letters"),
-    ("2026-11-22T06:10:00Z", "\"today\"", "created", "created", "without quotes"),
-    ("note =", "colour =", "colour", "colour", "is not a known key"),
-    ("name = \"x\"", "name = \"\"", "name = \"\"", "gyro[0].name", "a name of 1 to 24 bytes"),
-    (
-        "name = \"y\"",
-        "name = \"x\"",
-        "name = \"x\"\nstatic_bias_change_deg_per_h = -0.02",
-        "gyro[1].name",
-        "also the name of gyro[0]",
-    ),
-    (
-        "= 0.031",
-        "= \"0.031\"",
-        "0.031",
-        "gyro[0].static_bias_change_deg_per_h",
-        "must be a number from -100000",
-    ),
-    ("= 0.031", "= nan", "= nan", "gyro[0].static_bias_change_deg_per_h", "is nan"),
-    ("= 0.004", "= -0.004", "= -0.004", "gyro[0].static_bias_sigma_deg_per_h", "must be a number from 0"),
-    (
-        "static_bias_sigma_deg_per_h = 0.004\n",
-        "",
-        "[[gyro]]",
-        "gyro[0].static_bias_sigma_deg_per_h",
-        "is missing",
-    ),
-    (
-        "magnetic_bias_sigma_deg_per_h = 0.005\n",
-        "",
-        "[[gyro]]",
-        "gyro[0].magnetic_bias_sigma_deg_per_h",
-        "magnetic_bias_change_deg_per_h needs it",
-    ),
+    ("schema = 1", "schema = = 1", "schema", ""),
+    ("schema = 1", "schema = 2", "schema", "schema"),
+    ("schema = 1\n", "", "overlay_of", "schema"),
+    ("\"BASE\"", "\"27FB\"", "overlay_of", "overlay_of"),
+    ("EXAMPLE-0001", "EXAMPLE/0001", "unit", "unit"),
+    ("2026-11-22T06:10:00Z", "\"today\"", "created", "created"),
+    ("note =", "colour =", "colour", "colour"),
+    ("name = \"x\"", "name = \"\"", "name = \"\"", "gyro[0].name"),
+    ("name = \"y\"", "name = \"x\"", "name = \"x\"\nstatic_bias_change_deg_per_h = -0.02", "gyro[1].name"),
+    ("= 0.031", "= \"0.031\"", "0.031", "gyro[0].static_bias_change_deg_per_h"),
+    ("= 0.031", "= nan", "= nan", "gyro[0].static_bias_change_deg_per_h"),
+    ("= 0.004", "= -0.004", "= -0.004", "gyro[0].static_bias_sigma_deg_per_h"),
+    ("static_bias_sigma_deg_per_h = 0.004\n", "", "[[gyro]]", "gyro[0].static_bias_sigma_deg_per_h"),
+    ("magnetic_bias_sigma_deg_per_h = 0.005\n", "", "[[gyro]]", "gyro[0].magnetic_bias_sigma_deg_per_h"),
     (
         "static_bias_change_deg_per_h",
         "static_bias_change",
         "static_bias_change =",
         "gyro[0].static_bias_change",
-        "did you mean `static_bias_change_deg_per_h`?",
     ),
-    (
-        "latitude_deg = 55.0",
-        "latitude_deg = 95.0",
-        "95.0",
-        "pre_launch.latitude_deg",
-        "must be a number from -90 to 90",
-    ),
-    ("[1.5, -0.5]", "[1.5]", "[1.5]", "pre_launch.pitch_roll_deg", "has 1 entry, must have 2"),
-    (
-        "start_ns = 1000000000",
-        "start_ns = 1.5",
-        "start_ns",
-        "pre_launch.start_ns",
-        "a whole number of nanoseconds",
-    ),
-    ("end_ns = 601000000000", "end_ns = 6", "end_ns", "pre_launch.end_ns", "before start_ns"),
+    ("latitude_deg = 55.0", "latitude_deg = 95.0", "95.0", "pre_launch.latitude_deg"),
+    ("[1.5, -0.5]", "[1.5]", "[1.5]", "pre_launch.pitch_roll_deg"),
+    ("start_ns = 1000000000", "start_ns = 1.5", "start_ns", "pre_launch.start_ns"),
+    ("end_ns = 601000000000", "end_ns = 6", "end_ns", "pre_launch.end_ns"),
 ];
 
 #[test]
 fn each_error_is_told_with_its_line_key_and_limit() {
-    for (from, to, at, key, message) in BROKEN {
+    let mut told = String::new();
+    for (from, to, at, key) in BROKEN {
         assert!(OVERLAY.contains(from), "{from}");
         let text = OVERLAY.replacen(from, to, 1).replacen("BASE", &"0f".repeat(32), 1);
         let problems = Overlay::parse(&text, Some("field.toml")).unwrap_err();
         let line = text[..text.find(at).unwrap_or_else(|| panic!("{at}"))].matches('\n').count() + 1;
-        let found = problems.iter().any(|p| p.key == key && p.line == line && p.message.contains(message));
-        assert!(found, "no problem at line {line}, {key:?}, {message:?} in\n{}", listed(&problems));
+        let found = problems.iter().any(|p| p.key == key && p.line == line);
+        assert!(found, "no problem at line {line}, {key:?} in\n{}", listed(&problems));
         assert!(problems.len() <= 2, "one error, but\n{}", listed(&problems));
         // The one way in says the same, before it looks at any base.
         assert_eq!(refuse(&text, None).len(), problems.len(), "{key}");
+        told += &(listed(&problems) + "\n");
     }
+    insta::assert_snapshot!(told);
 }
 
 #[test]

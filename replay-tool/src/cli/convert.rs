@@ -78,7 +78,9 @@ impl ConvertArgs {
         let out = out.display();
         let target = match (self.to, by_name) {
             (Some(to), Some(by_name)) if to != by_name => {
-                return Err(Error::Usage(format!("{out} has the name of another kind of output than --to")));
+                return Err(Error::Usage(format!(
+                    "{out} has the name of another kind of output than --to: change one of the two"
+                )));
             }
             (to, by_name) => to.or(by_name),
         };

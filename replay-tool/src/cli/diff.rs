@@ -99,7 +99,9 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         compare(&mut a, &mut b, options, |ticks| bar.step_saying(|| Some(format!("{ticks} ticks"))))?;
     bar.finish();
     if accounts.is_empty() {
-        return Err(Error::Usage("neither log has corrected ticks".to_owned()));
+        return Err(Error::Usage(
+            "neither log has corrected ticks: make them with isotherm-replay correct".to_owned(),
+        ));
     }
     for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
         show::warn(&words);

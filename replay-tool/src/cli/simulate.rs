@@ -64,7 +64,7 @@ struct Preset {
 }
 
 /// All ready-made scenarios.
-const PRESETS: [Preset; 6] = [
+const PRESETS: [Preset; 7] = [
     Preset {
         name: "zeeman-rest",
         about: "laser unit at rest, +20 to +50 °C, mode reversal every two minutes, 1 h",
@@ -84,6 +84,11 @@ const PRESETS: [Preset; 6] = [
         name: "fibre-optic-judging",
         about: "fibre-optic unit at rest through the chamber programme to judge a model on, 5 h 28 min",
         make: |seed| presets::fibre_optic_chamber(seed, presets::judging_profile()),
+    },
+    Preset {
+        name: "fibre-optic-paper",
+        about: "fibre-optic unit at rest through the chamber programme of Vahrameev 2017, 18 h 20 min",
+        make: |seed| presets::fibre_optic_chamber(seed, presets::paper_profile()),
     },
     Preset {
         name: "mems-chamber",

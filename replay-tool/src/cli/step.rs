@@ -95,7 +95,7 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
     let replica = match loaded {
         Some(loaded) if loaded.unit != *unit => {
             return Err(Error::Usage(format!(
-                "--calibration is for unit {}, the log is of {unit}",
+                "--calibration is for unit {}, the log is of {unit}: give the document of {unit}",
                 loaded.unit
             )));
         }

@@ -23,9 +23,19 @@ pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// Checks the exit code and that the errors name what is wrong.
-pub(crate) fn check(output: &Output, code: i32, errors: &str) {
-    let text = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    assert!(text.contains(errors), "{text}");
+/// Standard error as text.
+pub(crate) fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Checks the exit code.
+pub(crate) fn check(output: &Output, code: i32) {
+    assert_eq!(output.status.code(), Some(code), "{}", stderr(output));
+}
+
+/// A command line, what it said on standard error and its exit code, for a snapshot.
+pub(crate) fn told(folder: &Path, args: &[&str]) -> String {
+    let output = replay(folder, args);
+    let code = output.status.code().unwrap();
+    format!("$ isotherm-replay {}\n{}exit code {code}\n\n", args.join(" "), stderr(&output))
 }

@@ -28,7 +28,7 @@ fn octave_reads_recordings_and_frames() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let run = |args: &[&str]| check(&replay(folder.path(), args), 0, "");
+    let run = |args: &[&str]| check(&replay(folder.path(), args), 0);
     run(&["simulate", "--preset", "mems-chamber", "--duration", "20", "--out", "own.csv"]);
     let document = root().join("config/calibration/MEMS-0001.toml");
     for out in ["own.mcap", "own.wire"] {

@@ -32,7 +32,7 @@ fn python_reads_what_convert_writes() {
     for (unit, preset) in UNITS {
         let simulate =
             ["simulate", "--preset", preset, "--duration", "20", "--out", "log.csv", "--overwrite"];
-        check(&replay(path, &simulate), 0, "");
+        check(&replay(path, &simulate), 0);
         record(path, unit, &mut writer);
     }
     writer.finish().unwrap();
@@ -46,7 +46,7 @@ fn python_reads_what_convert_writes() {
         let documents = documents.iter().flat_map(|path| ["--calibration", path.as_str()]);
         let documents: Vec<_> = documents.filter(|_| target == "ros2").collect();
         let args = [&["convert", "log.mcap", "--out", target, "--to", target], raw, &documents].concat();
-        check(&replay(path, &args), 0, "");
+        check(&replay(path, &args), 0);
     }
     let output = Command::new(python)
         .args(["-B", "tests/python/recordings.py"])

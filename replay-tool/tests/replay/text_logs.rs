@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::common::{replay, root};
+use crate::common::{replay, root, told};
 
 /// One log of ten ticks in a few guises: time in ms, three rates in °/s, a temperature.
 const ROWS: &str = "t;x;y;z;T\n\
@@ -57,54 +57,26 @@ fn the_same_log_in_every_guise_gives_the_same_figures() {
 fn what_cannot_be_read_right_is_refused_with_line_and_column() {
     let folder = tempfile::tempdir().unwrap();
     let table = [
-        (
-            "a missing cell",
-            ROWS.replace("30;0.5;-1.25;2;20.5", "30;0.5;-1.25"),
-            1,
-            "log.csv:4:13: column 4 \"z\"",
-        ),
-        (
-            "an empty cell",
-            ROWS.replace("30;0.5;-1.25", "30;;-1.25"),
-            1,
-            "log.csv:4:4: column 2 \"x\": is empty",
-        ),
-        (
-            "a truncated last line",
-            ROWS.trim_end().trim_end_matches(";20.5").to_owned(),
-            1,
-            "log.csv:11:16: column 5 \"T\": is missing, the row has only 4 cells; the last line has no line end",
-        ),
-        (
-            "a gap",
-            ROWS.replace("\n30;", "\n5030;"),
-            1,
-            "log.csv:4:1: column 1 \"t\": \"5030\" is 5.01 s after",
-        ),
-        (
-            "time going back",
-            ROWS.replace("\n30;", "\n5;"),
-            1,
-            "log.csv:4:1: column 1 \"t\": \"5\" is not after",
-        ),
-        ("time standing still", ROWS.replace("\n30;", "\n20;"), 1, "time must increase"),
-        ("a decimal comma", ROWS.replacen("-1.25", "-1,25", 1), 1, "log.csv:2:8: column 3 \"y\": \"-1,25\""),
-        (
-            "a cell too many",
-            ROWS.replacen("20.5", "20;5", 1),
-            1,
-            "log.csv:2:19: column 6: \"5\" is one too many",
-        ),
+        ("a missing cell", ROWS.replace("30;0.5;-1.25;2;20.5", "30;0.5;-1.25")),
+        ("an empty cell", ROWS.replace("30;0.5;-1.25", "30;;-1.25")),
+        ("a truncated last line", ROWS.trim_end().trim_end_matches(";20.5").to_owned()),
+        ("a gap", ROWS.replace("\n30;", "\n5030;")),
+        ("time going back", ROWS.replace("\n30;", "\n5;")),
+        ("time standing still", ROWS.replace("\n30;", "\n20;")),
+        ("a decimal comma", ROWS.replacen("-1.25", "-1,25", 1)),
+        ("a cell too many", ROWS.replacen("20.5", "20;5", 1)),
     ];
     let semicolons = mapping("delimiter = \"semicolon\"", "");
-    for (name, log, expected, words) in &table {
+    let mut told = String::new();
+    for (name, log) in &table {
         let (code, _, errors) = correct(folder.path(), &semicolons, log.as_bytes());
-        assert_eq!(code, Some(*expected), "{name}: {errors}");
-        assert!(errors.contains(words), "{name}: {errors}");
+        assert_eq!(code, Some(1), "{name}: {errors}");
+        told += &[name, errors.as_str()].join(": ");
     }
     let utf16: Vec<_> = "\u{feff}t;x\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
     let (code, _, errors) = correct(folder.path(), &semicolons, &utf16);
-    assert!(code == Some(1) && errors.contains("log.csv:1:1: "), "{errors}");
+    assert_eq!(code, Some(1), "{errors}");
+    insta::assert_snapshot!(told + &errors);
 }
 
 #[test]
@@ -146,25 +118,17 @@ fn play_refuses_a_log_before_it_opens_a_session() {
     fs::write(path.join("log.csv"), ROWS.replacen("t;x", "t;u", 1)).unwrap();
     fs::write(path.join("m.toml"), mapping("delimiter = \"semicolon\"", "")).unwrap();
     fs::write(path.join("log.mcap"), b"\x89MCAP0\r\n").unwrap();
-    let table: [(&[&str], i32, &str); 9] = [
-        (&["log.csv", "-m", "m.toml", "-u", "A"], 1, "log.csv:1:1: the header has no column \"x\""),
-        (&["log.csv", "-m", "m.toml"], 2, "give --unit SERIAL"),
-        (&["log.csv", "-m", "m.toml", "-u", "A", "-u", "B"], 2, "give --unit once"),
-        (&["log.csv", "-u", "A"], 2, "log.csv is not a recording, and a text log needs --mapping"),
-        (&["log.mcap", "log.csv"], 2, "log.mcap is a recording, but log.csv is not"),
-        (&["log.mcap", "-m", "m.toml"], 2, "--mapping m.toml is for text logs"),
-        (&["log.mcap", "--batch", "4"], 2, "--batch is for text logs"),
-        (
-            &["log.csv", "-m", "m.toml", "-u", "A", "--clock", "receive"],
-            2,
-            "--clock receive is for recordings",
-        ),
-        (&["log.mcap", "--start", "5", "--end", "4"], 2, "--end is 4 s, must not be before --start, 5 s"),
+    let refused: [&[&str]; 9] = [
+        &["log.csv", "-m", "m.toml", "-u", "A"],
+        &["log.csv", "-m", "m.toml"],
+        &["log.csv", "-m", "m.toml", "-u", "A", "-u", "B"],
+        &["log.csv", "-u", "A"],
+        &["log.mcap", "log.csv"],
+        &["log.mcap", "-m", "m.toml"],
+        &["log.mcap", "--batch", "4"],
+        &["log.csv", "-m", "m.toml", "-u", "A", "--clock", "receive"],
+        &["log.mcap", "--start", "5", "--end", "4"],
     ];
-    for (arguments, code, words) in table {
-        let output = replay(path, &[&["play"], arguments].concat());
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
-        assert!(errors.contains(words), "{arguments:?}: {errors}");
-    }
+    let told = refused.map(|arguments| told(path, &[&["play"], arguments].concat()));
+    insta::assert_snapshot!(told.concat());
 }

@@ -43,49 +43,21 @@ fn what_is_left_out_has_its_default() {
 fn every_problem_has_its_place() {
     let text = "version = 1\nnode = \"1x\"\n[[unit]]\nserial = \"A 1\"\nraw = \"raw\"\ncorrected = \"/a__b\"\n[unit.time]\ntick_ms = 0\n\
                 stamps = \"end\"\n[unit.gyro]\nunit = \"deg\\u002Fs\"\n";
-    let found = problems(text);
-    for (place, words) in [
-        ("m.toml:2:8: node", "must be letters"),
-        ("m.toml:4:10: unit[0].serial", "must be 1 to 64 letters"),
-        ("m.toml:5:7: unit[0].raw", "must be a name with its leading slash"),
-        ("m.toml:6:13: unit[0].corrected", "must be a name with its leading slash"),
-        ("m.toml:8:11: unit[0].time.tick_ms", "must be"),
-        ("m.toml:9:1: unit[0].time.stamps", "did you mean `stamp`?"),
-        ("m.toml:11:8: unit[0].gyro.unit", "must be one of"),
-    ] {
-        assert!(
-            found.iter().any(|it| it.starts_with(place) && it.contains(words)),
-            "{place}, {words}: {found:#?}"
-        );
-    }
-    assert_eq!(found.len(), 7, "{found:#?}");
+    insta::assert_snapshot!(problems(text).join("\n"));
 }
 
 #[test]
 fn what_contradicts_itself_is_refused() {
     let loops = GOOD.replace("\"/imu\"", "\"/raw\"");
-    assert_eq!(
-        problems(&loops),
-        ["m.toml:5:13: unit[0].corrected: is \"/raw\", already the topic of unit[0].raw: use another"]
-    );
     let twice = format!(
         "{GOOD}{}",
         GOOD.replace("version = 1\n", "").replace("/raw", "/raw2").replace("/imu", "/imu2")
     );
-    assert!(
-        problems(&twice)[0].contains("unit[1].serial: is \"A-1\", which is the serial of an earlier unit")
-    );
     let channels = format!(
         "{GOOD}temperature = [{{ topic = \"/t\", channel = \"b\" }}, {{ topic = \"/u\", channel = \"b\" }}]\n"
     );
-    assert!(problems(&channels)[0].contains("unit[0].temperature[1].channel: is \"b\""));
     let waits = format!("{GOOD}time.stamp = \"start\"\ntime.duration = \"measured\"\n");
-    assert!(problems(&waits)[0].contains("time.duration: is \"measured\""));
     let jitter = format!("{GOOD}time.uncertainty_us = 2000\n");
-    assert!(
-        problems(&jitter)[0].contains("uncertainty_us: is 2000, must be at most 1179"),
-        "{:?}",
-        problems(&jitter)
-    );
-    assert!(problems("version = 2\n")[0].contains("this release reads 1"));
+    let refused = [&loops, &twice, &channels, &waits, &jitter, "version = 2\n"].map(problems);
+    insta::assert_snapshot!(refused.concat().join("\n"));
 }

@@ -57,22 +57,18 @@ mod tests {
 
     #[test]
     fn what_others_could_reach_is_refused_unless_it_is_allowed() {
-        for address in
-            ["0.0.0.0:9464", "192.0.2.1:9464", "[::]:9464", "127.0.0.1", "localhost:9464", "9464", ""]
-        {
-            let problems = read(&format!("[metrics]\nlisten = \"{address}\"")).unwrap_err();
-            assert_eq!(problems.len(), 1, "{address}");
-            assert!(
-                problems[0].starts_with(&format!("s.toml:2:10: metrics.listen: is \"{address}\""))
-                    && problems[0].contains("127.0.0.1:9464")
-                    && problems[0].contains("allow_remote"),
-                "{problems:?}"
-            );
-        }
-        assert!(read("[metrics]\nlisten = 9464").is_err());
-        assert!(
-            read("[metrics]\nport = 9464").unwrap_err()[0]
-                .contains("keys not used here: listen, allow_remote")
-        );
+        let wrong = [
+            "listen = \"0.0.0.0:9464\"",
+            "listen = \"192.0.2.1:9464\"",
+            "listen = \"[::]:9464\"",
+            "listen = \"127.0.0.1\"",
+            "listen = \"localhost:9464\"",
+            "listen = \"9464\"",
+            "listen = \"\"",
+            "listen = 9464",
+            "port = 9464",
+        ];
+        let told = wrong.map(|key| read(&format!("[metrics]\n{key}")).unwrap_err().join("\n"));
+        insta::assert_snapshot!(told.join("\n"));
     }
 }

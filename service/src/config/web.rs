@@ -57,12 +57,8 @@ mod tests {
     fn a_host_is_a_name_without_a_port() {
         let hosts = read("[web]\nhosts = [\"bench.example\", \"10.0.0.7\"]").unwrap().web.hosts;
         assert_eq!(hosts, ["bench.example", "10.0.0.7"]);
-        for host in ["bench:9464", "http://bench", "", "*", "a b", "user@bench"] {
-            let problems = read(&format!("[web]\nhosts = [\"{host}\"]")).unwrap_err();
-            assert!(
-                problems[0].contains("web.hosts") && problems[0].contains("without a port"),
-                "{problems:?}"
-            );
-        }
+        let told = ["bench:9464", "http://bench", "", "*", "a b", "user@bench"]
+            .map(|host| read(&format!("[web]\nhosts = [\"{host}\"]")).unwrap_err().join("\n"));
+        insta::assert_snapshot!(told.join("\n"));
     }
 }

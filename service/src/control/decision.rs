@@ -16,6 +16,7 @@ use super::document::{Document, Layers};
 use super::manager::Worker;
 use super::request::Request;
 use super::revision::{Record, Revision};
+use super::unlikely::unlikely;
 use crate::config::{Severity, SwapSettings};
 use crate::receive::unit::Present;
 use crate::signing::check_signature;
@@ -230,6 +231,9 @@ fn doubts(
     }
     doubts.extend(active.and_then(|active| stream(candidate, active)));
     doubts.extend(active.and_then(|active| downgrade(settings, candidate, active)));
+    let unlikely =
+        active.map(|active| unlikely(&active.document.calibration, &candidate.calibration, present));
+    doubts.extend(unlikely.into_iter().flatten().map(|words| Doubt::new("", Severity::Warn, "", words)));
     if let Some(present) = present {
         doubts.extend(range(settings, candidate, present));
         doubts.extend(active.into_iter().flat_map(|active| jump(settings, candidate, active, present)));
@@ -257,19 +261,20 @@ fn loss(lost: &[String]) -> Option<Doubt> {
 }
 
 fn age(settings: &SwapSettings, candidate: &Document, now: SystemTime) -> Option<Doubt> {
-    let limit_s = i64::try_from(settings.max_age?.as_secs()).unwrap_or(i64::MAX);
-    let limit_days = limit_s / DAY_S;
-    let doubt = |words| Some(Doubt::new("created", settings.age, "age", words));
+    let limit_s = settings.max_age.map(|limit| i64::try_from(limit.as_secs()).unwrap_or(i64::MAX));
+    let severity = if limit_s.is_some() { settings.age } else { Severity::Warn };
+    let doubt = |words| Some(Doubt::new("created", severity, "age", words));
+    let days = |seconds: i64| seconds / DAY_S;
     let (Some(created), Some(created_unix_s)) = (&candidate.created, candidate.label.created_unix_s) else {
-        return doubt(format!("is missing: the document may be older than {limit_days} days"));
+        return doubt(format!("is missing: the document may be older than {} days", days(limit_s?)));
     };
     let now_s = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let age_s = i64::try_from(now_s).unwrap_or(i64::MAX).saturating_sub(created_unix_s);
     if age_s < -DAY_S {
-        return doubt(format!("is {created}, {} days in the future", -age_s / DAY_S));
+        return doubt(format!("is {created}, {} days in the future", days(-age_s)));
     }
-    (age_s > limit_s).then_some(())?;
-    doubt(format!("is {created}: {} days old, more than {limit_days}", age_s / DAY_S))
+    let limit_days = days(limit_s.filter(|limit| age_s > *limit)?);
+    doubt(format!("is {created}: {} days old, more than {limit_days}", days(age_s)))
 }
 
 /// A document that was replaced, with a signature or not, must not come back unseen.

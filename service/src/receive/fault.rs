@@ -266,7 +266,7 @@ mod tests {
         assert!((1..60).all(|s| at(s).is_none()));
         assert_eq!(at(60), Some(Telling::Again { count: 60, since: SILENCE }));
         assert!((61..120).all(|s| at(s).is_none()));
-        assert_eq!(at(120).map(|telling| telling.to_string()).as_deref(), Some("60 more in the last 60 s"));
+        insta::assert_snapshot!(at(120).unwrap());
     }
 
     #[test]

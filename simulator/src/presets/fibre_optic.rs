@@ -79,6 +79,16 @@ pub fn judging_profile() -> Profile {
         .hold(30.0)
 }
 
+/// Chamber programme of paper 000: −50 to +60 °C at 1 °C/min, with plateaus at 60, 20 and −50 °C, twice (18 h 20 min).
+#[must_use]
+pub fn paper_profile() -> Profile {
+    let cycle = |before: Profile| {
+        let up = before.ramp(60.0, 1.0).hold(80.0).ramp(20.0, 1.0).hold(80.0);
+        up.ramp(-50.0, 1.0).hold(80.0).ramp(20.0, 1.0).hold(60.0)
+    };
+    cycle(cycle(Profile::constant(20.0).hold(60.0)))
+}
+
 /// Fibre-optic unit at rest through a chamber programme, from its start to its end.
 #[must_use]
 pub fn fibre_optic_chamber(seed: u64, chamber: Profile) -> Scenario {

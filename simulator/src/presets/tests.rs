@@ -12,6 +12,7 @@ fn all() -> Vec<Scenario> {
         zeeman_sine(1),
         fibre_optic_chamber(1, training_profile()),
         fibre_optic_chamber(1, judging_profile()),
+        fibre_optic_chamber(1, paper_profile()),
         mems_chamber(1),
         skewed_six(1, None),
         skewed_six(1, Some(failure)),

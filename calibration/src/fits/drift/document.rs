@@ -212,7 +212,7 @@ pub fn put(document: &mut Document, parameters: &Found, keep_initial: bool) -> R
         let along = AXES.into_iter().zip(row).find(|(_, cosine)| cosine.abs() >= SMALLEST_COSINE);
         let Some((axis, _)) = along else {
             reasons.push(format!(
-                "gyro {} of the document lies along no case axis ({row:?}), so corrected rates do not show its own \
+                "gyro {} of the document lies along no case axis ({row:.3?}), so corrected rates do not show its own \
                  drift: analyse the raw readings (without --calibration) and insert the figures of the page (--html) by hand",
                 sensor.name
             ));

@@ -257,38 +257,18 @@ mod tests {
             assert!((of.thermal_arcsec() - total).abs() < 0.5, "{}", of.thermal_arcsec());
         }
         let text = budget.report(&Plan::twelve(), 3e-4).whole_text();
-        for words in ["11.5", "10.6", "0.3″ for quartz", "1.2″ for silicon", "16.4″"] {
-            assert!(text.contains(words), "{words} is not in\n{text}");
-        }
+        insta::assert_snapshot!(text);
     }
 
     #[test]
     fn the_first_line_is_of_the_plan() {
         let budget = example();
         let first = |plan: &Plan| budget.report(plan, 60.0 / ARCSEC_PER_RAD).headline();
-        let twelve = first(&Plan::twelve());
-        assert!(
-            twelve.starts_with(
-                "budget: an axis will be known to 2.9″ (one sigma) by the plan's 12 positions, to 12.1″"
-            ),
-            "{twelve}"
-        );
-        let six = first(&Plan::six());
         let [known, later] = budget.known_by(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
         assert!(known > 20.0 && later > known && later < known + 5.0, "{known} {later}");
-        assert!(
-            six.starts_with(&format!(
-                "budget: an axis will be known to {known:.1}″ (one sigma) by the plan's 6 positions"
-            )),
-            "{six}"
-        );
         let mut flat = Plan::twelve();
         flat.positions.retain(|position| !position.name.starts_with('Z'));
-        let flat = first(&flat);
-        assert!(
-            flat.starts_with("budget: the plan's 8 positions will not determine C: none has z up, z down."),
-            "{flat}"
-        );
+        insta::assert_snapshot!([Plan::twelve(), Plan::six(), flat].map(|plan| first(&plan)).join("\n"));
     }
 
     #[test]

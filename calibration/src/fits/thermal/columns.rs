@@ -12,7 +12,6 @@ use std::sync::Arc;
 use isotherm_correction::calibration::{
     BranchArgument, BranchedParts, Calibration, CalibrationParts, Defect, TermParts,
 };
-use isotherm_correction::curve::CurveParts;
 use isotherm_correction::observation::Observation;
 use isotherm_correction::sample::{
     GyroTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TemperatureReading,
@@ -22,11 +21,12 @@ use isotherm_correction::unit::{MAX_TICK_DURATION, UnitSettings};
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
 use isotherm_log::offline::{Loaded, Offline, unit_id};
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Channel, Curve, Filter, Shape};
+use isotherm_protocol::document::{Argument, Channel, Curve, Filter, Shape};
 
 use super::samples::Samples;
+use crate::document::tidy;
 use crate::error::Error;
-use crate::numbers::{real, seconds};
+use crate::numbers::{ends, real, seconds};
 
 /// Which thermal branches a term acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,19 +54,53 @@ pub enum Effect {
     Scale,
 }
 
-/// A term with one coefficient: its effect times (T − reference)ʲ.
+/// What the coefficient of an effect is a curve over, and which.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Form {
+    /// A polynomial in temperature.
+    OverTemperature,
+    /// A parabola over the derivative that the coefficient multiplies.
+    Parabola,
+    /// Straight lines over it.
+    Lines,
+    /// A spline over it.
+    Spline,
+}
+
+impl Form {
+    /// All of them, the plainest first.
+    pub const ALL: [Self; 4] = [Self::OverTemperature, Self::Parabola, Self::Lines, Self::Spline];
+
+    /// Number of the knots that a curve over a derivative has its values at.
+    pub const fn knots(self) -> usize {
+        match self {
+            Self::OverTemperature => 0,
+            Self::Parabola => 3,
+            Self::Lines | Self::Spline => 5,
+        }
+    }
+}
+
+/// A term with one coefficient: its effect times (T − reference)ʲ, or its effect where its curve is one at a knot, and zero at others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Term {
     /// What it follows.
     pub effect: Effect,
-    /// j.
+    /// The curve that it is a part of.
+    pub form: Form,
+    /// j, or the knot's number from 0.
     pub power: usize,
 }
 
 impl Effect {
     /// Its term with a power of temperature.
     pub const fn power(self, power: usize) -> Term {
-        Term { effect: self, power }
+        Term { effect: self, form: Form::OverTemperature, power }
+    }
+
+    /// Its terms with a curve over the derivative.
+    pub fn knots(self, form: Form) -> impl Iterator<Item = Term> {
+        (0..form.knots()).map(move |power| Term { effect: self, form, power })
     }
 
     /// Its terms with some powers of temperature.
@@ -97,6 +131,8 @@ pub struct Basis {
     pub reference_deg_c: f64,
     /// Fitted range (°C).
     pub range_deg_c: [f64; 2],
+    /// Fitted ranges of Ṫ (°C/s) and of T̈ (°C/s²), where curves are over them.
+    pub derivatives: [[f64; 2]; 2],
 }
 
 /// Columns of one channel over the windows of several runs, one after the other, made when they are asked for.
@@ -108,26 +144,58 @@ pub struct Columns<'a> {
 }
 
 impl Basis {
-    /// A polynomial (°/h and so on) with one coefficient that is not zero.
-    fn power(&self, power: usize, value: f64) -> CurveParts {
-        let mut coefficients = vec![0.0; power + 1];
-        coefficients[power] = AngularRate::from_deg_per_h(value).as_rad_per_s();
-        CurveParts::Polynomial { reference: self.reference_deg_c, coefficients, range: self.range_deg_c }
+    /// Where the curve of a term over a derivative has its values (°C/s or °C/s²).
+    pub(super) fn knots(&self, term: Term) -> Vec<f64> {
+        let [low, high] = self.derivatives[usize::from(matches!(term.effect, Effect::Acceleration(_)))];
+        let last = real(term.form.knots().saturating_sub(1));
+        (0..term.form.knots()).map(|knot| tidy(low + (high - low) * real(knot) / last)).collect()
     }
 
-    /// A polynomial over its range.
-    pub(super) fn curve(&self, coefficients: Vec<f64>) -> Curve {
-        let (reference, range) = (self.reference_deg_c, self.range_deg_c);
-        Curve::new(Shape::Polynomial { reference, coefficients, range })
+    /// The curve that a term is a part of, from the coefficients of all its parts.
+    fn shape(&self, term: Term, coefficients: Vec<f64>) -> Shape {
+        let places = self.knots(term);
+        let knots = || places.iter().zip(&coefficients).map(|(place, value)| [*place, *value]).collect();
+        match (term.form, &places[..], &coefficients[..]) {
+            (Form::Lines, ..) => Shape::PiecewiseLinear { knots: knots() },
+            (Form::Spline, ..) => Shape::Spline { knots: knots() },
+            (Form::Parabola, &[low, middle, high], &[first, value, last]) => {
+                let half = 0.5 * (high - low);
+                let bend = 0.5 * (first + last) - value;
+                let coefficients =
+                    [value, 0.5 * (last - first) / half, bend / (half * half)].map(tidy).into();
+                Shape::Polynomial { reference: middle, coefficients, range: [low, high] }
+            }
+            _ => {
+                let (reference, range) = (self.reference_deg_c, self.range_deg_c);
+                Shape::Polynomial { reference, coefficients, range }
+            }
+        }
+    }
+
+    /// The same as a document has it.
+    pub(super) fn curve(&self, term: Term, coefficients: Vec<f64>) -> Curve {
+        let argument = match (term.form, term.effect) {
+            (Form::OverTemperature, _) => Argument::DegC,
+            (_, Effect::Acceleration(_)) => Argument::DegCPerS2,
+            _ => Argument::DegCPerS,
+        };
+        Curve::new(self.shape(term, coefficients)).over(argument)
     }
 
     /// A term with the coefficient one (°/h and so on).
     fn parts(&self, term: Term) -> Vec<TermParts> {
-        let power = |value: f64| self.power(term.power, value);
+        let power = |value: f64| {
+            let mut coefficients = vec![0.0; term.form.knots().max(term.power + 1)];
+            coefficients[term.power] = AngularRate::from_deg_per_h(value).as_rad_per_s();
+            self.shape(term, coefficients)
+        };
         let branched = |feature, branch| {
             let [run_up, braking] =
                 [Branch::Braking, Branch::RunUp].map(|other| power(f64::from(u8::from(branch != other))));
-            let argument = BranchArgument::Temperature;
+            let argument = match term.form {
+                Form::OverTemperature => BranchArgument::Temperature,
+                _ => BranchArgument::Derivative,
+            };
             TermParts::branched(feature, BranchedParts { argument, run_up, braking })
         };
         vec![match term.effect {
@@ -260,6 +328,18 @@ impl<'a> Columns<'a> {
     /// What they are made with.
     pub fn basis(&self) -> &Basis {
         &self.basis
+    }
+
+    /// Takes the ranges of Ṫ and T̈ from the windows, for curves over them.
+    ///
+    /// # Errors
+    /// As [`Columns::make`].
+    pub fn span_derivatives(&mut self) -> Result<(), Error> {
+        let terms = [Effect::Rate, Effect::Acceleration].map(|of| of(Branch::Both).power(0));
+        self.make(&terms)?;
+        let found = terms.map(|term| ends(self.get(term).iter().copied().filter(|x| x.is_finite())));
+        self.basis.derivatives = found.map(|range| range.map(tidy));
+        Ok(())
     }
 
     /// Makes the columns of terms that are not there yet.

@@ -19,7 +19,7 @@ use crate::runs::{Run, Watch};
 /// Axes: gyros, then accelerometers.
 const COLUMNS: usize = 6;
 /// What is compared, in the order of the columns; a document of each but of the mean, which needs none.
-const HEAD: [&str; 5] = ["raw", "mean", "cubic", "cubic + Ṫ", "this document"];
+const HEAD: [&str; 6] = ["raw", "mean", "cubic", "cubic + Ṫ", "this document", "the one before"];
 
 /// Heading of the table that states each axis' accuracy.
 pub(super) const HEADING: &str = "Accuracy: rms of windows on the judging runs; noise of a window, and of single ticks from the thermometer";
@@ -47,7 +47,7 @@ struct Stage<'a> {
 /// it was fitted.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Compared {
-    rms: [Option<[f64; 5]>; COLUMNS],
+    rms: [Option<[f64; 6]>; COLUMNS],
     levels: [[f64; 2]; COLUMNS],
 }
 
@@ -57,15 +57,15 @@ type Pick = fn(&Rivals) -> &Vec<(Term, f64, f64)>;
 type Sum = (f64, f64);
 
 impl Compared {
-    /// Of documents without terms, with cubics, with Ṫ beside them, and the new one.
+    /// Of documents without terms, with cubics, with Ṫ beside them, the new one, and the one before it.
     fn of(
-        documents: [&Document; 4],
+        documents: [&Document; 5],
         fitted: &[Stage<'_>],
         judging: &[Stage<'_>],
         mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let loaded: Vec<Loaded> = documents.into_iter().map(Written::compiled).collect::<Result<_, _>>()?;
-        let mut levels = [[(0.0, 0.0); 4]; COLUMNS];
+        let mut levels = [[(0.0, 0.0); 5]; COLUMNS];
         for stage in fitted {
             let tables = stage.tables(&loaded, &mut watch)?;
             for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| stage.counts(*axis)) {
@@ -78,7 +78,7 @@ impl Compared {
         }
         let levels =
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
-        let mut sums: [[Sum; 5]; COLUMNS] = Default::default();
+        let mut sums: [[Sum; 6]; COLUMNS] = Default::default();
         for stage in judging {
             let tables = stage.tables(&loaded, &mut watch)?;
             let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
@@ -100,7 +100,7 @@ impl Compared {
 
     /// What leaves less of an axis than the document does, in words: a mean or a cubic.
     fn prefers(&self, axis: usize) -> Option<(&'static str, Pick)> {
-        let [_, mean, cubic, _, document] = self.rms.get(axis).copied().flatten()?;
+        let [_, mean, cubic, _, document, _] = self.rms.get(axis).copied().flatten()?;
         if mean.min(cubic) >= document {
             None
         } else if mean < cubic {
@@ -108,6 +108,21 @@ impl Compared {
         } else {
             Some(("cubic by plain least squares", |rivals| &rivals.cubic))
         }
+    }
+
+    /// Warns of axes of which the document before leaves less than the new one.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
+        self.rms.iter().enumerate().filter_map(|(axis, rms)| {
+            let [.., new, before] = (*rms)?;
+            let (of, (new_words, before_words)) = (output_name(axis < 3, axis % 3), (short(new), short(before)));
+            (before < new && before_words != new_words).then(|| {
+                let unit = if axis < 3 { "°/h" } else { "m/s²" };
+                format!(
+                    "{of}: on the judging runs this document leaves {new_words} {unit}, the one before it {before_words}: \
+                     keep that one"
+                )
+            })
+        })
     }
 
     /// By axis what is left in the end, beside the noise that nothing takes away and that of the thermometers.
@@ -153,18 +168,20 @@ impl Outcome {
         let (fitted, judging) = stages.split_at(runs.len());
         let rival = |of: Pick| self.document(|found| found.rivals.as_ref().map_or(&found.terms, of));
         let (cubic, with_rate) = (rival(|rivals| &rivals.cubic), rival(|rivals| &rivals.with_rate));
-        Compared::of([&self.plain(), &cubic, &with_rate, document], fitted, judging, watch)
+        Compared::of([&self.plain(), &cubic, &with_rate, document, &self.base], fitted, judging, watch)
     }
 
     /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
     pub(super) fn take_simpler(&mut self, compared: &Compared) -> bool {
         let sensors = [accelerometers(&self.base).len(), self.base.gyro.sensor.len()];
-        let mut changed = false;
+        let (mut changed, stepwise) = (false, self.settings.method.is_stepwise());
         for (sensor, _, found) in &mut self.found {
             // Of more than three sensors none stands for an axis.
             let axis = axis_of(sensor).filter(|_| sensors[usize::from(sensor.gyro)] == 3);
             let Some((words, of)) = axis.and_then(|axis| compared.prefers(axis)) else { continue };
-            let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some()) else { continue };
+            let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some() && !stepwise) else {
+                continue;
+            };
             let simpler = of(rivals);
             if found.refused.is_none() && found.terms != *simpler && !simpler.is_empty() {
                 found.terms.clone_from(simpler);
@@ -196,10 +213,10 @@ impl Stage<'_> {
 
 /// Adds the squares of what is left of an axis in windows that all have.
 fn add(
-    sums: &mut [Sum; 5],
+    sums: &mut [Sum; 6],
     tables: &[Table],
     (axis, truth): (usize, Option<f64>),
-    levels: [f64; 4],
+    levels: [f64; 5],
     shared: bool,
 ) {
     let columns: Vec<&[f64]> = tables.iter().map(|table| column(table, axis)).collect();
@@ -214,7 +231,7 @@ fn add(
     };
     // The mean of the fitted runs is what it takes, where the level counts.
     let mean = off(0) + if truth.is_some() { levels[0] } else { 0.0 };
-    let lines = [(0, off(0)), (0, mean), (1, off(1)), (2, off(2)), (3, off(3))];
+    let lines = [(0, off(0)), (0, mean), (1, off(1)), (2, off(2)), (3, off(3)), (4, off(4))];
     for ((square, number), (document, off)) in sums.iter_mut().zip(lines) {
         for &row in &good {
             *square += (columns[document][row] - off).powi(2);

@@ -4,14 +4,13 @@ use isotherm_protocol::document::Document;
 
 use super::bare::{bare, carry, filter, nominal_of};
 use super::checks::{self, Findings};
-use super::columns::{Columns, Effect};
+use super::columns::Columns;
 use super::filter::{choose_filter, longest_run_s};
-use super::joint::{CUBIC, Found, Joint, rivals};
+use super::joint::{Found, Joint, rivals};
 use super::known::{Known, channel, histories};
-use super::ladder::lags;
 use super::outcome::Outcome;
 use super::samples::Samples;
-use super::select::{Target, WORTH_IT};
+use super::select::Target;
 use super::sequential;
 use super::settings::{Method, Settings};
 use super::stand::Stand;
@@ -181,11 +180,14 @@ fn sensors_of<'a>(
     samples: &'a [Samples],
 ) -> Result<(), Error> {
     let (dead, alive): (Vec<_>, Vec<_>) = sensors.iter().partition(|(sensor, _)| sensor.dead.is_some());
+    let method = outcome.settings.method;
+    if method.is_stepwise() {
+        columns.span_derivatives()?;
+    }
     let basis = columns.basis().clone();
     for (sensor, _) in dead {
         outcome.add(sensor, &basis, Found::dead(sensor.dead.as_deref().unwrap_or_default()));
     }
-    let method = outcome.settings.method;
     if method.is_stepwise() {
         for (sensor, target) in alive {
             let found = step_by_step(&mut columns, (sensor, target), known, method)?;
@@ -215,30 +217,18 @@ fn step_by_step(
             "the temperature goes one way only: methods sequential and rate need ramps both ways",
         ));
     }
-    let grid = columns.basis().filter.grid_step_s;
-    let steps = if sensor.gyro {
-        let steps = if method == Method::Rate { 1 } else { 2 };
-        sequential::gyro_terms().into_iter().take(steps).collect()
-    } else {
-        vec![lags(&[(3.0 * grid).max(10.0)], 0).terms]
+    let choice = sequential::choose(columns, (sensor.gyro, target), known, method)?;
+    let Some(dynamics) = choice.best().map(|best| &best.spec.dynamics) else {
+        return Ok(Found::refused("too few windows for cross-validation"));
     };
-    let degree = sequential::degree(history).max(CUBIC);
-    columns.make(&Effect::Static.powers(0..=degree).collect::<Vec<_>>())?;
-    for terms in &steps {
-        columns.make(terms)?;
-    }
-    let mut found = match sequential::find(columns, target, history, &steps) {
+    let mut found = match sequential::find(columns, target, history, &dynamics.terms) {
         Err(why) => Found::refused(&why),
-        Ok(found) => {
-            let (left, mean) =
-                (sequential::left(columns, target, &found), sequential::left(columns, target, &[]));
-            let flat = target.flat(columns).filter(|_| left > WORTH_IT * mean);
-            flat.map_or_else(
-                || Found::sequential(found, left, mean),
-                |level| Found::flat(&level, target.level),
-            )
-        }
+        Ok(terms) => Found::unless_better(&choice, target, columns).unwrap_or_else(|| {
+            let words = format!("plateaus, then {}", dynamics.name);
+            Found { terms, words, ..Found::default() }
+        }),
     };
     found.rivals = Some(rivals(columns, sensor, target, target.widest_scale())?);
+    found.choice = Some(choice);
     Ok(found)
 }

@@ -88,18 +88,10 @@ impl<'a> Joint<'a> {
                 "cross-validation is not possible: the log has only one temperature ramp; run the chamber both ways",
             ));
         };
-        if terms == Terms::Auto && (choice.mean.is_nan() || best.score > WORTH_IT * choice.mean) {
-            if let Some(level) = target.flat(&self.columns) {
-                return Ok(Found { choice: Some(choice), ..Found::flat(&level, target.level) });
-            }
-            let why = format!(
-                "no model beats its mean: the best one, {}, leaves {:.3e} on unseen parts, the mean {:.3e}; the axis \
-                 does not follow temperature",
-                best.spec.words(),
-                best.score,
-                choice.mean
-            );
-            return Ok(Found { choice: Some(choice), ..Found::refused(&why) });
+        if terms == Terms::Auto
+            && let Some(found) = Found::unless_better(&choice, target, &self.columns)
+        {
+            return Ok(Found { choice: Some(choice), ..found });
         }
         let doubt = doubt_of_passes(target, &self.columns, (history, &self.known.temperature))
             .filter(|_| !best.spec.dynamics.terms.is_empty());
@@ -222,20 +214,24 @@ impl Found {
         }
     }
 
-    pub(super) fn sequential(terms: Vec<(Term, f64, f64)>, left: f64, mean: f64) -> Self {
-        if left <= WORTH_IT * mean {
-            let mut words = "plateaus".to_owned();
-            let has = |is: fn(Effect) -> bool| terms.iter().any(|(term, ..)| is(term.effect));
-            let steps = [
-                (", then Ṫ±", has(|effect| matches!(effect, Effect::Rate(_)))),
-                (", then T̈±", has(|effect| matches!(effect, Effect::Acceleration(_)))),
-                (", then a lag", has(|effect| matches!(effect, Effect::Lag(_)))),
-            ];
-            steps.iter().filter(|(_, has)| *has).for_each(|(step, _)| words.push_str(step));
-            return Self { terms, words, ..Self::default() };
+    /// A sensor whose best model is no better than its mean on parts that it did not see: temperature does nothing to it, or something
+    /// else does more.
+    pub(super) fn unless_better(choice: &Choice, target: &Target, columns: &Columns<'_>) -> Option<Self> {
+        let best = choice.best()?;
+        if best.score <= WORTH_IT * choice.mean {
+            return None;
         }
-        Self::refused(&format!(
-            "no model beats its mean: the terms leave {left:.3e}, the mean {mean:.3e}, in sample"
+        Some(target.flat(columns).map_or_else(
+            || {
+                Self::refused(&format!(
+                    "no model beats its mean: the best one, {}, leaves {:.3e} on unseen parts, the mean {:.3e}; the \
+                     axis does not follow temperature",
+                    best.spec.words(),
+                    best.score,
+                    choice.mean
+                ))
+            },
+            |level| Self::flat(&level, target.level),
         ))
     }
 

@@ -32,6 +32,7 @@ impl Known {
             filter: filter.clone(),
             reference_deg_c: libm::round(0.5 * (low + high)),
             range_deg_c,
+            derivatives: [[0.0; 2]; 2],
         }
     }
 }
@@ -65,8 +66,13 @@ pub(super) fn histories(
         }
         let channel = channel(bare, name)?;
         let plain = channel.conversion_deg_c == [0.0, 1.0];
-        let basis =
-            Basis { channel, filter: filter.clone(), reference_deg_c: 0.0, range_deg_c: [-300.0, 1000.0] };
+        let basis = Basis {
+            channel,
+            filter: filter.clone(),
+            reference_deg_c: 0.0,
+            range_deg_c: [-300.0, 1000.0],
+            derivatives: [[0.0; 2]; 2],
+        };
         let (temperature, _) = Columns::new(basis, samples).temperature()?;
         let mut parts = Vec::new();
         let mut from = 0;

@@ -69,7 +69,7 @@ impl Spec {
 }
 
 /// Name and unit of a term's coefficient.
-pub fn described(term: Term, output: &str) -> (String, String) {
+pub fn described(basis: &Basis, term: Term, output: &str) -> (String, String) {
     let branch = |branch: Branch| match branch {
         Branch::Both => "",
         Branch::RunUp => ", run-up",
@@ -84,7 +84,10 @@ pub fn described(term: Term, output: &str) -> (String, String) {
         Effect::Scale => ("scale factor error".to_owned(), "ppm".to_owned()),
         Effect::Lag(tau) => (format!("lag of {} s", tau_s(tau)), format!("({output})/(°C/s)")),
     };
-    (format!("{name}, power {}", term.power), per_deg_c(&unit, term.power))
+    match basis.knots(term).get(term.power) {
+        Some(knot) => (format!("{name}, at {knot:.3e}"), unit),
+        None => (format!("{name}, power {}", term.power), per_deg_c(&unit, term.power)),
+    }
 }
 
 /// Coefficients of some effects, by power from 0; `None` without any.
@@ -95,9 +98,10 @@ fn coefficients(found: &[(Term, f64)], of: &[Effect]) -> Option<Vec<f64>> {
     Some(coefficients)
 }
 
-/// A curve from some effects; `None` without any.
+/// A curve from some effects, all of them of one form; `None` without any.
 fn curve(basis: &Basis, found: &[(Term, f64)], of: &[Effect]) -> Option<Curve> {
-    coefficients(found, of).map(|found| basis.curve(found.into_iter().map(tidy).collect()))
+    let (first, _) = found.iter().find(|(term, _)| of.contains(&term.effect))?;
+    Some(basis.curve(*first, coefficients(found, of)?.into_iter().map(tidy).collect()))
 }
 
 /// The lags, with ascending time constants.
@@ -136,10 +140,8 @@ pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
 
 /// Run-up and braking.
 fn branches(basis: &Basis, found: &[(Term, f64)], of: fn(Branch) -> Effect) -> Option<[Curve; 2]> {
-    let sides = [Branch::RunUp, Branch::Braking];
-    let sides = sides.map(|side| curve(basis, found, &[of(Branch::Both), of(side)]));
-    let zero = || basis.curve(vec![0.0]);
-    sides.iter().any(Option::is_some).then(|| sides.map(|side| side.unwrap_or_else(zero)))
+    let side = |side| curve(basis, found, &[of(Branch::Both), of(side)]);
+    Some([side(Branch::RunUp)?, side(Branch::Braking)?])
 }
 
 /// Puts found coefficients (output units and so on) into an accelerometer, which has a static bias and lags only; its scale factor

@@ -97,7 +97,7 @@ impl Noise {
     pub(super) fn covariance(&self, a: Term, b: Term, away: &[f64]) -> f64 {
         let Some(known) = bare(a).zip(bare(b)).and_then(|pair| self.known.get(&pair)) else { return 0.0 };
         // A power of temperature moves by its derivative, a gain stays.
-        let part = |Term { effect, power }: Term, x: f64| match effect {
+        let part = |Term { effect, power, .. }: Term, x: f64| match effect {
             Effect::Static => (1..=power).map(|_| integer_power(x, power - 1)).sum(),
             _ => integer_power(x, power),
         };

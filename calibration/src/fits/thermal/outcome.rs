@@ -1,11 +1,11 @@
 //! What a thermal fit came to: the document, its verdicts, its report.
 
 use isotherm_correction::thermal::Feature;
-use isotherm_protocol::document::{Document, Filter, Sample};
+use isotherm_protocol::document::{Curve as DocumentCurve, Document, Filter, Sample, Shape};
 
 use super::branches::History;
 use super::checks::SMALLEST_RANGE_DEG_C;
-use super::columns::{Basis, Term};
+use super::columns::{Basis, Effect, Term};
 use super::compare;
 use super::fit::Sensor;
 use super::joint::Found;
@@ -32,6 +32,19 @@ pub(super) struct Outcome {
     pub(super) notes: Vec<String>,
     pub(super) range_deg_c: [f64; 2],
     pub(super) rate_range_deg_c_per_s: [f64; 2],
+}
+
+/// The bias with the level that it had before in the middle of the fitted range, where the runs could not tell that level. Biases: before,
+/// and as found.
+fn level(
+    basis: &Basis,
+    found: &[(Term, f64)],
+    [old, new]: [Option<&DocumentCurve>; 2],
+) -> Option<DocumentCurve> {
+    let old = old.filter(|_| found.iter().all(|(term, _)| *term != Effect::Static.power(0)))?;
+    let at = old.range().map_or(basis.reference_deg_c, |[low, high]| basis.reference_deg_c.clamp(low, high));
+    let value = old.shape().at(at)?;
+    Some(new.map_or_else(|| DocumentCurve::new(Shape::Constant { value }), |new| new.plus(value)))
 }
 
 impl Outcome {
@@ -119,6 +132,7 @@ impl Outcome {
             }
         };
         let table = compared.table(&self, &curves);
+        self.warnings.extend(compared.warnings());
         self.say(&mut verdicts);
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
@@ -151,23 +165,35 @@ impl Outcome {
             let terms: Vec<(Term, f64)> = of(found).iter().map(|(term, value, _)| (*term, *value)).collect();
             if sensor.gyro {
                 let Some(gyro) = document.gyro.sensor.get_mut(sensor.index) else { continue };
-                match self.base.gyro.sensor.get(sensor.index).filter(|_| found.refused.is_some()) {
-                    Some(old) => gyro.clone_from(old),
-                    None => put_gyro(gyro, basis, &terms),
+                let old = self.base.gyro.sensor.get(sensor.index);
+                if let Some(old) = old.filter(|_| found.refused.is_some()) {
+                    gyro.clone_from(old);
+                    continue;
+                }
+                put_gyro(gyro, basis, &terms);
+                let biases = [old.map(|old| &old.terms), Some(&gyro.terms)].map(|of| of?.curve(Feature::One));
+                if let Some(kept) = level(basis, &terms, biases) {
+                    gyro.set(Feature::One, kept);
                 }
             } else if let Some(accel) =
                 document.accel.as_mut().and_then(|accel| accel.sensor.get_mut(sensor.index))
             {
                 let old = accelerometers(&self.base).get(sensor.index);
-                match old.filter(|_| found.refused.is_some()) {
-                    Some(old) => accel.clone_from(old),
-                    None => put_accel(accel, basis, &terms),
+                if let Some(old) = old.filter(|_| found.refused.is_some()) {
+                    accel.clone_from(old);
+                    continue;
+                }
+                put_accel(accel, basis, &terms);
+                let biases =
+                    [old.map(|old| &old.terms), Some(&accel.terms)].map(|of| of?.curve(Feature::One));
+                if let Some(kept) = level(basis, &terms, biases) {
+                    accel.set(Feature::One, kept);
                 }
             }
         }
         if self.settings.removes_mean() {
-            let level = "The attitude of the unit was not stated: every fitted bias is zero in the middle of its \
-                         range, and the level of each output does not change.";
+            let level = "The attitude of the unit was not stated: in the middle of its range every fitted bias is what it \
+                         was before, and the level of each output does not change.";
             document.note = Some(match &self.base.note {
                 Some(note) if note.contains(level) => note.clone(),
                 Some(note) => format!("{note}\n{level}"),

@@ -297,7 +297,7 @@ fn ranges(target: &Target, piece: &[usize], temperature: &[f64]) -> Vec<[f64; 2]
 }
 
 /// The smallest model that is hardly worse than the best.
-fn smallest(tried: &[Tried]) -> Option<&Tried> {
+pub(super) fn smallest(tried: &[Tried]) -> Option<&Tried> {
     let best = tried.iter().map(|tried| tried.score).fold(f64::INFINITY, f64::min);
     let good = tried.iter().filter(|tried| tried.score * NO_BETTER <= best);
     good.min_by(|a, b| a.count.cmp(&b.count).then(a.score.total_cmp(&b.score)))

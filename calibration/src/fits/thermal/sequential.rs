@@ -1,19 +1,21 @@
-//! 000's procedure: the static bias from the plateaus, then the rate's coefficient on the ramps, then the acceleration's.
+//! 000's procedure: the static bias from the plateaus, then the coefficients of rate and acceleration on the ramps.
 //!
-//! The paper takes one after the other, point by point, and approximates. Here every step is a weighted least-squares fit, and
-//! the steps for rate and acceleration are repeated until neither moves, because smoothing makes the two alike.
+//! The paper takes one after the other, point by point, and approximates the points by straight lines, a parabola or splines. Here a
+//! step is a weighted least-squares fit, rate and acceleration are one, because smoothing makes the two alike, and cross-validation
+//! says whether they are curves over the derivatives, as in the paper, or polynomials in temperature.
 
 use super::branches::History;
-use super::columns::{Branch, Columns, Effect, Term};
-use super::model::Spec;
-use super::select::Target;
+use super::columns::{Branch, Columns, Effect, Form, Term};
+use super::joint::CUBIC;
+use super::known::Known;
+use super::ladder::lags;
+use super::model::{Dynamics, Spec};
+use super::noise::Noise;
+use super::select::{Choice, Target, Trials, smallest};
+use super::settings::Method;
+use crate::error::Error;
 use crate::lsq::weighted::solve;
 use crate::report::counted;
-
-/// Rounds of rate and acceleration.
-const ROUNDS: usize = 60;
-/// Change of a coefficient, as a share of itself, that counts as none.
-const STILL: f64 = 1e-6;
 
 /// The branches that terms of the rate and of the acceleration are told apart by.
 const BRANCHES: [Branch; 2] = [Branch::RunUp, Branch::Braking];
@@ -21,15 +23,65 @@ const BRANCHES: [Branch; 2] = [Branch::RunUp, Branch::Braking];
 /// Coefficients with their standard errors, and why there are none.
 pub type Found = Result<Vec<(Term, f64, f64)>, String>;
 
-/// The terms of the rate and of the acceleration of a gyro.
-pub fn gyro_terms() -> [Vec<Term>; 2] {
-    [
-        [0, 1]
-            .into_iter()
-            .flat_map(|power| BRANCHES.map(|branch| Effect::Rate(branch).power(power)))
-            .collect(),
-        BRANCHES.map(|branch| Effect::Acceleration(branch).power(0)).to_vec(),
-    ]
+/// What may follow the plateaus, the plainest first: Ṫ and T̈ of a gyro, a lag of an accelerometer.
+fn offers(gyro: bool, method: Method, grid_step_s: f64) -> Vec<Dynamics> {
+    if !gyro {
+        return vec![lags(&[(3.0 * grid_step_s).max(10.0)], 0)];
+    }
+    let rate = |form| follows("Ṫ", Effect::Rate, 1, form);
+    if method == Method::Rate {
+        return vec![rate(Form::OverTemperature)];
+    }
+    let both = |(on_rate, on_acceleration)| {
+        let (rate, acceleration) = (rate(on_rate), follows("T̈", Effect::Acceleration, 0, on_acceleration));
+        Dynamics {
+            name: format!("{}, {}", rate.name, acceleration.name),
+            terms: [rate.terms, acceleration.terms].concat(),
+        }
+    };
+    Form::ALL
+        .into_iter()
+        .flat_map(|rate| Form::ALL.map(|acceleration| (rate, acceleration)))
+        .map(both)
+        .collect()
+}
+
+/// A derivative by branches, its coefficient a curve of a form, or a polynomial of some degree in temperature.
+fn follows(derivative: &str, effect: fn(Branch) -> Effect, degree: usize, form: Form) -> Dynamics {
+    let name = match form {
+        Form::OverTemperature => format!("{derivative}±"),
+        Form::Parabola => format!("{derivative}± by a parabola over it"),
+        Form::Lines => format!("{derivative}± by lines over it"),
+        Form::Spline => format!("{derivative}± by a spline over it"),
+    };
+    let of_branch = |branch| match form {
+        Form::OverTemperature => effect(branch).powers(0..=degree).collect(),
+        _ => effect(branch).knots(form).collect::<Vec<_>>(),
+    };
+    Dynamics { name, terms: BRANCHES.into_iter().flat_map(of_branch).collect() }
+}
+
+/// What follows the plateaus of one sensor: the smallest of what may that leaves hardly more than the best on parts that it did not see.
+/// Makes the columns of all, and of a cubic.
+///
+/// # Errors
+/// As [`Columns::make`].
+pub(super) fn choose(
+    columns: &mut Columns<'_>,
+    (gyro, target): (bool, &Target),
+    known: &Known,
+    method: Method,
+) -> Result<Choice, Error> {
+    let offers = offers(gyro, method, columns.basis().filter.grid_step_s);
+    let (degree, history) = (degree(&known.history), &known.history);
+    let mut terms: Vec<Term> = offers.iter().flat_map(|dynamics| dynamics.terms.clone()).collect();
+    terms.extend(Effect::Static.powers(0..=CUBIC));
+    columns.make(&terms)?;
+    let trials = Trials::of(target, columns, &terms, &Noise::default(), (&history.piece, &known.temperature));
+    let spec = |dynamics| Spec { degree, dynamics, scale: target.widest_scale(), shrink: 0.0 };
+    let tried: Vec<_> = offers.into_iter().filter_map(|dynamics| trials.tried(spec(dynamics))).collect();
+    let chosen = smallest(&tried).and_then(|best| tried.iter().position(|other| other == best));
+    Ok(Choice { mean: trials.score(&Spec::default()).unwrap_or(f64::NAN), tried, chosen })
 }
 
 /// Power of the static bias that so many levels of plateaus allow.
@@ -40,11 +92,11 @@ pub fn degree(history: &History) -> usize {
 /// Standard errors by which a power of the scale factor error must stand out.
 const STANDS_OUT: f64 = 3.0;
 
-/// Finds the coefficients of one sensor: `steps` are the terms of each step after the plateaus.
+/// Finds the coefficients of one sensor, with `terms` after the plateaus.
 ///
 /// # Errors
 /// Why the log does not allow it, and what to do.
-pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[Vec<Term>]) -> Found {
+pub fn find(columns: &Columns<'_>, target: &Target, history: &History, terms: &[Term]) -> Found {
     let levels = history.levels();
     if levels < 2 {
         return Err(format!(
@@ -72,56 +124,9 @@ pub fn find(columns: &Columns<'_>, target: &Target, history: &History, steps: &[
             _ => break (found, solution.residual),
         }
     };
-    let mut parts: Vec<Vec<(Term, f64, f64)>> =
-        steps.iter().map(|terms| terms.iter().map(|term| (*term, 0.0, 0.0)).collect()).collect();
-    for _ in 0..ROUNDS {
-        let mut still = true;
-        for step in 0..parts.len() {
-            let others =
-                parts.iter().enumerate().filter(|(other, _)| *other != step).flat_map(|(_, part)| part);
-            let mut left = rest.clone();
-            for (term, value, _) in others {
-                left.iter_mut().zip(columns.get(*term)).for_each(|(left, column)| *left -= value * column);
-            }
-            let own: Vec<&[f64]> = parts[step].iter().map(|(term, ..)| columns.get(*term)).collect();
-            let solution = solve(&own, &left, &moving, None).ok_or("too few windows on ramps")?;
-            for (i, (_, value, sigma)) in parts[step].iter_mut().enumerate() {
-                let new = solution.coefficients[i];
-                still &= (new - *value).abs() <= STILL * new.abs();
-                (*value, *sigma) = (new, solution.sigmas[i]);
-            }
-        }
-        if still {
-            break;
-        }
-    }
-    found.extend(parts.into_iter().flatten());
+    let own: Vec<&[f64]> = terms.iter().map(|term| columns.get(*term)).collect();
+    let solution = solve(&own, &rest, &moving, None).ok_or("too few windows on ramps")?;
+    let values = solution.coefficients.iter().zip(&solution.sigmas);
+    found.extend(terms.iter().zip(values).map(|(term, (value, sigma))| (*term, *value, *sigma)));
     Ok(found)
-}
-
-/// What a found model leaves (weighted root mean square), each run's own mean taken off where the level is not known.
-pub fn left(columns: &Columns<'_>, target: &Target, found: &[(Term, f64, f64)]) -> f64 {
-    let mut residual = target.values.clone();
-    for (term, value, _) in found {
-        let column = target.column(columns, *term);
-        residual.iter_mut().zip(column.iter()).for_each(|(left, column)| *left -= value * column);
-    }
-    let runs = target.run.last().map_or(0, |last| last + 1);
-    let (mut square, mut weight) = (0.0, 0.0);
-    for run in 0..runs {
-        let rows =
-            || (0..residual.len()).filter(move |&row| target.run[row] == run && target.weights[row] > 0.0);
-        let good = || rows().filter(|&row| residual[row].is_finite());
-        let all: f64 = good().map(|row| target.weights[row]).sum();
-        let mean = if target.level || all <= 0.0 {
-            0.0
-        } else {
-            good().map(|row| target.weights[row] * residual[row]).sum::<f64>() / all
-        };
-        square += good()
-            .map(|row| target.weights[row] * (residual[row] - mean) * (residual[row] - mean))
-            .sum::<f64>();
-        weight += all;
-    }
-    if weight > 0.0 { (square / weight).sqrt() } else { f64::NAN }
 }

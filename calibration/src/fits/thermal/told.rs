@@ -100,9 +100,9 @@ impl Outcome {
                     .into(),
             );
         }
-        for (sensor, _, found) in &self.found {
+        for (sensor, basis, found) in &self.found {
             for (term, value, sigma) in &found.terms {
-                let (name, unit) = described(*term, output(&self.base, sensor));
+                let (name, unit) = described(basis, *term, output(&self.base, sensor));
                 let name = format!("{} {name}", sensor.name);
                 report.coefficient(name, unit, *value, *sigma);
             }

@@ -6,12 +6,14 @@ use std::path::Path;
 use isotherm_calibration::fits::thermal::{Method, Settings, fit};
 use isotherm_calibration::report::residuals;
 use isotherm_calibration::runs::Run;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
+use isotherm_correction::units::Span;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::{Offline, load_calibration, unit_id};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogReader;
-use isotherm_protocol::document::Sample;
+use isotherm_protocol::document::{Curve, Document, Sample, Shape};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::presets::fibre_optic_chamber;
 use isotherm_simulator::{Scenario, Simulation};
@@ -48,6 +50,10 @@ pub(crate) fn text_log(folder: &Path) -> (std::path::PathBuf, Mapping) {
 }
 
 pub(crate) fn run_of(log: &Path, mapping: &Mapping) -> Run {
+    part_of(log, mapping, &Part::default())
+}
+
+fn part_of(log: &Path, mapping: &Mapping, part: &Part) -> Run {
     let unit = unit_id("UNIT").unwrap();
     let files = LogFiles::Text {
         paths: vec![log.to_path_buf()],
@@ -55,7 +61,7 @@ pub(crate) fn run_of(log: &Path, mapping: &Mapping) -> Run {
         unit: unit.clone(),
         batch_ticks: 512,
     };
-    Run::new("log".to_owned(), unit, files, &Part::default())
+    Run::new("log".to_owned(), unit, files, part)
 }
 
 #[test]
@@ -69,6 +75,8 @@ fn the_residual_of_the_report_is_that_of_the_service() {
         let out = folder.path().join(format!("{}.toml", method.name()));
         made.written.save(&out, false).unwrap();
         assert!(made.report.verdicts.iter().any(|verdict| verdict.accepted), "{}", made.report.to_text());
+        let curves: usize = made.written.document.gyro.sensor.iter().map(super::over_derivatives).sum();
+        assert_eq!(curves > 0, method == Method::Sequential, "{}", made.report.headline());
 
         // As isotherm-replay correct does it: the document from its file, the log event by event.
         let mut unit = Offline::new(&load_calibration(&out).unwrap(), UnitSettings::default());
@@ -93,4 +101,52 @@ fn the_residual_of_the_report_is_that_of_the_service() {
             assert!((stated / rms - 1.0).abs() < 1e-9, "{method:?} {name}: {stated} {rms}");
         }
     }
+}
+
+/// A document may have its constants from elsewhere: from positions, or from turns about the north.
+#[test]
+fn a_level_that_the_run_cannot_tell_stays_what_it_was() {
+    const LEVELS_DEG_PER_H: [f64; 3] = [3.0, -2.0, 0.5];
+    let folder = tempfile::tempdir().unwrap();
+    let (log, mapping) = text_log(folder.path());
+    let settings = Settings { window_s: Some(10.0), ..Settings::default() };
+    let fitted = |base: Option<&Document>| {
+        fit(base, (&[run_of(&log, &mapping)], &[]), &settings, ()).unwrap().written.document
+    };
+    let mut base = fitted(None);
+    for (sensor, value) in base.gyro.sensor.iter_mut().zip(LEVELS_DEG_PER_H) {
+        sensor.set(Feature::One, Curve::new(Shape::Constant { value }));
+    }
+    let again = fitted(Some(&base));
+    for (sensor, level) in again.gyro.sensor.iter().zip(LEVELS_DEG_PER_H) {
+        let bias = sensor.terms.curve(Feature::One).unwrap();
+        let Shape::Polynomial { reference, coefficients, .. } = bias.shape() else { panic!("{bias:?}") };
+        assert!(coefficients.len() > 1, "{bias:?}");
+        let kept = bias.shape().at(*reference).unwrap();
+        assert!((kept - level).abs() < 1e-9, "{}: {kept}, {level} before", sensor.name);
+    }
+}
+
+/// Half of the chamber's programme says less than the whole of it, from which the document before was made.
+#[test]
+fn a_document_that_is_worse_than_the_one_before_it_is_told() {
+    const HALF: Span = Span::from_ns(4_500_000_000_000);
+    let folder = tempfile::tempdir().unwrap();
+    let (log, mapping) = text_log(folder.path());
+    let settings = Settings { window_s: Some(10.0), ..Settings::default() };
+    let whole = fit(None, (&[run_of(&log, &mapping)], &[]), &settings, ()).unwrap().written.document;
+    let [fitted, judging] = [(Span::ZERO, Some(HALF)), (HALF, None)]
+        .map(|(start, end)| part_of(&log, &mapping, &Part { start, end, ..Part::default() }));
+    let report = fit(Some(&whole), (&[fitted], &[judging]), &settings, ()).unwrap().report;
+    let (_, accuracy) = report.tables.last().unwrap();
+    let worse = accuracy.rows.iter().filter(|row| {
+        let [.., new, before] = &row[..] else { panic!("{row:?}") };
+        before.parse::<f64>().unwrap() < new.parse().unwrap()
+    });
+    let told = |row: &&Vec<String>| {
+        let (axis, _) = row[0].split_once(',').unwrap();
+        report.warnings.iter().any(|words| words.starts_with(axis))
+    };
+    let (told, silent): (Vec<_>, Vec<_>) = worse.partition(told);
+    assert!(!told.is_empty() && silent.is_empty(), "{}", report.to_text());
 }

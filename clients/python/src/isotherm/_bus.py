@@ -195,7 +195,11 @@ class Bus:
         key = f"imu/{unit}/calibration{self._named}"
         reply = self._json(f"{key}?{parameters}" if parameters else key, text)
         if reply["outcome"] == "refused":
-            problems = [f"{problem.get('key') or 'document'}: {problem['message']}" for problem in reply["problems"]]
+            # As the operator's program prints them, for a document without a file.
+            problems = [
+                ": ".join(filter(None, [f"{it['line']}:{it['column']}", it.get("key"), it["message"]]))
+                for it in reply["problems"]
+            ]
             raise NotAccepted(f"{unit}: the calibration is refused: {'; '.join(problems) or 'no reason given'}", reply)
         return reply
 

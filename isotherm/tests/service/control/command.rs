@@ -25,9 +25,9 @@ async fn commands_move_a_unit_from_state_to_state_and_are_written_down() {
     let reply = stand.command(UNIT, r#"{"command":"run"}"#).await;
     assert_eq!(reply.state, State::RunningWithoutReversal);
     let reply = stand.command(UNIT, r#"{"command":"self-test"}"#).await;
-    assert!(!reply.accepted && reply.reason.unwrap().contains("possible now: run, standby"));
+    assert!(!reply.accepted && reply.allowed.iter().take(2).eq(["run", "standby"]), "{reply:?}");
     let reply = stand.command(UNIT, r#"{"command":"rest","latitude_deg":95,"heading_deg":0}"#).await;
-    assert!(!reply.accepted && reply.reason.unwrap().contains("latitude is 95°"));
+    assert!(!reply.accepted && reply.reason.unwrap().contains("95°"));
 
     // The ticks that were held back are announced by the first that goes out.
     let out = stand.run_unit(UNIT, 20).await;
@@ -125,7 +125,8 @@ async fn a_unit_that_sends_no_more_can_be_forgotten() {
     let mut stand = Stand::start(folders.settings()).await;
     assert_eq!(stand.revisions(UNIT, 10).await, [0], "it does not come back with a restart");
     let reply = stand.command(UNIT, forget).await;
-    assert!(!reply.accepted && reply.reason.unwrap().contains("still sending"));
+    assert!(!reply.accepted);
+    insta::assert_snapshot!(reply.reason.unwrap());
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &SwapOptions::default()).await, 2);
     stand.stop().await;
 }

@@ -120,7 +120,7 @@ async fn the_beginning_of_a_document_is_refused_though_it_is_one_by_itself() {
     let status = until_service(&stand, |status| !status.bad_documents.is_empty()).await;
     assert!(status.bad_documents[0].problem.contains("lacks [accel]"), "{status:#?}");
     let options = SwapOptions::default();
-    assert_refused(&stand.swap(UNIT, torn, &options).await, &["lacks [accel]", "--force"]);
+    assert_refused(&stand.swap(UNIT, torn, &options).await, &["[accel]", "--force"]);
     // The rest is written.
     folders.put("a.toml", &(whole.clone() + "# The rest.\n"));
     stand.until_accepted(UNIT, 2).await;

@@ -55,24 +55,24 @@ async fn an_old_document_is_warned_about_or_refused() {
         settings.swap.age = severity;
     };
     let old = document(UNIT, 2.0).replace("2026-01-05", "2020-01-05");
-    policy(set, 25.0, &old, &["created: is 2020-01-05", "days old, more than 30"]).await;
+    policy(set, 25.0, &old, &["created: ", "2020-01-05", " 30"]).await;
     let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
-    policy(set, 25.0, &undated, &["created: is missing"]).await;
+    policy(set, 25.0, &undated, &["created: "]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_document_older_than_the_one_in_force_is_warned_about_or_refused() {
     let set = |settings: &mut Settings, severity| settings.swap.downgrade = severity;
-    let older = ["created: is 2026-01-05: older than the document in force", "2999-01-01T00:00:00"];
+    let older = ["created: ", "2026-01-05", "2999-01-01T00:00:00"];
     policy(set, 25.0, &document(UNIT, 2.0), &older).await;
     let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
-    policy(set, 25.0, &undated, &["created: is missing: the document may be older"]).await;
+    policy(set, 25.0, &undated, &["created: "]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_document_that_was_fitted_elsewhere_is_warned_about_or_refused() {
     let set = |settings: &mut Settings, severity| settings.swap.outside_range = severity;
-    policy(set, 55.0, &document(UNIT, 2.0), &["channel body is at 55.00 °C", "-10 to 40 °C"]).await;
+    policy(set, 55.0, &document(UNIT, 2.0), &["body", "55.00 °C", "-10 to 40 °C"]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -82,13 +82,7 @@ async fn a_jump_of_the_output_is_warned_about_or_refused() {
         settings.swap.max_jump_rad_per_s = Some(2.0_f64.to_radians() / 3600.0);
         settings.swap.jump = severity;
     };
-    policy(
-        set,
-        25.0,
-        &document(UNIT, 4.5),
-        &["the corrected angular rate about x would jump by -3.5000 °/h", "2"],
-    )
-    .await;
+    policy(set, 25.0, &document(UNIT, 4.5), &["rate about x", "-3.5000 °/h", "2"]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -107,14 +101,15 @@ async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_ref
 
     let text = document(UNIT, 1.0);
     let signed = sign(&text, &trusted, Existing::Refuse).unwrap();
-    let foreign = sign(&text, &PrivateKey::from_seed(&[8; 32]), Existing::Refuse).unwrap();
+    let (stranger, id) = (PrivateKey::from_seed(&[8; 32]), |key: &PrivateKey| key.public().id().to_string());
+    let foreign = sign(&text, &stranger, Existing::Refuse).unwrap();
     let changed = signed.replace("coefficients_deg_per_h = [1, ", "coefficients_deg_per_h = [1.5, ");
     assert_ne!(changed, signed);
     let force = SwapOptions { force: true, any_serial: true, ..PLAIN };
     for options in [PLAIN, force] {
-        assert_refused(&stand.swap(UNIT, &text, &options).await, &["is not signed", "isotherm sign"]);
-        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &["not trusted here", "bench"]);
-        assert_refused(&stand.swap(UNIT, &changed, &options).await, &["changed after signing"]);
+        assert_refused(&stand.swap(UNIT, &text, &options).await, &["isotherm sign"]);
+        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &[&id(&stranger), "bench"]);
+        assert_refused(&stand.swap(UNIT, &changed, &options).await, &[&id(&trusted), "bench"]);
     }
     assert_accepted(&stand.swap(UNIT, &signed, &PLAIN).await, 1);
     let second = sign(&document(UNIT, 2.0), &trusted, Existing::Refuse).unwrap();
@@ -125,22 +120,18 @@ async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_ref
     // What was signed for one unit is not taken for another, and what was replaced does not come back but by a rollback.
     let foreign = sign(&document("ZLG-9", 3.0), &trusted, Existing::Refuse).unwrap();
     for options in [PLAIN, SwapOptions { force: true, any_serial: true, ..PLAIN }] {
-        let words = ["is \"ZLG-9\", but the document was sent to unit", "so any_serial does not count"];
-        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &words);
+        assert_refused(&stand.swap(UNIT, &foreign, &options).await, &["ZLG-9", "any_serial"]);
     }
     let newer =
         sign(&document(UNIT, 4.0).replace("2026-01-05", "2026-03-05"), &trusted, Existing::Refuse).unwrap();
     assert_accepted(&stand.swap(UNIT, &newer, &PLAIN).await, 4);
-    assert_refused(
-        &stand.swap(UNIT, &second, &PLAIN).await,
-        &["older than the document in force", "downgrade"],
-    );
+    assert_refused(&stand.swap(UNIT, &second, &PLAIN).await, &["created: ", "downgrade"]);
     let reply = stand.command(UNIT, r#"{"command":"rollback"}"#).await;
     assert_eq!(reply.swap.unwrap().outcome, SwapOutcome::Accepted, "somebody asks for it by its revision");
 
     // A key that is taken away no longer counts, at once.
     std::fs::remove_file(keys.path().join("bench.pub")).unwrap();
     let third = sign(&document(UNIT, 3.0), &trusted, Existing::Refuse).unwrap();
-    assert_refused(&stand.swap(UNIT, &third, &PLAIN).await, &["not trusted here"]);
+    assert_refused(&stand.swap(UNIT, &third, &PLAIN).await, &[&id(&trusted)]);
     stand.stop().await;
 }

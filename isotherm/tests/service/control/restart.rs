@@ -163,7 +163,7 @@ async fn a_swap_that_cannot_be_written_down_is_refused_and_changes_nothing() {
     std::fs::rename(&shelf, &aside).unwrap();
     std::fs::write(&shelf, "in the way").unwrap();
     let reply = stand.swap(UNIT, &document(UNIT, 2.0), &plain()).await;
-    assert_refused(&reply, &["nothing has changed", "documents"]);
+    assert_refused(&reply, &["documents"]);
     assert_eq!(reply.revision, 1);
     assert_eq!(stand.revisions(UNIT, 20).await, [1]);
     let status = until_service(&stand, |status| told(status, "state_folder").is_some()).await;
@@ -178,7 +178,7 @@ async fn a_swap_that_cannot_be_written_down_is_refused_and_changes_nothing() {
     std::fs::remove_file(&audit).unwrap();
     symlink(&audit, &audit).unwrap();
     let reply = stand.swap(UNIT, &document(UNIT, 3.0), &plain()).await;
-    assert_refused(&reply, &["nothing has changed", "audit"]);
+    assert_refused(&reply, &["audit"]);
     assert_eq!(stand.revisions(UNIT, 20).await, [2]);
     stand.stop().await;
 }

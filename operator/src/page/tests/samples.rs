@@ -233,7 +233,7 @@ pub(crate) fn pre_launch(serial: &str) -> Status {
 }
 
 /// One unit for each kind of trouble: its level, and a part of the first remark.
-pub(crate) fn troubles() -> Vec<(&'static str, Status, Level, &'static str)> {
+pub(crate) fn troubles() -> Vec<(&'static str, Status, Level)> {
     let with = |change: &dyn Fn(&mut Status)| {
         let mut status = running("U");
         change(&mut status);
@@ -243,60 +243,24 @@ pub(crate) fn troubles() -> Vec<(&'static str, Status, Level, &'static str)> {
     let refused = PreLaunchVerdict::Refused(vec!["too short".to_owned()]);
     let outcome = PreLaunchOutcome { ended_ns: None, verdict: refused, overlay: None };
     vec![
-        ("fault", faulty("U"), Level::Fault, "bad frames checksum 12×, last 3 s ago: the checksum"),
-        ("sensor", with(&|s| s.sensors[1].flags = excluded), Level::Fault, "gyro y is excluded"),
-        (
-            "self-test",
-            with(&|s| s.self_test = Some(self_test(false))),
-            Level::Fault,
-            "self-test failed: gyro y",
-        ),
-        (
-            "above",
-            with(&|s| s.channels[2] = channel("gyro-z", 61.25, 0.1)),
-            Level::Warning,
-            "gyro-z 61.2 °C, calibrated to 55 °C",
-        ),
-        (
-            "below",
-            with(&|s| s.channels[0] = channel("gyro-x", -45.0, 0.1)),
-            Level::Warning,
-            "calibrated from -40 °C",
-        ),
-        ("stale", with(&|s| s.channels[3].stale = true), Level::Warning, "board is stale"),
-        (
-            "raw",
-            with(&|s| (s.output, s.calibration) = (Output::PassThrough, None)),
-            Level::Warning,
-            "raw readings pass through",
-        ),
-        (
-            "held",
-            with(&|s| (s.output, s.calibration) = (Output::Held, None)),
-            Level::Warning,
-            "nothing is published",
-        ),
-        ("silent", with(&|s| s.input_rates = InputRates::default()), Level::Warning, "no raw ticks"),
-        (
-            "refused",
-            with(&|s| s.pre_launch_outcome = Some(outcome.clone())),
-            Level::Warning,
-            "refused: too short",
-        ),
-        (
-            "pending",
-            with(&|s| s.pending = faulty("U").pending),
-            Level::Note,
-            "revision 5 waits: from tick 1730000 on",
-        ),
-        ("pre-launch", pre_launch("U"), Level::Note, "43 % done, 5 min left"),
-        ("warm-up", with(&|s| s.channels[1].warming_up = true), Level::Note, "gyro-y is warming up"),
-        ("standby", with(&|s| s.state = State::Standby), Level::Fine, ""),
+        ("fault", faulty("U"), Level::Fault),
+        ("sensor", with(&|s| s.sensors[1].flags = excluded), Level::Fault),
+        ("self-test", with(&|s| s.self_test = Some(self_test(false))), Level::Fault),
+        ("above", with(&|s| s.channels[2] = channel("gyro-z", 61.25, 0.1)), Level::Warning),
+        ("below", with(&|s| s.channels[0] = channel("gyro-x", -45.0, 0.1)), Level::Warning),
+        ("stale", with(&|s| s.channels[3].stale = true), Level::Warning),
+        ("raw", with(&|s| (s.output, s.calibration) = (Output::PassThrough, None)), Level::Warning),
+        ("held", with(&|s| (s.output, s.calibration) = (Output::Held, None)), Level::Warning),
+        ("silent", with(&|s| s.input_rates = InputRates::default()), Level::Warning),
+        ("refused", with(&|s| s.pre_launch_outcome = Some(outcome.clone())), Level::Warning),
+        ("pending", with(&|s| s.pending = faulty("U").pending), Level::Note),
+        ("pre-launch", pre_launch("U"), Level::Note),
+        ("warm-up", with(&|s| s.channels[1].warming_up = true), Level::Note),
+        ("standby", with(&|s| s.state = State::Standby), Level::Fine),
         (
             "old service",
             with(&|s| (s.instance, s.input_rates) = (String::new(), InputRates::default())),
             Level::Fine,
-            "",
         ),
     ]
 }

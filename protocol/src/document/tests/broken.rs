@@ -5,11 +5,11 @@ mod values;
 
 use isotherm_correction::reversal::{FitWindow, ReversalParts, Transition};
 
-use super::{FULL, Problem, accept, listed, refuse};
+use super::{FULL, accept, listed, refuse};
 
 /// A document that is broken in one place: name, text to replace (its first occurrence), replacement, text that stands
-/// on the line of the problem after the edit, key, part of the message.
-type Case = (&'static str, &'static str, &'static str, &'static str, &'static str, &'static str);
+/// on the line of the problem after the edit, key.
+type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);
 
 /// The mode reversal of the full document.
 const MODE_REVERSAL: &str = "[mode_reversal]
@@ -30,16 +30,19 @@ fn line_of(text: &str, part: &str) -> usize {
 
 #[test]
 fn each_error_is_told_with_its_line_key_and_limit() {
-    for (name, from, to, at, key, message) in values::CASES.into_iter().chain(relations::CASES) {
+    let mut told = String::new();
+    for (name, from, to, at, key) in values::CASES.into_iter().chain(relations::CASES) {
         assert!(FULL.contains(from), "{name}: {from:?} is not in the document");
         let text = &FULL.replacen(from, to, 1);
         let problems = refuse(text);
         let line = line_of(text, at);
-        let found = problems.iter().any(|p| p.key == key && p.line == line && p.message.contains(message));
-        assert!(found, "{name}: no problem at line {line}, {key:?}, {message:?} in\n{}", listed(&problems));
+        let found = problems.iter().any(|p| p.key == key && p.line == line);
+        assert!(found, "{name}: no problem at line {line}, {key:?} in\n{}", listed(&problems));
         // A key that is taken for another one is missing as well, and what needs it may say so.
         assert!(problems.len() <= 3, "{name}: one error, but\n{}", listed(&problems));
+        told += &[name, &listed(&problems), ""].join("\n");
     }
+    insta::assert_snapshot!(told);
 }
 
 #[test]
@@ -48,9 +51,7 @@ fn axes_in_one_plane_are_refused() {
     let end = FULL.find("[gyro.orientation.thermal]").unwrap();
     let rows = "[gyro.orientation]\nrows = [[1, 0, 0], [0, 1, 0], [0.6, 0.8, 0], [0.8, 0.6, 0]]\n\n";
     let problems = refuse(&format!("{}{rows}{}", &FULL[..start], &FULL[end..]));
-    let about_rows =
-        |p: &Problem| p.key == "gyro.orientation.rows" && p.message.contains("at most 100 is allowed");
-    assert!(problems.iter().all(about_rows), "{}", listed(&problems));
+    insta::assert_snapshot!(listed(&problems));
 }
 
 #[test]
@@ -64,11 +65,7 @@ fn axes_that_come_into_one_plane_within_their_range_are_refused() {
     let (before, fourth) = FULL[..start].split_at(FULL[..start].rfind("[[accel.sensor]]").unwrap());
     assert!(fourth.contains("name = \"s\""));
     let problems = refuse(&format!("{before}{three}"));
-    let [problem] = &problems[..] else { panic!("{}", listed(&problems)) };
-    assert_eq!(problem.key, "accel.orientation.thermal.slopes_arcsec_per_deg_c");
-    for part in ["condition number", "°C, within range_deg_c", "at most 100", "narrow range_deg_c"] {
-        assert!(problem.message.contains(part), "{part}: {}", problem.message);
-    }
+    insta::assert_snapshot!(listed(&problems));
 }
 
 #[test]
@@ -86,18 +83,14 @@ fn a_transition_is_stated_once_as_ticks_or_as_a_time() {
         ..default
     };
     assert_eq!(parts("fit_window = \"adaptive\""), adaptive);
-    for (keys, key, message) in [
-        ("transition_s = 0.015\ntransition_ticks = 3", "transition_ticks", "give one of the two"),
-        ("transition_s = 1.5", "transition_s", "1"),
-        ("transition_ticks = 33", "transition_ticks", "32"),
-        ("fit_window = \"wide\"", "fit_window", "one of \"fixed\", \"adaptive\""),
-        ("fit_window = \"adaptive\"\nfit_readings_after = 3", "fit_window", "at least 12 are needed"),
-    ] {
-        let problems = refuse(&with(keys));
-        let [problem] = &problems[..] else { panic!("{keys}:\n{}", listed(&problems)) };
-        assert_eq!(problem.key, format!("mode_reversal.{key}"));
-        assert!(problem.message.contains(message), "{keys}: {}", problem.message);
-    }
+    let wrong = [
+        "transition_s = 0.015\ntransition_ticks = 3",
+        "transition_s = 1.5",
+        "transition_ticks = 33",
+        "fit_window = \"wide\"",
+        "fit_window = \"adaptive\"\nfit_readings_after = 3",
+    ];
+    insta::assert_snapshot!(wrong.map(|keys| listed(&refuse(&with(keys)))).join("\n"));
     // What is written is what was read.
     for keys in ["", "transition_s = 0.015", "fit_window = \"adaptive\"\ntransition_ticks = 20"] {
         let document = accept(&with(keys)).document;

@@ -33,8 +33,11 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         let calibration = load_calibration(path)?;
         calibration.warnings.iter().for_each(|warning| show::warn(&warning.to_string()));
         if let Some(before) = loaded.insert(calibration.unit.clone(), (path, calibration)) {
-            let words =
-                format!("--calibration is given twice for unit {}: {}", before.1.unit, before.0.display());
+            let words = format!(
+                "--calibration is given twice for unit {}: leave out {}",
+                before.1.unit,
+                before.0.display()
+            );
             return Err(Error::Usage(words));
         }
     }

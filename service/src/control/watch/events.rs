@@ -164,10 +164,7 @@ mod tests {
         let words = |kind| reason(&notify::Error::new(kind));
         assert!(words(notify::ErrorKind::MaxFilesWatch).contains("fs.inotify.max_user_watches"));
         let io = |code| words(notify::ErrorKind::Io(std::io::Error::from_raw_os_error(code)));
-        let instances = io(EMFILE);
-        assert!(
-            instances.contains("Too many open files") && instances.contains("fs.inotify.max_user_instances")
-        );
+        assert!(io(EMFILE).contains("fs.inotify.max_user_instances"));
         assert!(!io(5).contains("fs.inotify"));
     }
 }

@@ -39,14 +39,12 @@ fn made(run: Run, base: &Document) -> Result<Made, Error> {
     make(&wanted(&runs, base), &mut ())
 }
 
+/// Why nothing can be made of a run.
 #[track_caller]
-fn refused(run: Run, base: &Document, words: &[&str]) {
+fn refused(run: Run, base: &Document) -> String {
     let error = made(run, base).map(|made| made.report().to_text()).unwrap_err();
     assert_eq!(error.exit(), Exit::Failed);
-    let text = error.to_string();
-    for word in words {
-        assert!(text.contains(word), "{word:?} is not in: {text}");
-    }
+    error.to_string() + "\n"
 }
 
 #[test]
@@ -60,39 +58,40 @@ fn logs_without_what_a_mode_reversed_gyro_needs_are_refused() {
             true
         })
     };
-    refused(with_mode(|_| None), &base, &["none of the 820 gyro ticks states a lasing mode", "mapping"]);
-    refused(with_mode(|_| Some(LasingMode::Minus)), &base, &["all 820 ticks are in one lasing mode (minus)"]);
+    let mut told = refused(with_mode(|_| None), &base);
+    told += &refused(with_mode(|_| Some(LasingMode::Minus)), &base);
     let unbalanced = |tick: &GyroTick| {
         let minus = (tick.end_time.as_ns() / 1_000_000_000) % 40 >= 30;
         Some(if minus { LasingMode::Minus } else { LasingMode::Plus })
     };
-    refused(with_mode(unbalanced), &base, &["unbalanced", "20 %"]);
+    told += &refused(with_mode(unbalanced), &base);
     let few = changed(&scenario, |tick| seconds(tick) < 70);
-    refused(few, &base, &["the mode switches 3 times, 8 times are needed"]);
+    told += &refused(few, &base);
     let dead = changed(&scenario, |tick| {
         tick.readings[1] = 0.0;
         true
     });
-    refused(dead, &base, &["gyro y has a constant reading, or no number, in all 820 ticks"]);
+    told += &refused(dead, &base);
     let nan = changed(&scenario, |tick| {
         if tick.sequence % 3 == 0 {
             tick.readings[2] = f64::NAN;
         }
         true
     });
-    refused(nan, &base, &["have an unusable gyro reading"]);
+    told += &refused(nan, &base);
     let gaps = changed(&scenario, |tick| tick.sequence % 10 != 3);
-    refused(gaps, &base, &["ticks are missing", "5 %"]);
+    told += &refused(gaps, &base);
     let nudged = changed(&scenario, |tick| {
         tick.readings[0] += if tick.sequence == 333 { 60.0 } else { 0.0 };
         true
     });
-    refused(nudged, &base, &["the unit moved 16", "gyro x turned by", "cut the log"]);
+    told += &refused(nudged, &base);
     let turning = changed(&scenario, |tick| {
         tick.readings.iter_mut().for_each(|reading| *reading += 500.0);
         true
     });
-    refused(turning, &base, &["at most 180 °/h of bias"]);
+    told += &refused(turning, &base);
+    insta::assert_snapshot!(told);
 }
 
 #[test]
@@ -104,25 +103,17 @@ fn readings_that_change_their_scale_or_die_are_refused() {
         tick.readings.iter_mut().for_each(|reading| *reading *= factor);
         true
     });
-    refused(
-        twice,
-        &base,
-        &["the mean rate steps and stays there", "gyro z from -1", "two units of measure", "Cut the log"],
-    );
+    let mut told = refused(twice, &base);
     let dies = changed(&scenario, |tick| {
         tick.readings[1] *= if late(tick) { 0.0 } else { 1.0 };
         true
     });
-    refused(dies, &base, &["gyro y gives the same reading, 0, from 20", "cut the log"]);
+    told += &refused(dies, &base);
     let degrees = changed(&scenario, |tick| {
         tick.readings.iter_mut().for_each(|reading| *reading = (*reading * 57.3).round());
         true
     });
-    refused(
-        degrees,
-        &base,
-        &["by the document's weights the gyros show", "180 °/h of bias", "1 rad is 57.3°"],
-    );
+    told += &refused(degrees, &base);
     let halves = |change: fn(i32) -> i32| {
         changed(&scenario, move |tick| {
             for counts in tick.half_periods.iter_mut().take(1) {
@@ -131,13 +122,10 @@ fn readings_that_change_their_scale_or_die_are_refused() {
             true
         })
     };
-    refused(halves(|_| 0), &base, &["gyro x: all half-period counts are zero"]);
-    refused(
-        halves(|counts| 1000 * counts),
-        &base,
-        &["gyro x: the dither's frequency comes out as 6", "1000000 Hz"],
-    );
-    refused(halves(|counts| -counts), &base, &["gyro x: the dither's frequency comes out as -6", "swapped"]);
+    told += &refused(halves(|_| 0), &base);
+    told += &refused(halves(|counts| 1000 * counts), &base);
+    told += &refused(halves(|counts| -counts), &base);
+    insta::assert_snapshot!(told);
 }
 
 #[test]
@@ -149,7 +137,8 @@ fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
         tick.mode = if held.len() > 10 { held.pop_front().flatten() } else { tick.mode };
         true
     });
-    refused(late, &base(), &["the mode changes 5.00 s (10 ticks) behind the switch command"]);
+    let told = refused(late, &base());
+    insta::assert_snapshot!(told);
     let made = fitted(&scenario, &base());
     let turned = changed(&scenario, |tick| {
         tick.mode =
@@ -157,9 +146,11 @@ fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
         true
     });
     let again = make(&wanted(&[turned], &made.written.document), &mut ()).unwrap();
-    let told = again.warnings.iter().find(|words| words.contains("with the other sign")).unwrap();
-    assert!(told.starts_with("gyros x, y, z: "), "{told}");
-    assert!(!made.warnings.iter().any(|words| words.contains("with the other sign")));
+    insta::assert_snapshot!(format!(
+        "as it is\n{}\nturned\n{}",
+        made.warnings.join("\n"),
+        again.warnings.join("\n")
+    ));
 }
 
 #[test]
@@ -175,16 +166,11 @@ fn thermometers_are_told_with_what_they_read() {
         });
         Run::of_events("changed".into(), unit_id("ZLG-0001").unwrap(), events.collect())
     };
-    refused(
-        with(|raw, _| 100.0 * raw - 150.0 + 273.15),
-        &base,
-        &["gyro0 reads 3", "Its range_deg_c is -70…130 °C"],
-    );
-    refused(with(|_, _| f64::NAN), &base, &["gyro0 has no numbers"]);
+    let mut told = refused(with(|raw, _| 100.0 * raw - 150.0 + 273.15), &base);
+    told += &refused(with(|_, _| f64::NAN), &base);
+    insta::assert_snapshot!(told);
     let made = made(with(|raw, time_s| if time_s < 205 { raw } else { 1.75 }), &base).unwrap();
-    let frozen =
-        made.warnings.iter().find(|words| words.starts_with("temperature channels gyro0, gyro1")).unwrap();
-    assert!(frozen.contains("each reads exactly 1.75 from 205"), "{frozen}");
+    insta::assert_snapshot!(made.warnings.join("\n"));
 }
 
 #[test]
@@ -195,11 +181,12 @@ fn documents_that_do_not_fit_the_log_are_refused() {
     for sensor in &mut mean.gyro.sensor {
         sensor.increment_weight_rad_per_rad = sensor.increment_weight_arcsec_per_count.take();
     }
-    refused(changed(&scenario, |_| true), &mean, &["readings are counts", "gyro.output is mean rates"]);
+    let mut told = refused(changed(&scenario, |_| true), &mean);
     let mut other = base();
     other.temperature.channel[0].name = "elsewhere".into();
     other.gyro.sensor[0].channel = Some("elsewhere".into());
-    refused(changed(&scenario, |_| true), &other, &["does the document name the log's channels"]);
+    told += &refused(changed(&scenario, |_| true), &other);
+    insta::assert_snapshot!(told);
     // A document of counts without their weights is refused by its own reader.
     let mut weightless = base();
     weightless.gyro.sensor[0].increment_weight_arcsec_per_count = None;
@@ -210,8 +197,7 @@ fn documents_that_do_not_fit_the_log_are_refused() {
 #[test]
 fn a_constant_temperature_leaves_the_constants() {
     let made = fitted(&short(), &base());
-    let text = made.report().to_json().to_string();
-    assert!(text.contains("temperature spans 0.0 °C only: only the constants are fitted"), "{text}");
+    insta::assert_snapshot!(made.report().notes.join("\n"));
     for fit in made.gyros.iter().flatten() {
         assert_eq!(
             (fit.model.static_order, fit.model.magnetic_order, fit.model.meander_order),
@@ -228,8 +214,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     let base = base();
     let runs = [changed(&scenario, |_| true)];
     let made = make(&Wanted { place: None, ..wanted(&runs, &base) }, &mut ()).unwrap();
-    assert!(made.warnings.iter().any(|words| words.contains("the static bias keeps its constant")));
-    assert!(made.warnings.iter().any(|words| words.contains("the phase of the slow meander")));
+    insta::assert_snapshot!(made.warnings.join("\n"));
     for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let fit = fit.as_ref().unwrap();
         assert!(!sensor.terms.has(Feature::Meander));
@@ -238,8 +223,8 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
         let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
         assert!(got.abs() > 100.0 * sigma);
     }
-    let report = made.report().to_json().to_string();
-    assert!(report.contains("gyro x static bias, power 0, with the Earth's rate: not written"), "{report}");
+    let report = made.report().to_json();
+    assert!(report["coefficients"].to_string().contains("not written"), "{report}");
     let sigmas = crate::fits::modes::document::sigmas(&made);
     assert!(
         sigmas.get("gyro", "x", "static_bias").unwrap()[0] <= 0.0,
@@ -248,7 +233,5 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     // Orders that the run cannot tell are not invented.
     let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
     let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
-    assert!(
-        made.report().warnings.iter().any(|words| words.contains("cannot be separated from the static bias"))
-    );
+    insta::assert_snapshot!(made.report().warnings.join("\n"));
 }

@@ -204,20 +204,17 @@ mod tests {
     #[test]
     fn what_was_not_found_is_said_in_plain_words() {
         let patience = NoSolution::NoMinimum("LostPatience".to_owned());
-        let words = no_accelerometers(&patience);
-        assert!(!words.contains("Lost") && words.contains("edges and corners"), "{words}");
-        let words = no_gyros(&patience);
-        assert!(
-            !words.contains("Lost") && words.contains("the order and the signs of the columns"),
-            "{words}"
-        );
-        assert!(no_gyros(&NoSolution::NotDetermined(8)).contains("gyro z"));
         // What no document may state is refused before it is written, without the numbers of a matrix.
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let of =
             |rows| GyroFit { weight: [1.0; 3], rest: [0.0; 3], rows, sigma: [0.0; 9], angle: vec![0.01; 8] };
         assert_eq!(lost(&of(straight)), None);
-        let words = lost(&of([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, 0.6, 1e-5]])).unwrap();
-        assert!(words.contains("in one plane") && !words.contains("condition number"), "{words}");
+        let told = [
+            no_accelerometers(&patience),
+            no_gyros(&patience),
+            no_gyros(&NoSolution::NotDetermined(8)),
+            lost(&of([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, 0.6, 1e-5]])).unwrap(),
+        ];
+        insta::assert_snapshot!(told.join("\n"));
     }
 }

@@ -9,7 +9,6 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"block\"",
         "# digital sensor",
         "temperature.channel[1].name",
-        "is also the name of temperature.channel[0]",
     ),
     (
         "name too long",
@@ -17,23 +16,14 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"coil-coil-coil-coil-coil-\"",
         "coil-",
         "temperature.channel[1].name",
-        "a name of 1 to 24 bytes",
     ),
-    (
-        "no such channel",
-        "channel = \"coil\"",
-        "channel = \"coal\"",
-        "\"coal\"",
-        "gyro.sensor[3].channel",
-        "the channels are: block, coil, accel, board",
-    ),
+    ("no such channel", "channel = \"coil\"", "channel = \"coal\"", "\"coal\"", "gyro.sensor[3].channel"),
     (
         "no such channel of the orientation",
         "channels = [\"block\"]",
         "channels = [\"rock\"]",
         "rock",
         "gyro.orientation.thermal.channels[0]",
-        "is \"rock\", not a temperature channel",
     ),
     (
         "two sensors of one name",
@@ -41,7 +31,6 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"x\"",
         "name = \"x\"\nchannel = \"block\"\nincrement_weight_arcsec_per_count = 0.9841",
         "gyro.sensor[1].name",
-        "also the name of gyro.sensor[0]",
     ),
     (
         "filter left out",
@@ -49,7 +38,6 @@ pub(super) const CASES: [Case; 32] = [
         "[temperature.smoother]",
         "[temperature]\n",
         "temperature.filter",
-        "is missing: temperature.channel[0] needs it",
     ),
     (
         "dead band left out",
@@ -57,7 +45,6 @@ pub(super) const CASES: [Case; 32] = [
         "",
         "[temperature.filter]",
         "temperature.filter.branch_dead_band_deg_c2_per_s3",
-        "gyro.sensor[3] need it",
     ),
     (
         "weight of the other output",
@@ -65,7 +52,6 @@ pub(super) const CASES: [Case; 32] = [
         "increment_weight_rad_per_rad = 1.0",
         "rad_per_rad = 1.0\ninput_limit_counts_per_tick",
         "gyro.sensor[1].increment_weight_rad_per_rad",
-        "but the output is \"counts\": give `increment_weight_arcsec_per_count`",
     ),
     (
         "weight of zero",
@@ -73,23 +59,14 @@ pub(super) const CASES: [Case; 32] = [
         "0",
         "arcsec_per_count = 0\n",
         "gyro.sensor[1].increment_weight_arcsec_per_count",
-        "is 0, must be a number other than 0",
     ),
-    (
-        "unknown output",
-        "output = \"counts\"",
-        "output = \"count\"",
-        "output = \"count\"",
-        "gyro.output",
-        "is \"count\" (a string), must be one of \"counts\", \"mean\"",
-    ),
+    ("unknown output", "output = \"counts\"", "output = \"count\"", "output = \"count\"", "gyro.output"),
     (
         "unknown kind",
         "static_bias = { kind = \"spline\"",
         "static_bias = { kind = \"cubic\"",
         "cubic",
         "gyro.sensor[2].static_bias.kind",
-        "must be one of \"constant\", \"polynomial\"",
     ),
     (
         "kind left out",
@@ -97,7 +74,6 @@ pub(super) const CASES: [Case; 32] = [
         "static_bias = { ",
         "static_bias = { knots",
         "gyro.sensor[2].static_bias.kind",
-        "is missing",
     ),
     (
         "unit of a curve",
@@ -105,7 +81,6 @@ pub(super) const CASES: [Case; 32] = [
         "knots_deg_per_s = [[-40.0, 0.31]",
         "knots_deg_per_s",
         "gyro.sensor[2].static_bias.knots_deg_per_s",
-        "did you mean `knots_deg_per_h`?",
     ),
     (
         "knots out of order",
@@ -113,7 +88,6 @@ pub(super) const CASES: [Case; 32] = [
         "[0.0, 0.12], [-25.0",
         "[-25.0",
         "gyro.sensor[2].static_bias.knots_deg_per_h[2]",
-        "knot 2 is at -25, not above the one before it at 0",
     ),
     (
         "knot of three",
@@ -121,7 +95,6 @@ pub(super) const CASES: [Case; 32] = [
         "[-10.0, -0.62, 1.0],",
         "-0.62, 1.0",
         "gyro.sensor[1].static_bias.knots_deg_per_h[1]",
-        "has 3 entries, must have 2",
     ),
     (
         "too many coefficients",
@@ -129,7 +102,6 @@ pub(super) const CASES: [Case; 32] = [
         "[1,2,3,4,5,6,7,8,9,10,11]",
         "10,11]",
         "gyro.sensor[2].magnetic_bias.coefficients_deg_per_h",
-        "has 11 entries, must have 1 to 10",
     ),
     (
         "curves of two arguments",
@@ -137,7 +109,6 @@ pub(super) const CASES: [Case; 32] = [
         "braking = { kind = \"polynomial\", reference_deg_c = 0.0, coefficients_deg_per_h_per_deg_c_per_s = [104.0, 620.0], range_deg_c =",
         "[104.0, 620.0]",
         "gyro.sensor[3].thermal_rate.braking",
-        "is over °C, but run_up is over °C/s",
     ),
     (
         "lag below the grid step",
@@ -145,7 +116,6 @@ pub(super) const CASES: [Case; 32] = [
         "time_constant_s = 0.5",
         "time_constant_s = 0.5",
         "gyro.sensor[3].lag[0].time_constant_s",
-        "is 0.5 s, must be at least temperature.filter.grid_step_s, 1 s",
     ),
     (
         "regressor of no channel",
@@ -153,7 +123,6 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"mains\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "mains",
         "gyro.sensor[3].regressor[0].channel",
-        "is \"mains\", not a channel; the channels are: block, coil, accel, board",
     ),
     (
         "difference to no channel",
@@ -161,7 +130,6 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"coil\", minus = \"air\", gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "\"air\"",
         "gyro.sensor[3].regressor[0].minus",
-        "not a channel",
     ),
     (
         "reference that is no number",
@@ -169,7 +137,6 @@ pub(super) const CASES: [Case; 32] = [
         "regressor = [{ channel = \"coil\", reference = nan, gain = { kind = \"constant\", value_deg_per_h_per_unit = 1.0 } }]",
         "reference = nan",
         "gyro.sensor[3].regressor[0].reference",
-        "nan",
     ),
     (
         "hysteresis without slack",
@@ -177,7 +144,6 @@ pub(super) const CASES: [Case; 32] = [
         "hysteresis = [{ half_width_deg_c = 0.0, gain = { kind = \"constant\", value_deg_per_h_per_deg_c = 1.0 } }]",
         "half_width_deg_c = 0.0",
         "gyro.sensor[3].hysteresis[0].half_width_deg_c",
-        "must be a number",
     ),
     (
         "array for a table",
@@ -185,23 +151,14 @@ pub(super) const CASES: [Case; 32] = [
         "[[gyro.sensor.servo]]\nform = \"modelled\"",
         "[[gyro.sensor.servo]]",
         "gyro.sensor[1].servo",
-        "is an array, must be a table",
     ),
-    (
-        "servo without mode reversal",
-        MODE_REVERSAL,
-        "",
-        "#:schema",
-        "mode_reversal",
-        "is missing: the gyros' servo term needs it",
-    ),
+    ("servo without mode reversal", MODE_REVERSAL, "", "#:schema", "mode_reversal"),
     (
         "row that is no unit vector",
         "[0.0005, -0.0004, 0.9999998]",
         "[0.0005, -0.0004, 0.99]",
         "0.99]",
         "gyro.orientation.rows[2]",
-        "has norm 0.990000, must be 1 within 0.001",
     ),
     (
         "a weight too few",
@@ -209,7 +166,6 @@ pub(super) const CASES: [Case; 32] = [
         "weights = [1.0, 1.0, 1.0]",
         "weights = [1.0, 1.0, 1.0]\n",
         "gyro.orientation.weights",
-        "has 3 entries, must have 4: one for each sensor",
     ),
     (
         "accelerometer in the wrong unit",
@@ -217,23 +173,14 @@ pub(super) const CASES: [Case; 32] = [
         "scale_factor = { kind = \"constant\", value_v_per_m_per_s2 = 0.1 }",
         "value_v_per",
         "accel.sensor[2].scale_factor.value_v_per_m_per_s2",
-        "is in V/(m/s²), but the output needs (counts/s)/(m/s²)",
     ),
-    (
-        "scale factor of zero",
-        "[70.0, 1018.9]",
-        "[70.0, -1018.9]",
-        "-1018.9",
-        "accel.sensor[1].scale_factor",
-        "must not be zero anywhere in its range",
-    ),
+    ("scale factor of zero", "[70.0, 1018.9]", "[70.0, -1018.9]", "-1018.9", "accel.sensor[1].scale_factor"),
     (
         "two voltages of one name",
         "name = \"half-wave y\"",
         "name = \"half-wave x\"",
         "name = \"half-wave x\"\nrange_v = [41.0, 55.0]\n\n[[self_test.counter]]",
         "self_test.voltage[1].name",
-        "also the name of self_test.voltage[0]",
     ),
     (
         "counter with the name of a voltage",
@@ -241,7 +188,6 @@ pub(super) const CASES: [Case; 32] = [
         "name = \"half-wave y\"",
         "name = \"half-wave y\"\nmax",
         "self_test.counter[0].name",
-        "also the name of self_test.voltage[1]",
     ),
     (
         "table for an array of tables",
@@ -249,7 +195,6 @@ pub(super) const CASES: [Case; 32] = [
         "[self_test.counter]",
         "[self_test.counter]",
         "self_test.counter",
-        "must be an array of tables",
     ),
     (
         "degree without readings",
@@ -257,6 +202,5 @@ pub(super) const CASES: [Case; 32] = [
         "predict_readings = 1",
         "predict_degree",
         "mode_reversal.predict_degree",
-        "with 1 readings",
     ),
 ];

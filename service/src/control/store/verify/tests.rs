@@ -111,46 +111,25 @@ fn a_file_of_before_is_read_and_its_end_is_where_the_chain_begins() {
 #[test]
 fn every_break_is_told_with_file_line_entry_unit_and_what_to_do() {
     let whole = lines(&written(6));
-    let with = |change: &dyn Fn(&mut Vec<String>)| {
+    let mut told = String::new();
+    let mut with = |change: &dyn Fn(&mut Vec<String>)| {
         let folder = written(6);
         let mut changed = whole.clone();
         change(&mut changed);
         write(&folder, &changed);
         let found = verified(&folder);
         assert!(!found.holds);
-        let file = folder.path().join(NAME);
-        for broken in &found.breaks {
-            assert_eq!(broken.file, file);
-            assert!(
-                broken.to_string().starts_with(&format!("{}:{}: entry ", file.display(), broken.line)),
-                "{broken}"
-            );
-            assert!(
-                broken.to_string().contains(" of unit ZLG-1: ") && broken.words.contains("backup"),
-                "{broken}"
-            );
-        }
-        found
-            .breaks
-            .into_iter()
-            .map(|broken| (broken.line, broken.number.unwrap(), broken.words))
-            .collect::<Vec<_>>()
+        let breaks: String = found.breaks.iter().map(|broken| broken.to_string() + "\n").collect();
+        told += &breaks.replace(folder.path().to_str().unwrap(), "FOLDER");
+        let places = found.breaks.into_iter().map(|broken| (broken.line, broken.number.unwrap()));
+        places.collect::<Vec<_>>()
     };
-    let places = |breaks: &[(u64, u64, String)]| {
-        breaks.iter().map(|(line, number, _)| (*line, *number)).collect::<Vec<_>>()
-    };
-    let changed = with(&|lines| lines[2] = lines[2].replace("\"ann\"", "\"eve\""));
-    assert!(places(&changed) == [(3, 3)] && changed[0].2.contains("checksum"), "{changed:?}");
-    let removed = with(&|lines| drop(lines.remove(2)));
-    let missing = Fault::Missing { first: 3, last: 3 }.to_string();
-    assert!(places(&removed) == [(3, 4)] && removed[0].2 == missing, "{removed:?}");
-    let exchanged = with(&|lines| lines.swap(2, 3));
-    let behind = Fault::Behind { last: 4 }.to_string();
-    assert!(places(&exchanged) == [(3, 4), (4, 3)] && exchanged[1].2 == behind, "{exchanged:?}");
-    let inserted = with(&|lines| lines.insert(3, bare(&lines[3])));
-    assert_eq!(places(&inserted), [(4, 4)], "{inserted:?}");
-    let cut = with(&|lines| lines.truncate(4));
-    assert!(places(&cut) == [(4, 4)] && cut[0].2.contains("5 to 6"), "{cut:?}");
+    assert_eq!(with(&|lines| lines[2] = lines[2].replace("\"ann\"", "\"eve\"")), [(3, 3)]);
+    assert_eq!(with(&|lines| drop(lines.remove(2))), [(3, 4)]);
+    assert_eq!(with(&|lines| lines.swap(2, 3)), [(3, 4), (4, 3)]);
+    assert_eq!(with(&|lines| lines.insert(3, bare(&lines[3]))), [(4, 4)]);
+    assert_eq!(with(&|lines| lines.truncate(4)), [(4, 4)]);
+    insta::assert_snapshot!(told);
 }
 
 #[test]
