@@ -59,6 +59,14 @@ pub enum Error {
         /// Those that it has.
         there: String,
     },
+    /// A file that is no corrected log of any form.
+    #[error(
+        "{path} has no corrected ticks: give a recording (MCAP) that has some, or a CSV or wire file of `isotherm-replay correct`"
+    )]
+    NoCorrectedTicks {
+        /// The file.
+        path: String,
+    },
     /// What was given does not go together.
     #[error("{0}")]
     Usage(String),

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use isotherm_correction::sample::TickFlags;
-use isotherm_correction::units::{AngularRate, SpecificForce};
+use isotherm_correction::units::{AngularRate, SpecificForce, Timestamp};
 use serde::Serialize;
 
 use super::align::{Aligner, Row};
@@ -103,12 +103,16 @@ pub struct Account {
     pub ticks: u64,
     /// Of these, how many differ by more than is allowed.
     pub different: u64,
+    /// Of these, how many differ by no more than is allowed.
+    pub within_tolerance: u64,
     /// Ticks of both that were made by different documents, whether they differ or not; where both logs say by which.
     pub other_document: u64,
     /// Ticks of the first log alone.
     pub only_a: Only,
     /// Ticks of the second log alone.
     pub only_b: Only,
+    /// Of [`Only::behind`] in the second log, those of which a recording that was cut short has no raw ticks any more.
+    pub unfinished: u64,
     /// The first that differs or is missing.
     pub first: Option<FirstDifference>,
     /// Largest difference of the angle increments, by axis, whatever is allowed.
@@ -118,7 +122,7 @@ pub struct Account {
 }
 
 impl Account {
-    /// Whether both logs have the same ticks.
+    /// Whether both logs have the same ticks, as far as the tolerance tells.
     #[must_use]
     pub fn is_identical(&self) -> bool {
         self.different + self.only_a.all() + self.only_b.all() == 0
@@ -128,10 +132,15 @@ impl Account {
     /// what the recorder did not hear the readings of, and end earlier, as the recorder did not wait for the last ticks.
     #[must_use]
     pub fn agrees(&self) -> bool {
-        let missing_a = self.only_b.between + self.only_b.behind;
-        let missing_b = self.only_a.before + self.only_a.between;
         let nothing_common = self.ticks == 0 && self.only_a.all() > 0 && self.only_b.all() > 0;
-        self.different + missing_a + missing_b == 0 && !nothing_common
+        self.different + self.missing() == 0 && !nothing_common
+    }
+
+    /// Ticks that only one of such logs has and the other should have.
+    #[must_use]
+    pub fn missing(&self) -> u64 {
+        let in_a = self.only_b.between + self.only_b.behind.saturating_sub(self.unfinished);
+        in_a + self.only_a.before + self.only_a.between
     }
 }
 
@@ -145,7 +154,9 @@ pub struct Comparison {
     account: Account,
     /// Ticks of one log alone since the last that both have.
     since: (u64, u64),
-    /// The first of these, with the ticks around it, where nothing differed before.
+    /// The end of the first of these that the second log has.
+    alone_in_b: Option<Timestamp>,
+    /// The first tick of one log alone, with the ticks around it, where nothing differed before.
     suspect: Option<FirstDifference>,
     recent: VecDeque<Row>,
     /// Rows that are still to be kept behind the first difference.
@@ -172,6 +183,7 @@ impl Comparison {
             aligner: Aligner::default(),
             account: Account::default(),
             since: (0, 0),
+            alone_in_b: None,
             suspect: None,
             recent: VecDeque::new(),
             behind: 0,
@@ -203,13 +215,25 @@ impl Comparison {
 
     /// Nothing more comes.
     #[must_use]
-    pub fn finish(mut self) -> Account {
+    pub fn finish(self) -> Account {
+        self.finish_with(|_| true)
+    }
+
+    /// Nothing more comes. Of the ticks behind the last that both have, the second log's are unfinished where `recorded` says of the end
+    /// of their first that the first log could not have it.
+    #[must_use]
+    pub(crate) fn finish_with(mut self, recorded: impl Fn(Timestamp) -> bool) -> Account {
         self.aligner.finish();
         self.advance();
         self.account.only_a.behind += self.since.0;
         self.account.only_b.behind += self.since.1;
+        if self.account.ticks > 0 && self.alone_in_b.is_some_and(|end_time| !recorded(end_time)) {
+            self.account.unfinished = self.since.1;
+        }
         if self.account.first.is_none() {
-            self.account.first = self.suspect.filter(|suspect| self.whole || suspect.only_in == Some("b"));
+            let finished = self.account.unfinished == 0;
+            self.account.first =
+                self.suspect.filter(|suspect| self.whole || (finished && suspect.only_in == Some("b")));
         }
         self.account
     }
@@ -238,6 +262,9 @@ impl Comparison {
                 let in_a = row.a.is_some();
                 let count = if in_a { &mut self.since.0 } else { &mut self.since.1 };
                 *count += 1;
+                if let Some(tick) = &row.b {
+                    self.alone_in_b.get_or_insert(tick.tick.end_time);
+                }
                 if let Some(tick) =
                     only.as_ref().filter(|_| self.account.first.is_none() && self.suspect.is_none())
                 {
@@ -260,6 +287,7 @@ impl Comparison {
     /// A tick that both have: those of one alone before it were before the first such, or between two.
     fn settle_only(&mut self) {
         let (a, b) = std::mem::take(&mut self.since);
+        self.alone_in_b = None;
         let first = self.account.ticks == 0;
         for (only, count) in [(&mut self.account.only_a, a), (&mut self.account.only_b, b)] {
             *(if first { &mut only.before } else { &mut only.between }) += count;
@@ -288,6 +316,7 @@ impl Comparison {
         velocities.for_each(|(largest, pair)| largest.note(pair, sequence, &milli_g));
         let fields = differences(a, b, &self.options.tolerance);
         if fields.is_empty() {
+            self.account.within_tolerance += 1;
             return false;
         }
         self.account.different += 1;

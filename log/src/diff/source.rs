@@ -53,7 +53,7 @@ impl std::fmt::Debug for CorrectedLog {
 enum Source {
     Recording(Box<Recording>),
     Csv { lines: BufReader<Bytes>, unit: UnitId, line: u64 },
-    Wire { bytes: BufReader<Bytes>, units: BTreeSet<UnitId>, frame: Vec<u8> },
+    Wire { bytes: BufReader<Bytes>, units: BTreeSet<UnitId>, frame: Vec<u8>, begun: bool },
 }
 
 #[derive(Debug)]
@@ -100,7 +100,7 @@ impl CorrectedLog {
         let source = if csv {
             Source::Csv { lines: bytes, unit: units.first().unwrap_or(unnamed).clone(), line: 0 }
         } else {
-            Source::Wire { bytes, units: units.clone(), frame: Vec::new() }
+            Source::Wire { bytes, units: units.clone(), frame: Vec::new(), begun: false }
         };
         Ok(Self { path: path.to_owned(), source, progress })
     }
@@ -108,7 +108,7 @@ impl CorrectedLog {
     /// The next ticks; `None` behind the last.
     ///
     /// # Errors
-    /// [`Error::File`], also where the file is no corrected log.
+    /// [`Error::File`], [`Error::NoCorrectedTicks`].
     pub fn next_ticks(&mut self) -> Result<Option<Ticks>, Error> {
         let path = &self.path;
         let failed = |source| Error::file(path, "read the corrected log", source);
@@ -118,8 +118,16 @@ impl CorrectedLog {
                 let ticks = read_rows(lines, line).map_err(failed)?;
                 Ok((!ticks.is_empty()).then(|| Ticks { unit: unit.clone(), ticks }))
             }
-            Source::Wire { bytes, units, frame } => loop {
-                let Some(batch) = read_frame(bytes, frame).map_err(failed)? else { return Ok(None) };
+            Source::Wire { bytes, units, frame, begun } => loop {
+                let read = read_frame(bytes, frame).map_err(|source| match source.kind() {
+                    // What does not begin as one is a file of another kind: a CSV of other columns, say.
+                    io::ErrorKind::Other | io::ErrorKind::UnexpectedEof if !*begun => {
+                        Error::NoCorrectedTicks { path: path.display().to_string() }
+                    }
+                    _ => failed(source),
+                });
+                let Some(batch) = read? else { return Ok(None) };
+                *begun = true;
                 let ticks = ticks_of(batch)?;
                 if units.is_empty() || units.contains(&ticks.unit) {
                     return Ok(Some(ticks));
@@ -206,8 +214,7 @@ fn read_rows(lines: &mut impl BufRead, line: &mut u64) -> io::Result<Vec<LogTick
 
 /// The next frame behind its length.
 fn read_frame(bytes: &mut impl BufRead, frame: &mut Vec<u8>) -> io::Result<Option<CorrectedBatch>> {
-    let other =
-        |words: String| io::Error::other(format!("{words}: it is no corrected log (MCAP, CSV or wire)"));
+    let other = |words: String| io::Error::other(format!("{words}: the file is damaged there"));
     if bytes.fill_buf()?.is_empty() {
         return Ok(None);
     }

@@ -88,6 +88,9 @@ fn what_is_allowed_is_no_difference_and_is_told_all_the_same() {
     let account = with(Tolerance { angle_rad: 5e-10, ..none });
     assert_eq!(account.different, 2);
     assert!(account.angle[0].increment > 9e-10);
+    let account = with(Tolerance { angle_rad: 2e-9, velocity_m_per_s: 2e-9, ..none });
+    assert_eq!((account.within_tolerance, account.is_identical()), (2, true));
+    assert_eq!(compared(&a, &a, DiffOptions::default()).within_tolerance, 0);
 }
 
 #[test]
@@ -118,6 +121,7 @@ fn what_is_no_corrected_log_is_refused_with_its_place() {
     let refused = [
         ("x.csv", text.replacen("-0.3333333333333333", "x", 1)),
         ("y.bin", "sequence of something else".to_owned()),
+        ("z.csv", text.split_once('\n').unwrap().1.to_owned()),
     ]
     .map(|(name, bytes)| {
         let path = folder.path().join(name);

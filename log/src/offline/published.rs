@@ -2,8 +2,11 @@
 
 use std::collections::VecDeque;
 
+use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
+use isotherm_protocol::key::RawStream;
+use isotherm_protocol::raw::{AccelBatch, GyroBatch};
 
 use crate::diff::{Comparison, Side, ticks_of};
 
@@ -53,6 +56,38 @@ impl Published {
                 break;
             }
         }
+    }
+}
+
+/// The last raw frames of gyros and accelerometers in a recording: what was published behind them cannot be made again.
+#[derive(Debug, Default)]
+pub(super) struct RawEnd {
+    gyro: Vec<u8>,
+    accel: Vec<u8>,
+}
+
+impl RawEnd {
+    pub(super) fn note(&mut self, stream: RawStream, frame: &[u8]) {
+        let last = match stream {
+            RawStream::Gyro => &mut self.gyro,
+            RawStream::Accel => &mut self.accel,
+            RawStream::Temperature | RawStream::Health => return,
+        };
+        last.clear();
+        last.extend_from_slice(frame);
+    }
+
+    /// Whether the recording has what a tick is made of, that ends then; `made` is the end of the last tick that was made.
+    pub(super) fn reaches(&self, end_time: Timestamp, made: Option<Timestamp>) -> bool {
+        let gyro =
+            codec::decode::<GyroBatch>(&self.gyro).ok().and_then(|batch| Some(batch.ticks.last()?.end_time));
+        let accel = codec::decode::<AccelBatch>(&self.accel)
+            .ok()
+            .and_then(|batch| Some(batch.ticks.last()?.end_time));
+        // A unit that starts anew sets its clock back: what was made of all of them leaves nothing to make.
+        gyro != made
+            && gyro.is_some_and(|gyro| gyro >= end_time)
+            && accel.is_none_or(|accel| accel >= end_time)
     }
 }
 

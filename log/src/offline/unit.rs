@@ -1,6 +1,7 @@
 //! One unit of a recording on its way through a replica: corrected ticks out, in the form that is asked for.
 
 use isotherm_correction::unit::UnitSettings;
+use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
@@ -8,7 +9,7 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 use serde::Serialize;
 
-use super::published::Published;
+use super::published::{Published, RawEnd};
 use super::rows::{write_frame, write_tick};
 use super::sums::{Summary, Sums};
 use crate::diff::{Account, Comparison, DiffOptions, LogTick, Side};
@@ -122,6 +123,7 @@ pub(super) struct UnitWork {
     replica: Replica,
     by_journal: bool,
     published: Published,
+    raw_end: RawEnd,
     taker: Taker,
 }
 
@@ -135,6 +137,8 @@ struct Taker {
     received_ns: u64,
     sums: Sums,
     comparison: Option<Comparison>,
+    /// End of the last tick.
+    made: Option<Timestamp>,
     /// What the journal said since the last tick.
     event: Option<Box<str>>,
     output: Output,
@@ -158,17 +162,21 @@ impl UnitWork {
             received_ns: 0,
             sums: Sums::default(),
             comparison: compare.then(|| Comparison::new(diff, false)),
+            made: None,
             event: None,
             output: Output::default(),
             frame: Vec::new(),
         };
-        Self { replica, by_journal, published: Published::default(), taker }
+        Self { replica, by_journal, published: Published::default(), raw_end: RawEnd::default(), taker }
     }
 
     /// Takes a message of the unit.
     pub(super) fn take(&mut self, message: Message) {
         if let (Topic::Corrected(_), Some(_)) = (&message.topic, &self.taker.comparison) {
             self.published.push(message.frame.clone());
+        }
+        if let (Topic::Raw(_, stream), Some(_)) = (&message.topic, &self.taker.comparison) {
+            self.raw_end.note(*stream, &message.frame);
         }
         self.replica.take(message);
         self.go_on();
@@ -220,7 +228,9 @@ impl UnitWork {
             summary: self.taker.sums.summary(),
             counters: counters.map(|counter| (counter.name, counter.value)).collect(),
             replica: self.replica.report().clone(),
-            published: self.taker.comparison.map(Comparison::finish),
+            published: self.taker.comparison.map(|comparison| {
+                comparison.finish_with(|end_time| self.raw_end.reaches(end_time, self.taker.made))
+            }),
         }
     }
 }
@@ -232,6 +242,7 @@ impl Taker {
             return;
         }
         if let Some(comparison) = &mut self.comparison {
+            self.made = stream.ready().ticks().last().map(|tick| tick.end_time);
             for tick in stream.ready().ticks() {
                 let event = self.event.take();
                 comparison.push(Side::A, LogTick { tick: tick.clone(), digest: None, event });

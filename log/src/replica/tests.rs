@@ -1,6 +1,8 @@
 //! What a replica makes of recordings: whole, from the middle, with losses on either side.
 
+mod cut;
 mod session;
+mod silent;
 
 use isotherm_protocol::key::RawStream;
 

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use isotherm_correction::unit::UnitSettings;
 
+use super::sequencer::LATE_NS;
 use super::{Deed, Mark, Outline, Sequencer};
 use crate::journal::{JournalEntry, JournalEvent};
 use crate::key::{Input, RawStream, UnitId};
@@ -18,8 +19,6 @@ use crate::stream::{Heard, UnitStream};
 const APART_NS: u64 = 1_000_000_000;
 /// The input by which it is known which frames came before a memory.
 const GYRO: Input = Input::Raw(RawStream::Gyro);
-/// How much later than a memory the last frame may come that the memory has heard (ns).
-const LONGEST_LAG_NS: u64 = 300_000_000;
 /// How long an entry may wait for frames that the other service has heard (ns).
 const LONGEST_WAIT_NS: u64 = 1_000_000_000;
 /// Most frames that wait for a memory, and most that are kept between two; beyond them the oldest go, and the memory is asked for anew.
@@ -183,7 +182,7 @@ impl Follower {
             let anchor = Anchor { entry: memory, at_ns, frames: self.gone, made };
             // Where the last gyro frame that the other had heard did not come, some behind it may be missing too.
             if !self.has_last_gyro_frame(&anchor.entry) {
-                return (None, now_ns > at_ns.saturating_add(LONGEST_LAG_NS));
+                return (None, now_ns > at_ns.saturating_add(LATE_NS));
             }
             let rebuilt = self.rebuild(&anchor, false);
             let Some(again) = &rebuilt else {

@@ -19,6 +19,7 @@ use crate::journal::JournalEntry;
 use crate::key::Input;
 use crate::stream::Heard;
 
+pub(super) use anchor::LATE_NS;
 use anchor::Search;
 use copies::Copies;
 

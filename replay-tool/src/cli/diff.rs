@@ -70,7 +70,10 @@ fn not_negative(text: &str) -> Result<f64, String> {
 struct Report<'r> {
     a: String,
     b: String,
+    /// To the bit.
     identical: bool,
+    /// Whether nothing differs by more than the tolerance.
+    within_tolerance: bool,
     tolerance: Tolerance,
     units: &'r BTreeMap<UnitId, Account>,
 }
@@ -82,6 +85,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         check_units(std::slice::from_ref(recording), &units)?;
     }
     let unnamed = unnamed(args, &units)?;
+    let named = !units.is_empty() || !(is_csv(&args.a) && is_csv(&args.b));
     let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
     let mut b = CorrectedLog::open(&args.b, &units, &unnamed)?;
     let tolerance = Tolerance {
@@ -102,11 +106,19 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
     for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
         show::warn(&words);
     }
-    let identical = accounts.values().all(Account::is_identical);
+    let within_tolerance = accounts.values().all(Account::is_identical);
+    let identical = within_tolerance && accounts.values().all(|account| account.within_tolerance == 0);
     let name = |path: &Path| path.display().to_string();
-    let report = Report { a: name(&args.a), b: name(&args.b), identical, tolerance, units: &accounts };
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(if identical { Exit::Ok } else { Exit::Failed })
+    let report = Report {
+        a: name(&args.a),
+        b: name(&args.b),
+        identical,
+        within_tolerance,
+        tolerance,
+        units: &accounts,
+    };
+    print(if args.json { show::json(&report) } else { human(&report, named) }.as_bytes())?;
+    Ok(if within_tolerance { Exit::Ok } else { Exit::Failed })
 }
 
 /// The unit that a CSV is of, where it is not said: the only one of the other log.
@@ -141,30 +153,42 @@ fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
 }
 
 /// The result as a table, and the first difference of each unit.
-fn human(report: &Report<'_>) -> String {
+/// Where both are CSVs and nobody said of which unit (`named` false), there is none to name.
+fn human(report: &Report<'_>, named: bool) -> String {
+    let of = |unit: &UnitId| if named { format!("unit {unit}: ") } else { String::new() };
     let row = |(unit, account): (&UnitId, &Account)| {
         let Account { ticks, different, only_a, only_b, .. } = account;
         let counts = [*ticks, *different, only_a.all(), only_b.all()];
-        std::iter::once(unit.to_string()).chain(counts.map(|count| count.to_string()))
+        let unit = if named { unit.as_str() } else { "–" };
+        std::iter::once(unit.to_owned()).chain(counts.map(|count| count.to_string()))
     };
     let head = ["unit", "ticks in both", "different", "only in A", "only in B"];
     let mut text = show::grid(head, report.units.iter().map(row), 1..);
     for (unit, account) in report.units.iter().filter(|(_, account)| account.other_document > 0) {
         let count = account.other_document;
         let _ =
-            writeln!(text, "unit {unit}: {count} ticks in both were made by different calibration documents");
+            writeln!(text, "{}{count} ticks in both were made by different calibration documents", of(unit));
     }
     for (unit, account) in report.units {
-        let Some(first) = &account.first else { continue };
-        let _ = writeln!(text, "\nunit {unit}: the first difference");
-        text += &first_difference(first, ["A", "B"]);
-        if account.different > 0 {
+        let allowed = account.within_tolerance;
+        if allowed > 0 {
+            let _ = writeln!(text, "\n{}{allowed} ticks differ within the tolerance", of(unit));
+        }
+        if let Some(first) = &account.first {
+            let _ = writeln!(text, "\n{}the first difference", of(unit));
+            text += &first_difference(first, ["A", "B"]);
+        }
+        if account.different + allowed > 0 {
             text += "\nlargest differences\n";
             text += &largest("angle", "rad", "°/h", &account.angle);
             text += &largest("velocity", "m/s", "mg", &account.velocity);
         }
     }
-    text += if report.identical { "identical\n" } else { "\ndifferent\n" };
+    text += match (report.identical, report.within_tolerance) {
+        (true, _) => "identical\n",
+        (false, true) => "\nwithin tolerance\n",
+        (false, false) => "\ndifferent\n",
+    };
     text
 }
 

@@ -94,8 +94,18 @@ fn one_coefficient_changed_in_its_last_digit_is_found_at_the_first_tick_that_it_
 
     let output = replay(folder.path(), &["diff", "a.csv", "b.csv", "--around", "2"]);
     ended(&output, 1);
+    assert!(!stdout(&output).contains("unit unit"));
     insta::assert_snapshot!(stdout(&output));
-    ended(&replay(folder.path(), &["diff", "a.csv", "b.csv", "--tolerance-angle", "1e-12"]), 0);
+    let allowed = ["diff", "a.csv", "b.csv", "--tolerance-angle", "1e-12"];
+    let output = replay(folder.path(), &allowed);
+    ended(&output, 0);
+    assert!(!stdout(&output).contains("identical"), "{}", stdout(&output));
+    let output = replay(folder.path(), &[&allowed[..], &["--json"]].concat());
+    let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!((&report["identical"], &report["within_tolerance"]), (&false.into(), &true.into()));
+    assert_eq!(report["units"]["unit"]["within_tolerance"], different);
+    // A CSV of raw ticks.
+    ended(&replay(folder.path(), &["diff", "a.csv", "mems.csv"]), 1);
     let output = replay(folder.path(), &["diff", "a.csv", "a.csv", "--json"]);
     ended(&output, 0);
     let report: Value = serde_json::from_str(&stdout(&output)).unwrap();

@@ -17,13 +17,17 @@ pub(super) struct Report<'r> {
     /// Whether every unit's ticks are those that the service published, to the bit; left out where none were compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     identical: Option<bool>,
+    /// Published ticks at the end of which the recording has no raw ticks: they were not compared.
+    unfinished: u64,
 }
 
 impl<'r> Report<'r> {
     pub(super) fn new(units: &'r [UnitReport], log: &'r LogReport) -> Self {
         let mut compared = units.iter().filter_map(|unit| unit.published.as_ref()).peekable();
         let identical = compared.peek().is_some().then(|| compared.all(isotherm_log::diff::Account::agrees));
-        Self { units, log, identical }
+        let unfinished =
+            units.iter().filter_map(|unit| unit.published.as_ref()).map(|account| account.unfinished).sum();
+        Self { units, log, identical, unfinished }
     }
 
     pub(super) fn lost_data(&self) -> bool {
@@ -72,6 +76,9 @@ impl<'r> Report<'r> {
             }
         }
         match self.identical {
+            Some(true) if self.unfinished > 0 => {
+                text += "identical as far as the recording has raw ticks: every other tick that the service published is reproduced to the bit\n";
+            }
             Some(true) => {
                 text += "identical: every tick that the service published is reproduced to the bit\n";
             }
@@ -101,9 +108,13 @@ fn journal(unit: &UnitReport) -> String {
 /// How the ticks compare with what was published, in a few words.
 fn published(unit: &UnitReport) -> String {
     let Some(account) = &unit.published else { return "not compared".to_owned() };
+    let tail = match account.unfinished {
+        0 => String::new(),
+        ticks => format!(", {ticks} at the end without raw ticks"),
+    };
     if account.agrees() {
-        return format!("{} identical", account.ticks);
+        return format!("{} identical{tail}", account.ticks);
     }
-    let between = account.only_a.between + account.only_b.between;
-    format!("{} of {} differ, {between} in one alone", account.different, account.ticks)
+    let missing = account.missing();
+    format!("{} of {} differ, {missing} in one alone{tail}", account.different, account.ticks)
 }
