@@ -88,7 +88,7 @@ impl<'t> Reader<'t> {
                         // All its keys stand there already.
                         told_until = end;
                         format!(
-                            "TOML: a second table `{path}`: where there are several, write [[{path}]] for each"
+                            "TOML: a second table `{path}`: join the two, or write [[{path}]] for each of several"
                         )
                     }
                     None => format!("TOML: {DUPLICATE_KEY} `{}`: remove one", self.excerpt(span.clone())),
@@ -148,7 +148,8 @@ fn header(text: &str, offset: usize) -> Option<(&str, usize)> {
     let (before, _) = text.split_at_checked(offset)?;
     let start = before.rfind('\n').map_or(0, |end| end + 1);
     let line = text.get(start..)?.lines().next()?;
-    let (path, _) = line.trim_start().strip_prefix('[')?.split_once(']')?;
+    let header = line.trim_start().strip_prefix('[').filter(|header| !header.starts_with('['))?;
+    let (path, _) = header.split_once(']')?;
     let next = text.get(offset..)?.find("\n[").map_or(text.len(), |next| offset + next);
     Some((path, next))
 }

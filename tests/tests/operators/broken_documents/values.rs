@@ -28,7 +28,7 @@ pub(super) const EDITS: [Edit; 35] = [
         "[temperature]\nassumed_deg_c = 20.0\n[accel]",
         "[temperature]\nassumed_deg_c = 20.0",
         "",
-        "duplicate key",
+        "a second table `temperature`",
     ),
     (
         "unknown key",
