@@ -23,14 +23,12 @@ pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, r
     table
 }
 
-/// A problem under the name that the operator gave the file; without one, under the service's own. What is no matter of a
-/// file is told without a place.
-pub(super) fn problem(problem: &Problem, name: Option<&str>) -> String {
-    if problem.file.is_none() {
-        return escaped(&problem.message).into_owned();
-    }
-    let file = name.map(ToOwned::to_owned).or_else(|| problem.file.clone());
-    Problem { file, ..problem.clone() }.to_string()
+/// A problem; that of the document under the name that the operator gave the file, `sent` with the key that it was sent to. What is no
+/// matter of a file is told without a place.
+pub(super) fn problem(problem: &Problem, sent: Option<(&str, &str)>) -> String {
+    let Some(place) = &problem.file else { return escaped(&problem.message).into_owned() };
+    let name = sent.filter(|(key, _)| place == key).map_or(place.as_str(), |(_, name)| name);
+    Problem { file: Some(name.to_owned()), ..problem.clone() }.to_string()
 }
 
 /// When a change takes effect, and how long it takes.
@@ -81,4 +79,25 @@ fn correction_row(change: &CorrectionChange) -> Vec<String> {
         format!("{:+.6}", after - before),
         unit.clone(),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_problems_of_the_document_are_told_under_its_name() {
+        let of = |file: Option<&str>| Problem {
+            file: file.map(ToOwned::to_owned),
+            line: 3,
+            column: 1,
+            key: String::new(),
+            message: "words".to_owned(),
+        };
+        let sent = Some(("imu/U/calibration", "new.toml"));
+        assert!(problem(&of(Some("imu/U/calibration")), sent).starts_with("new.toml:3:1:"));
+        assert!(problem(&of(Some("/etc/keys")), sent).starts_with("/etc/keys:3:1:"));
+        assert!(problem(&of(Some("state/a.toml")), None).starts_with("state/a.toml:3:1:"));
+        assert_eq!(problem(&of(None), sent), "words");
+    }
 }

@@ -157,7 +157,9 @@ async fn change(
     let unit = client::unit(serial)?;
     let client = Client::open(client).await?;
     let preview = wish.ask(&client, &unit, true).await?;
-    tell(&preview, name);
+    let key = key::calibration(&unit);
+    let sent = name.map(|name| (key.as_str(), name));
+    tell(&preview, sent);
     if consent.dry_run || preview.outcome != SwapOutcome::WouldBeAccepted {
         return Ok(result(&preview, consent.json));
     }
@@ -170,24 +172,24 @@ async fn change(
     if reply.outcome == SwapOutcome::Accepted {
         say(wait(&mut follow, &reply, client.timeout).await);
     } else {
-        tell(&reply, name);
+        tell(&reply, sent);
     }
     client.close().await;
     Ok(result(&reply, consent.json))
 }
 
 /// Says on stderr what a reply holds beside its outcome: what is to be done last, where it is read.
-fn tell(reply: &SwapReply, name: Option<&str>) {
+fn tell(reply: &SwapReply, sent: Option<(&str, &str)>) {
     if let Some(difference) = &reply.difference
         && reply.outcome != SwapOutcome::Unchanged
     {
         say_lines(show::difference(difference));
     }
     for problem in &reply.problems {
-        say(show::problem(problem, name));
+        say(show::problem(problem, sent));
     }
     for warning in &reply.warnings {
-        say(format_args!("{} (warning)", show::problem(warning, name)));
+        say(format_args!("{} (warning)", show::problem(warning, sent)));
     }
 }
 
