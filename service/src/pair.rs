@@ -4,11 +4,13 @@
 //! |---|---|
 //! | `watch` | the thread that notices a silent instance, and hears the journals of others |
 //! | `join` | who is there at the start |
+//! | `elsewhere` | which units instances of other groups take |
 //! | `ask` | memories, histories and documents of the instance that speaks, asked for |
 //! | [`crate::receive::unit`] `speech` | one unit: what is kept, compared and published in the other's place |
 //! | [`crate::control`] `carry` | histories and documents, written down here too |
 
 mod ask;
+mod elsewhere;
 mod join;
 mod watch;
 
@@ -22,19 +24,21 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{Member, Mode, PairReport};
 use zenoh::Session;
-use zenoh::key_expr::OwnedKeyExpr;
 
 use crate::ServiceError;
-use crate::config::{PairSettings, Settings, chunks, includes};
+use crate::config::{PairSettings, Settings};
 use crate::receive::intake::Intake;
 use crate::receive::unit::{Footing, Standing, UnitActor};
 pub(crate) use ask::{Asker, Questions};
+use elsewhere::Elsewhere;
 pub(crate) use watch::Watch;
 
 /// How long a unit that is not taken is remembered.
 const PASSED_OVER: Duration = Duration::from_secs(10);
 /// How long a process may stand still without losing its connections: well below the lease.
 const SHORT: Duration = Duration::from_millis(300);
+/// How long the other instance may be away before that is a fault: two are seldom started at once.
+const MISSING: Duration = Duration::from_secs(5);
 /// Most such units.
 const MOST_PASSED_OVER: usize = 4096;
 
@@ -45,6 +49,8 @@ pub(crate) struct Pair {
     takeover: Duration,
     takes: Vec<String>,
     others: RwLock<BTreeMap<String, Member>>,
+    /// Whether another instance is meant to be there.
+    is_meant: bool,
     alone_since: Mutex<Option<Instant>>,
     /// Whether it is not known yet which units the others speak for.
     opening: AtomicBool,
@@ -57,9 +63,8 @@ pub(crate) struct Pair {
     still_us: AtomicU64,
     /// Whether there were others once.
     was_accompanied: AtomicBool,
+    elsewhere: Elsewhere,
     passed_over: Mutex<BTreeMap<String, Instant>>,
-    /// What instances of other groups take, by instance; `None` where they have not said it yet.
-    elsewhere: Mutex<BTreeMap<String, Option<Vec<OwnedKeyExpr>>>>,
 }
 
 impl Pair {
@@ -80,21 +85,21 @@ impl Pair {
         let PairSettings { name, mode, priority, takeover, .. } = settings.pair.clone();
         let name = name.unwrap_or_else(|| instance.chars().take(8).collect());
         let me = Member { instance, name, mode, priority, started_unix_ms, group: group(settings) };
-        let alone = others.is_empty().then(Instant::now);
         Self {
             me,
             takeover,
             takes: settings.units.clone(),
+            is_meant: settings.pair.is_meant(),
             opening: AtomicBool::new(!others.is_empty()),
             accompanied: AtomicBool::new(!others.is_empty()),
             was_accompanied: AtomicBool::new(!others.is_empty()),
+            alone_since: Mutex::new(others.is_empty().then(Instant::now)),
             others: RwLock::new(others.into_iter().map(|other| (other.instance.clone(), other)).collect()),
-            alone_since: Mutex::new(alone),
             start: Instant::now(),
             beat: AtomicU64::new(0),
             still_us: AtomicU64::new(0),
             passed_over: Mutex::default(),
-            elsewhere: Mutex::default(),
+            elsewhere: Elsewhere::default(),
         }
     }
 
@@ -122,22 +127,14 @@ impl Pair {
     fn come_elsewhere(&self, member: &Member) -> bool {
         let is_elsewhere = member.group != self.me.group;
         if is_elsewhere {
-            lock(&self.elsewhere).entry(member.instance.clone()).or_default();
+            self.elsewhere.come(&member.instance);
         }
         is_elsewhere
     }
 
-    /// An instance has said what it takes.
-    fn takes_elsewhere(&self, report: &PairReport) {
-        if let Some(takes) = lock(&self.elsewhere).get_mut(&report.member.instance) {
-            *takes = Some(chunks(&report.takes));
-        }
-    }
-
     /// Whether an instance of another group takes a unit, or may.
     pub(crate) fn is_taken_elsewhere(&self, unit: &UnitId) -> bool {
-        let may_take = |takes: &Option<Vec<_>>| takes.as_ref().is_none_or(|it| includes(it, unit.as_str()));
-        lock(&self.elsewhere).values().any(may_take)
+        self.elsewhere.may_take(unit)
     }
 
     /// An instance has come; whether it is new.
@@ -158,7 +155,7 @@ impl Pair {
 
     /// An instance has gone, or the connection to it; whether it was there.
     fn go(&self, instance: &str) -> bool {
-        lock(&self.elsewhere).remove(instance);
+        self.elsewhere.go(instance);
         let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
         let gone = others.remove(instance).is_some();
         if gone && others.is_empty() {
@@ -184,6 +181,12 @@ impl Pair {
     /// Whether it is not known yet which units the others speak for.
     pub(crate) fn is_opening(&self) -> bool {
         self.opening.load(Ordering::Acquire)
+    }
+
+    /// That the other instance that is meant to be there has not been for a while.
+    pub(crate) fn is_missing_other(&self, now: Instant) -> bool {
+        let since = self.standing().alone_since.filter(|_| self.is_meant);
+        since.is_some_and(|since| now.saturating_duration_since(since) >= MISSING)
     }
 
     /// What a unit needs to know of it.
@@ -261,9 +264,8 @@ impl Pair {
 
     /// What this instance says of itself and its units.
     pub(crate) fn report(&self, intake: &Intake) -> PairReport {
-        let now = Instant::now();
         let mut passed_over = lock(&self.passed_over);
-        passed_over.retain(|_, at| now.saturating_duration_since(*at) < PASSED_OVER);
+        passed_over.retain(|_, at| at.elapsed() < PASSED_OVER);
         PairReport {
             member: self.me.clone(),
             takes: self.takes.clone(),
@@ -316,6 +318,21 @@ mod tests {
         pair.told();
         assert_eq!(pair.look(Instant::now()), None);
         assert!(pair.standing().deserted);
+    }
+
+    #[test]
+    fn an_instance_that_is_meant_to_be_there_and_is_not_is_missed_until_it_comes() {
+        for (name, is_missed) in [(Some("north".to_owned()), true), (None, false)] {
+            let settings =
+                Settings { pair: PairSettings { name, ..PairSettings::default() }, ..Settings::default() };
+            let pair = Pair::new(&settings, "me".to_owned(), 2, Vec::new());
+            let missing_in = |s| pair.is_missing_other(Instant::now() + Duration::from_secs(s));
+            assert_eq!([missing_in(0), missing_in(6)], [false, is_missed]);
+            pair.come(other());
+            assert!(!missing_in(6));
+            pair.go("other");
+            assert_eq!([missing_in(0), missing_in(6)], [false, is_missed]);
+        }
     }
 
     #[test]

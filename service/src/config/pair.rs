@@ -49,6 +49,13 @@ impl Default for PairSettings {
     }
 }
 
+impl PairSettings {
+    /// Whether anything but the default is set: another instance is meant to be there.
+    pub(crate) fn is_meant(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
 /// All units.
 pub(super) const ALL_UNITS: &str = "*";
 

@@ -102,7 +102,7 @@ impl Asker {
         while let Some(instance) = questions.recv().await {
             for sample in self.ask(&key::pair(&instance)).await {
                 if let Ok(report) = serde_json::from_slice(&sample.payload().to_bytes()) {
-                    self.pair.takes_elsewhere(&report);
+                    self.pair.elsewhere.said(&report);
                 }
             }
         }

@@ -93,6 +93,7 @@ impl Instance {
         self.said = Some(news.clone());
         let mut faults: Vec<_> =
             posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
+        faults.extend(intake.missing_other());
         faults.extend(intake.faults());
         faults.extend(intake.awaited());
         let dropped = dropped_lines();

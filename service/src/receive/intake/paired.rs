@@ -4,11 +4,12 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::status::Fault;
 
 use super::{Intake, guarded, lock};
 use crate::control::revision::Plan;
 use crate::pair::Pair;
-use crate::receive::fault::FaultKind;
+use crate::receive::fault::{FaultKind, standing};
 
 /// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
 const LONGEST_DOUBT: Duration = Duration::from_millis(500);
@@ -57,6 +58,15 @@ impl Intake {
     /// This instance's name for itself: its Zenoh id as text.
     pub(crate) fn instance(&self) -> &str {
         self.pair.as_ref().map_or("", |pair| &pair.me().instance)
+    }
+
+    /// That the other instance of a pair is not there.
+    pub(crate) fn missing_other(&self) -> Option<Fault> {
+        let is_missing = self.pair.as_ref().is_some_and(|pair| pair.is_missing_other(Instant::now()));
+        is_missing.then(|| {
+            let words = "the other instance is not there: nobody takes over from this one; start it, or mend the connection";
+            standing("other_instance_missing", 1, words.to_owned())
+        })
     }
 
     /// Another instance has published a frame of a unit.
