@@ -105,6 +105,7 @@ fn verify(args: &HistoryArgs) -> Exit {
         return print(&isotherm_cli::json(&found), exit);
     }
     found.breaks.iter().for_each(say);
+    found.lost.iter().for_each(say);
     print(&found.to_string(), exit)
 }
 

@@ -28,7 +28,7 @@ mod verify;
 
 pub use error::StoreError;
 pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn};
-pub use verify::{Break, Verification, verify};
+pub use verify::{Break, Lost, Verification, verify};
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};

@@ -198,8 +198,12 @@ impl Index {
 
     /// Documents and overlays of every revision that can be gone back to.
     pub(super) fn digests(&self) -> impl Iterator<Item = Digest> {
-        let sets = self.units.values().flat_map(|of_unit| &of_unit.sets);
-        sets.flat_map(|set| [Some(set.digest), set.overlay]).flatten()
+        self.all_sets().flat_map(|(_, set)| [Some(set.digest), set.overlay]).flatten()
+    }
+
+    /// Good sets of every unit.
+    pub(super) fn all_sets(&self) -> impl Iterator<Item = (&UnitId, &GoodSet)> {
+        self.units.iter().flat_map(|(unit, of_unit)| of_unit.sets.iter().map(move |set| (unit, set)))
     }
 
     /// Good sets of a unit, the newest last.

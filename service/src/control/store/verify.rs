@@ -1,5 +1,7 @@
-//! The audit files of a folder, verified as one chain: by whoever may read them, while a service writes there or not.
+//! The audit files of a folder, verified as one chain, and the documents that they name: by whoever may read them, while a service writes
+//! there or not.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +10,9 @@ use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::history::chain::{Broken, Head, Verifier};
 use serde::Serialize;
 
+use super::blobs::BlobStore;
 use super::folder::Mark;
+use super::index::Index;
 use super::log::{NAME, full_files};
 use super::{StoreError, read};
 
@@ -36,6 +40,21 @@ pub struct Verification {
     pub breaks: Vec<Break>,
     /// How many there are.
     pub broken: u64,
+    /// Documents and overlays that a rollback could go to and that are missing or were altered: the first 100.
+    pub lost: Vec<Lost>,
+}
+
+/// A document or an overlay that is not as it was stored.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Lost {
+    /// Its file.
+    pub file: PathBuf,
+    /// Serial of the unit that it was accepted for last.
+    pub unit: String,
+    /// The revision.
+    pub revision: u64,
+    /// Why it cannot be used.
+    pub words: String,
 }
 
 /// A place where the chain is broken.
@@ -73,6 +92,7 @@ fn once(folder: &Path, full: &[PathBuf], noted: Option<Digest>) -> Result<Verifi
     let written = Mark::last_entry(folder);
     let mut verifier = Verifier::default();
     let (mut breaks, mut broken) = (Vec::new(), 0);
+    let mut index = Index::default();
     let mut note = |file: &Path, line: u64, found: Option<Broken>| {
         let Some(Broken { number, unit, fault }) = found else { return };
         broken += 1;
@@ -92,6 +112,9 @@ fn once(folder: &Path, full: &[PathBuf], noted: Option<Digest>) -> Result<Verifi
             }
             last_line = line;
             note(file, line, verifier.line(bytes));
+            if let Ok(entry) = AuditEntry::from_line(bytes) {
+                index.apply(&entry);
+            }
             is_there |= verifier.head.is_some_and(|head| noted == Some(head.digest));
         });
         read.map_err(StoreError::read(file))?;
@@ -106,8 +129,42 @@ fn once(folder: &Path, full: &[PathBuf], noted: Option<Digest>) -> Result<Verifi
         breaks.push(Break { file: current, line: last_line, number: None, unit: None, words });
     }
     let Verifier { entries, first, begins, head, .. } = verifier;
-    let (folder, files, holds) = (folder.to_owned(), full.len() + 1, broken == 0);
-    Ok(Verification { folder, holds, files, entries, first, begins, head, breaks, broken })
+    let lost = lost(folder, &index);
+    let (folder, files, holds) = (folder.to_owned(), full.len() + 1, broken == 0 && lost.is_empty());
+    Ok(Verification { folder, holds, files, entries, first, begins, head, breaks, broken, lost })
+}
+
+/// What can be gone back to, and is not as it was stored.
+fn lost(folder: &Path, index: &Index) -> Vec<Lost> {
+    let shelves = ["documents", "overlays"].map(|name| BlobStore::Folder(folder.join(name)));
+    let [documents, overlays] = &shelves;
+    let mut named = BTreeMap::new();
+    for (unit, set) in index.all_sets() {
+        let files = [(documents, Some(set.digest)), (overlays, set.overlay)];
+        for (shelf, digest) in files.into_iter().filter_map(|(shelf, digest)| Some((shelf, digest?))) {
+            let Some(file) = shelf.file(&digest) else { continue };
+            named.insert(file, (shelf, digest, unit, set.revision));
+        }
+    }
+    let lost = named.into_iter().filter_map(|(file, (shelf, digest, unit, revision))| {
+        let words = match shelf.get(&digest) {
+            Ok(Some(_)) => return None,
+            Ok(None) => "is missing".to_owned(),
+            Err(StoreError::Corrupt { found, .. }) => format!("was altered: its SHA-256 is {found}"),
+            Err(StoreError::Read { source, .. }) => format!("cannot be read: {source}"),
+            Err(error) => error.to_string(),
+        };
+        Some(Lost { file, unit: unit.to_string(), revision, words })
+    });
+    lost.take(MAX_BREAKS).collect()
+}
+
+impl fmt::Display for Lost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, unit, revision, words } = self;
+        let file = file.display();
+        write!(f, "{file} {words}; revision {revision} of unit {unit} needs it: restore it from a backup")
+    }
 }
 
 impl fmt::Display for Break {
@@ -124,13 +181,17 @@ impl fmt::Display for Break {
 
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { folder, files, entries, first, begins, head, broken, .. } = self;
+        let Self { folder, files, entries, first, begins, head, broken, lost, .. } = self;
         let folder = folder.display();
         let many =
             |count: u64, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
         let verdict = match broken {
             0 => "the chain holds".to_owned(),
             broken => format!("the chain is broken in {}", many(*broken, "place", "places")),
+        };
+        let verdict = match lost.len() as u64 {
+            0 => verdict,
+            lost => format!("{verdict}; {} missing or altered", many(lost, "document", "documents")),
         };
         let in_files = many(*files as u64, "file", "files");
         writeln!(f, "{folder}: {} in {in_files}: {verdict}", many(*entries, "entry", "entries"))?;

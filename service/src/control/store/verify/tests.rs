@@ -3,8 +3,9 @@
 use std::fs;
 use std::time::{Duration, SystemTime};
 
+use isotherm_protocol::control::Schedule;
 use isotherm_protocol::history::chain::Fault;
-use isotherm_protocol::history::{AuditEvent, CommandRecord};
+use isotherm_protocol::history::{Acceptance, AuditEvent, CommandRecord, Source};
 use isotherm_protocol::key::UnitId;
 use tempfile::TempDir;
 
@@ -222,4 +223,37 @@ fn a_folder_without_an_audit_file_is_an_error_that_names_it() {
         let error = verify(&path, None).unwrap_err().to_string();
         assert!(error.contains(&path.display().to_string()), "{error}");
     }
+}
+
+#[test]
+fn a_document_that_can_be_rolled_back_to_and_was_altered_or_removed_is_told() {
+    let folder = TempDir::new().unwrap();
+    let unit = UnitId::new("ZLG-1").unwrap();
+    let (mut store, _) = Store::open(folder.path()).unwrap();
+    for revision in 1..=3 {
+        let digest = store.put_document(format!("text {revision}").as_bytes()).unwrap();
+        let accepted = Acceptance {
+            revision,
+            digest,
+            overlay: (revision == 3).then(|| store.put_overlay(b"overlay").unwrap()),
+            source: Source::Bus,
+            base: None,
+            changed: Vec::new(),
+            schedule: Schedule::NextTick,
+            slew_ms: 0,
+        };
+        store.append(SystemTime::UNIX_EPOCH, Some(&unit), "ann", AuditEvent::Accepted(accepted)).unwrap();
+    }
+    assert!(verified(&folder).holds);
+    let file = |shelf: &str, text: &str| {
+        folder.path().join(shelf).join(format!("{}.toml", Digest::of(text.as_bytes())))
+    };
+    let overlay = file("overlays", "overlay");
+    fs::remove_file(&overlay).unwrap();
+    let altered = file("documents", "text 1");
+    fs::write(&altered, "text 2").unwrap();
+    let found = verified(&folder);
+    assert!(!found.holds && found.broken == 0, "{found:?}");
+    let lost: Vec<_> = found.lost.iter().map(|lost| (&lost.file, &*lost.unit, lost.revision)).collect();
+    assert_eq!(lost, [(&altered, "ZLG-1", 1), (&overlay, "ZLG-1", 3)]);
 }
