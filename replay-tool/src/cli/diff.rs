@@ -85,7 +85,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         check_units(std::slice::from_ref(recording), &units)?;
     }
     let unnamed = unnamed(args, &units)?;
-    let named = !units.is_empty() || !(is_csv(&args.a) && is_csv(&args.b));
+    let named = !(units.is_empty() && is_csv(&args.a) && is_csv(&args.b));
     let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
     let mut b = CorrectedLog::open(&args.b, &units, &unnamed)?;
     let tolerance = Tolerance {

@@ -12,7 +12,9 @@ fn corrected(messages: &[Message]) -> Account {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cut.mcap");
     let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
-    messages.iter().for_each(|message| writer.write(message).unwrap());
+    for message in messages {
+        writer.write(message).unwrap();
+    }
     writer.finish().unwrap();
     let outlines = scan(std::slice::from_ref(&path)).unwrap();
     let plan = |(id, outline): (UnitId, UnitOutline)| {
@@ -22,7 +24,7 @@ fn corrected(messages: &[Message]) -> Account {
     let plans = outlines.units.into_iter().map(plan).collect();
     let options = RunOptions { threads: 1, form: Form::Sums, from_ns: 0, diff: DiffOptions::default() };
     let files = LogFiles::Recordings(vec![path]);
-    let (mut units, _) = correct(&files, &mut Part::default(), plans, options, &mut |_, _| Ok(())).unwrap();
+    let (mut units, _) = correct(&files, &Part::default(), plans, options, &mut |_, _| Ok(())).unwrap();
     units.remove(0).published.unwrap()
 }
 

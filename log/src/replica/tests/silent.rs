@@ -14,7 +14,7 @@ struct Later {
 
 impl Later {
     fn new(speed: u64, raw_later_ns: i64) -> Self {
-        let mut session = Session { speed, raw_later_ns, ..Session::new() };
+        let mut session = Session { raw_later_ns, speed, ..Session::new() };
         session.ticks(TICKS);
         session.now_ns += 10 * SECOND_NS;
         session.recorded.clear();
