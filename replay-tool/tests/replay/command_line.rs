@@ -152,7 +152,7 @@ fn completions_and_presets_go_to_standard_output() {
         assert!(stdout(&replay(folder.path(), &["completions", shell])).contains("isotherm-replay"));
     }
     let presets = stdout(&replay(folder.path(), &["simulate", "--list-presets"]));
-    assert_eq!(presets.lines().count(), 6);
+    assert_eq!(presets.lines().count(), 7);
     for name in presets.lines().map(|line| line.split_whitespace().next().unwrap()) {
         let out = ["--out", "x.csv.gz", "--overwrite"];
         let preset = ["simulate", "--preset", name, "--duration", "1"];
