@@ -10,9 +10,9 @@ pub(super) const EDITS: [Edit; 35] = [
         "open array",
         "[41.0, 55.0]",
         "[41.0, 55.0",
-        "[[self_test.voltage]]\nname = \"half-wave y",
+        "[41.0, 55.0",
         "",
-        "TOML: ",
+        "TOML: `[` is not closed",
     ),
     (
         "duplicate key",
