@@ -6,14 +6,7 @@ pub(super) const EDITS: [Edit; 35] = [
     ("syntax", "schema = 1", "schema = = 1", "schema = =", "", "TOML: "),
     ("open string", "zeeman_sine)\"", "zeeman_sine)", "method =", "", "TOML: invalid basic string"),
     ("open table", "[temperature]", "[temperature", "[temperature", "", "TOML: "),
-    (
-        "open array",
-        "[41.0, 55.0]",
-        "[41.0, 55.0",
-        "[41.0, 55.0",
-        "",
-        "TOML: `[` is not closed",
-    ),
+    ("open array", "[41.0, 55.0]", "[41.0, 55.0", "[41.0, 55.0", "", "TOML: `[` is not closed"),
     (
         "duplicate key",
         "smoothing_s = 3.0",
