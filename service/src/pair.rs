@@ -16,7 +16,7 @@ mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use isotherm_operator::status::unix_ms;
@@ -27,7 +27,7 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::{PairSettings, Settings};
-use crate::receive::intake::Intake;
+use crate::receive::intake::{Intake, lock};
 use crate::receive::unit::{Footing, Standing, UnitActor};
 pub(crate) use ask::{Asker, Questions};
 use elsewhere::Elsewhere;
@@ -273,10 +273,6 @@ impl Pair {
             passed_over: passed_over.keys().cloned().collect(),
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Of the units that an instance takes.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::SystemTime;
 
+use isotherm_correction::calibration::{Calibration, Steady};
 use isotherm_correction::operation::State;
 use isotherm_correction::units::{AngularRate, SpecificForce};
 use isotherm_document::{file, parse_toml, unplaced};
@@ -231,13 +232,16 @@ fn doubts(
     }
     doubts.extend(active.and_then(|active| stream(candidate, active)));
     doubts.extend(active.and_then(|active| downgrade(settings, candidate, active)));
-    let unlikely =
-        active.map(|active| unlikely(&active.document.calibration, &candidate.calibration, present));
-    doubts.extend(unlikely.into_iter().flatten().map(|words| Doubt::new("", Severity::Warn, "", words)));
+    // A unit of which no temperature is known is at the assumed one, as it corrects then.
+    let thermal = |name: &_| present?.thermal(name);
+    let steady = |of: &Calibration| of.steady(thermal, present.and_then(|present| present.mode));
+    let both =
+        active.map(|active| [&active.document.calibration, &candidate.calibration].map(|of| steady(of)));
+    doubts.extend(both.iter().flat_map(unlikely).map(|words| Doubt::new("", Severity::Warn, "", words)));
     if let Some(present) = present {
         doubts.extend(range(settings, candidate, present));
     }
-    doubts.extend(active.into_iter().flat_map(|active| jump(settings, candidate, active, present)));
+    doubts.extend(both.iter().flat_map(|both| jump(settings, candidate, both, present)));
     doubts
 }
 
@@ -311,21 +315,17 @@ fn range<'a>(
     })
 }
 
-/// A unit of which no temperature is known is at the assumed one, as it corrects then.
 fn jump(
     settings: &SwapSettings,
     candidate: &Document,
-    active: &Revision,
+    [before, after]: &[Steady; 2],
     present: Option<&Present>,
 ) -> Vec<Doubt> {
     if settings.max_jump_rad_per_s.is_none() && settings.max_jump_m_per_s2.is_none() {
         return Vec::new();
     }
     let doubt = |words| Doubt::new("", settings.jump, "jump", words);
-    let thermal = |name: &_| present?.thermal(name);
-    let mode = present.and_then(|present| present.mode);
-    let before = active.document.calibration.steady(thermal, mode);
-    let Some(jump) = before.jump(&candidate.calibration.steady(thermal, mode)) else {
+    let Some(jump) = before.jump(after) else {
         return vec![doubt(
             "has other sensors or another kind of output than the document in force: the jump of the output is \
              unknown"

@@ -1,24 +1,17 @@
 //! What a document changes so much that hardly anybody means it: told whatever the limits of the configuration are.
 
-use isotherm_correction::calibration::Calibration;
-
-use crate::receive::unit::Present;
+use isotherm_correction::calibration::Steady;
 
 /// Largest turn of an input axis that is nothing special (°).
 const LARGEST_TURN_DEG: f64 = 1.0;
 /// Largest change of a scale that is nothing special, as a share of it.
 const LARGEST_CHANGE: f64 = 0.1;
 
-/// What of the scales and input axes of two calibrations of the same sensors differs so much, in words, where the unit stands; of one that
-/// was not heard, at the temperatures that they assume.
-pub(super) fn unlikely(before: &Calibration, after: &Calibration, present: Option<&Present>) -> Vec<String> {
-    let kind = |of: &Calibration| (of.gyro_output(), of.gyro_count(), of.accel_output(), of.accel_count());
-    if kind(before) != kind(after) {
+/// What of the scales and input axes of a unit differs so much before and after, in words; nothing of other sensors.
+pub(super) fn unlikely([before, after]: &[Steady; 2]) -> Vec<String> {
+    if before.jump(after).is_none() {
         return Vec::new();
     }
-    let thermal = |name: &_| present.and_then(|present| present.thermal(name));
-    let [before, after] =
-        [before, after].map(|of| of.steady(thermal, present.and_then(|present| present.mode)));
     let turns = |what, old: &[[f64; 3]], new: &[[f64; 3]]| {
         let angles = old.iter().zip(new).map(|(old, new)| angle_deg(old, new));
         let (numbers, largest) = beyond(angles, LARGEST_TURN_DEG)?;
@@ -59,6 +52,7 @@ fn angle_deg(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_correction::calibration::Calibration;
     use isotherm_protocol::document::Document;
 
     use super::*;
@@ -69,9 +63,9 @@ mod tests {
         let of = |change: fn(&mut Document)| {
             let mut document = Document::parse(text, None).unwrap().document;
             change(&mut document);
-            Calibration::new(&document.to_parts()).unwrap()
+            Calibration::new(&document.to_parts()).unwrap().steady(|_| None, None)
         };
-        let told = |change: fn(&mut Document)| unlikely(&of(|_| {}), &of(change), None).join("\n");
+        let told = |change: fn(&mut Document)| unlikely(&[of(|_| {}), of(change)]).join("\n");
         assert_eq!(told(|document| document.gyro.orientation.rows[0][1] += 1e-4), "");
         let swapped = told(|document| document.gyro.orientation.rows.swap(0, 1));
         let scaled = told(|document| {

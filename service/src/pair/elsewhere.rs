@@ -7,8 +7,8 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::PairReport;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::lock;
 use crate::config::{chunks, includes};
+use crate::receive::intake::lock;
 
 /// What each takes, by instance; `None` where it has not said it yet.
 #[derive(Debug, Default)]

@@ -268,7 +268,7 @@ fn words_of(panic: &(dyn Any + Send)) -> String {
 }
 
 /// Locks; a panic while the lock was held has been dealt with where it happened.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
