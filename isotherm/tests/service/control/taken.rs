@@ -45,9 +45,17 @@ async fn what_is_for_a_unit_that_is_not_taken_is_refused_and_the_unit_not_awaite
         assert!(words.contains(OTHER) && words.contains("ZLG-*"), "{words}");
     }
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.0), &SwapOptions::default()).await, 1);
-    let (replies, _) = ask_all(&stand.session, key::ALL_SERVICE_STATUS, LIMIT).await.unwrap();
-    let frame = replies[0].result().unwrap().payload().to_bytes();
-    let status: ServiceStatus = decode(&frame).unwrap();
+    // The swap manager posts its status after it has answered.
+    let deadline = tokio::time::Instant::now() + LIMIT;
+    let status = loop {
+        let (replies, _) = ask_all(&stand.session, key::ALL_SERVICE_STATUS, LIMIT).await.unwrap();
+        let frame = replies[0].result().unwrap().payload().to_bytes();
+        let status: ServiceStatus = decode(&frame).unwrap();
+        if status.swaps_accepted == 1 {
+            break status;
+        }
+        assert!(tokio::time::Instant::now() < deadline, "{status:?}");
+    };
     assert_eq!(status.store.unwrap().audit_entries, 1, "of the unit that is taken");
     let awaited = status.faults.iter().find(|fault| fault.kind == "awaited_units").unwrap();
     assert_eq!(awaited.count, 1, "{awaited:?}");
