@@ -81,7 +81,9 @@ fn diff_tells_what_has_changed() {
     assert!((axis["significance"].as_f64().unwrap() - 50.0 / 50.0_f64.sqrt()).abs() < 0.1, "{axis}");
     let verdict = changes["verdict"].as_str().unwrap();
     assert!(std::fs::read_to_string(&html).unwrap().contains("gyro x bias"));
-    insta::assert_snapshot!(format!("{verdict}\n{}", told(files.path(), &["diff", &before, &before])));
+    let told = |arguments: &[&str]| told(files.path(), &[&["diff", &before], arguments].concat());
+    insta::assert_snapshot!(format!("{verdict}\n{}\n{}", told(&[&before]), told(&[&after])));
+    assert!(told(&[&after, "--all"]).contains("accel.orientation.rows[2]"));
     assert_eq!(calibrate(&["diff", &before, &after, "--axis-sigma", "-1"]).status.code(), Some(2));
 }
 
