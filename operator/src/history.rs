@@ -20,7 +20,7 @@ const MOST_ENTRIES: u32 = 10_000;
 /// Columns of the terminal that a table fits.
 const WIDTH: usize = 100;
 /// Longest name of who and of what it came from.
-const LONGEST_NAME: usize = 16;
+const LONGEST_NAME: usize = 15;
 /// What stands before a line of what changed.
 const INDENT: &str = "        ";
 

@@ -167,16 +167,16 @@ fn other_weights(made: &Made) -> Option<String> {
     let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
     let other = sensors.filter(|_| made.scale_known).filter_map(|(sensor, found)| {
         let change = 1.0 / found.as_ref().ok()?.gain[0].abs() - 1.0;
-        (change.abs() > OTHER_WEIGHT).then(|| (sensor.name.as_str(), format!("{} ppm", short(1e6 * change))))
+        (change.abs() > OTHER_WEIGHT).then(|| (sensor.name.as_str(), format!("{} %", short(100.0 * change))))
     });
     let (names, changes): (Vec<&str>, Vec<String>) = other.unzip();
     (!names.is_empty()).then(|| {
         format!(
-            "{}: the weight changes by {}, more than {:.0} ppm: check the stated rates, the unit of measure in the \
+            "{}: the weight changes by {}, more than {:.0} %: check the stated rates, the unit of measure in the \
              mapping, and that the document is of this unit",
             gyros(&names),
             changes.join(", "),
-            1e6 * OTHER_WEIGHT
+            100.0 * OTHER_WEIGHT
         )
     })
 }
