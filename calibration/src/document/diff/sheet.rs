@@ -110,10 +110,10 @@ impl Changes {
                 let value = own.find(|value| (value.unit == "ppm") == is_scale)?;
                 Some(format!("{} {}", short(largest_of(value)), value.unit))
             };
-            let turned = format!("{} ″", tenths(axis.largest_arcsec));
-            vec![axis.of.clone(), turned, or_dash(largest(false)), or_dash(largest(true))]
+            let turned = plus_minus(axis.turned_arcsec, axis.turned_sigma_arcsec, tenths);
+            vec![axis.of.clone(), turned + " ″", or_dash(largest(false)), or_dash(largest(true))]
         };
-        let head = ["largest change", "input axis", "bias", "scale"];
+        let head = ["", "axis turned", "bias by up to", "scale by up to"];
         let summary = Table::of(head, self.axes.iter().map(row));
         let sheet = Report { summary: Some(summary), ..self.sheet() };
         let entries = counted(self.entries.len(), "entry differs", "entries differ");
