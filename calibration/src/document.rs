@@ -19,10 +19,11 @@ use isotherm_protocol::document::{AccelSensor, Document};
 
 pub use fitted::{About, Fitted};
 pub(crate) use fitted::{by_name, rows};
+pub use isotherm_document::tidy;
 pub(crate) use plain::{channels, faults, follows, plain};
 pub(crate) use provenance::files_of;
 pub use provenance::{TOOL, command_line, origin, recordings_in};
-pub use written::{Written, name_of, tidy, write_file};
+pub use written::{Written, name_of, write_file};
 
 /// The accelerometers of a document.
 pub fn accelerometers(document: &Document) -> &[AccelSensor] {

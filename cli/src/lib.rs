@@ -26,5 +26,5 @@ pub use bar::Bar;
 pub use exit::Exit;
 pub use print::{coloured, grouped, json, print, print_within, to_stdout};
 pub use program::Common;
-pub use stderr::{failed, failed_lines, say, say_lines};
+pub use stderr::{failed, failed_lines, say, say_lines, say_warning};
 pub use table::table;

@@ -32,6 +32,11 @@ pub fn say(line: impl Display) {
     to_stderr(format!("{}\n", escaped(&line.to_string())));
 }
 
+/// Says what is doubtful, and no reason to stop.
+pub fn say_warning(words: impl Display) {
+    say(format_args!("{words} (warning)"));
+}
+
 /// Says several lines on stderr.
 pub fn say_lines(lines: impl Display) {
     to_stderr(format!("{}\n", escaped_lines(&lines.to_string())));

@@ -51,6 +51,7 @@ mod suggest;
 mod text;
 mod walk;
 
+pub use number::tidy;
 pub use problem::{Problem, few, listed};
 pub use reader::{Reader, element, join, parse};
 pub use schema::{Form, published};

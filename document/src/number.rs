@@ -7,6 +7,15 @@ use toml::de::DeValue;
 /// Largest magnitude of any number: far beyond any instrument, safe to multiply.
 const HUGE: f64 = 1e100;
 
+/// Digits that numbers are written with: no conversion of units shows in them, and no fit is as good.
+const DIGITS: usize = 12;
+
+/// A number as documents state it: without the dust of unit conversions, in twelve digits.
+#[must_use]
+pub fn tidy(value: f64) -> f64 {
+    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+}
+
 /// What a schema allows of a number.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {

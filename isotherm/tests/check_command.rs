@@ -132,8 +132,20 @@ fn what_cannot_be_read_is_a_failure_and_a_wrong_call_is_usage() {
     let output = check(&[missing.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(1));
     assert!(lines(&output.stderr)[0].starts_with(missing.to_str().unwrap()), "{:?}", output.stderr);
-    assert_eq!(check(&[folder.path().to_str().unwrap()]).status.code(), Some(1), "a folder");
+    assert_eq!(check(&[folder.path().to_str().unwrap()]).status.code(), Some(1), "an empty folder");
     assert_eq!(check(&[]).status.code(), Some(2));
+}
+
+#[test]
+fn every_document_of_a_folder_is_checked() {
+    let output = check(&["--json", &config("calibration")]);
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let there = std::fs::read_dir(config("calibration")).unwrap().count();
+    assert_eq!(found["files"].as_array().unwrap().len(), there);
+    let folder = TempDir::new().unwrap();
+    write(&folder, ".hidden.toml", "no");
+    write(&folder, "a.toml", "schema = 1\n");
+    assert_eq!(check(&[folder.path().to_str().unwrap()]).status.code(), Some(78));
 }
 
 #[test]

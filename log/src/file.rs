@@ -34,7 +34,7 @@ pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
     let same = |other: &&&Path| resolved(out).is_some_and(|out| resolved(other) == Some(out));
     match others.iter().find(same) {
         Some(other) if out.is_file() || !out.exists() => Err(Error::Usage(format!(
-            "{} would be overwritten: it is also the {} of this command",
+            "{} would be overwritten: it is also the {} of this command; give another name",
             out.display(),
             other.display()
         ))),

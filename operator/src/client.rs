@@ -126,9 +126,12 @@ impl Client {
         parameters: &str,
         payload: Option<&[u8]>,
     ) -> Result<String, ConsoleError> {
-        let first = self.answers(key, parameters, payload).await?.into_iter().next();
-        let ended = || ConsoleError::Ended { key: key.to_owned(), tried: self.tried.clone() };
-        let bytes = first.ok_or_else(ended)?;
+        let Some(bytes) = self.answers(key, parameters, payload).await?.into_iter().next() else {
+            // imu/{unit}/…
+            let unit = key.split('/').nth(1).unwrap_or_default();
+            let instances = self.pairs().await.unwrap_or_default();
+            return Err(ConsoleError::unanswered(unit, key, &self.tried, &instances));
+        };
         String::from_utf8(bytes).map_err(unread(key))
     }
 

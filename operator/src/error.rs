@@ -6,7 +6,7 @@ use std::time::Duration;
 use isotherm_bus::BusError;
 use isotherm_cli::Exit;
 use isotherm_protocol::key::{self, UnitIdError};
-use isotherm_protocol::service_status::ServiceStatus;
+use isotherm_protocol::pair::{PairReport, Role};
 use isotherm_protocol::status::Status;
 use thiserror::Error;
 
@@ -57,6 +57,19 @@ pub enum ConsoleError {
         key: String,
         /// Where the service is.
         tried: String,
+    },
+    /// Only an instance that does not speak for the unit was asked.
+    #[error(
+        "{name} is the standby for {unit}, which {elsewhere} publishes: give the address of that instance with --connect, \
+         or the addresses of both"
+    )]
+    Standby {
+        /// The instance that was asked.
+        name: String,
+        /// The unit.
+        unit: String,
+        /// The others of its pair, and where they are.
+        elsewhere: String,
     },
     /// The service is there, the unit is not.
     #[error("the service has heard no unit {unit}; it has heard {}", known(units))]
@@ -114,11 +127,21 @@ pub enum ConsoleError {
 }
 
 impl ConsoleError {
-    /// Of a unit whose status is not among those that came: nobody knows it, or its answer was lost on the way.
-    pub(super) fn unlisted(unit: &str, tried: &str, statuses: &[Status], services: &[ServiceStatus]) -> Self {
-        let is_known = |service: &ServiceStatus| service.units.iter().any(|summary| summary.unit == unit);
-        if services.is_empty() || services.iter().any(is_known) {
-            return Self::Ended { key: key::ALL_STATUS.to_owned(), tried: tried.to_owned() };
+    /// Of a unit of which no answer came: another instance speaks for it, or the answer was lost on the way.
+    pub(super) fn unanswered(unit: &str, key: &str, tried: &str, instances: &[PairReport]) -> Self {
+        let silent = |report: &PairReport| {
+            report.role(unit).filter(|role| *role != Role::Speaking)?;
+            let (name, unit) = (report.member.name.clone(), unit.to_owned());
+            Some(Self::Standby { name, unit, elsewhere: report.elsewhere()? })
+        };
+        let ended = || Self::Ended { key: key.to_owned(), tried: tried.to_owned() };
+        instances.iter().find_map(silent).unwrap_or_else(ended)
+    }
+
+    /// Of a unit whose status is not among those that came: nobody knows it, or no answer came of it.
+    pub(super) fn unlisted(unit: &str, tried: &str, statuses: &[Status], instances: &[PairReport]) -> Self {
+        if instances.is_empty() || instances.iter().any(|report| report.role(unit).is_some()) {
+            return Self::unanswered(unit, key::ALL_STATUS, tried, instances);
         }
         let units = statuses.iter().map(|status| status.unit.clone()).collect();
         Self::NoUnit { unit: unit.to_owned(), units }

@@ -20,7 +20,7 @@ const MOST_ENTRIES: u32 = 10_000;
 /// Columns of the terminal that a table fits.
 const WIDTH: usize = 100;
 /// Longest name of who and of what it came from.
-const LONGEST_NAME: usize = 16;
+const LONGEST_NAME: usize = 15;
 /// What stands before a line of what changed.
 const INDENT: &str = "        ";
 
@@ -64,14 +64,14 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });
     let mut entries: Vec<AuditEntry> = client.json(&key::history(&unit), &parameters, None).await?;
     if entries.is_empty() {
-        let (statuses, services) = (client.statuses().await?, or_none(client.services().await)?);
+        let (statuses, instances) = (client.statuses().await?, or_none(client.pairs().await)?);
         if !statuses.iter().any(|status| status.unit == unit.as_str()) {
-            return Err(ConsoleError::unlisted(unit.as_str(), client.tried(), &statuses, &services));
+            return Err(ConsoleError::unlisted(unit.as_str(), client.tried(), &statuses, &instances));
         }
     }
     client.close().await;
     entries.sort_by_key(|entry| std::cmp::Reverse(entry.number));
-    entries.retain(|entry| args.all || matches!(entry.event, AuditEvent::Accepted(_)));
+    entries.retain(|entry| args.all || is_of_calibrations(&entry.event));
     entries.truncate(args.limit as usize);
     let text = if args.json {
         isotherm_cli::json(&entries)
@@ -81,6 +81,11 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
         table(&entries)
     };
     Ok(print(&text, Exit::Ok))
+}
+
+/// Whether it says which calibration holds: one that never came in force is not to be taken for one that did.
+fn is_of_calibrations(event: &AuditEvent) -> bool {
+    matches!(event, AuditEvent::Accepted(_) | AuditEvent::Withdrawn(_))
 }
 
 /// The entries, each with a line of its own for what changed; the JSON has them whole.
@@ -190,8 +195,16 @@ mod tests {
             serde_json::from_value(json).unwrap()
         };
         let change = "gyro.sensor[0].static_bias.coefficients_deg_per_h[0]: 0.45 -> 0.41 (-0.04, -8.889 %)";
-        let entries =
-            [accepted(12_345, "/home/ann/bench/units/ZLG-0001.toml", change), accepted(1, "/u.toml", "x")];
+        let withdrawn = serde_json::json!({
+            "number": 12_346, "time": "2026-11-21T13:41:00Z", "unit": "ZLG-0001", "event": "withdrawn",
+            "revision": 12_345, "why": "superseded", "by_revision": 12_347,
+        });
+        let entries = [
+            serde_json::from_value(withdrawn).unwrap(),
+            accepted(12_345, "/home/ann/bench/units/ZLG-0001.toml", change),
+            accepted(1, "/u.toml", "x"),
+        ];
+        assert!(entries.iter().all(|entry| is_of_calibrations(&entry.event)));
         let text = table(&entries);
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
         insta::assert_snapshot!(text);

@@ -29,7 +29,7 @@ use ratatui::text::Line;
 
 pub use figure::fit;
 pub(crate) use figure::{deg_per_h, of, short};
-pub use pairs::{of_unit, pairs, said as said_of_pairs};
+pub use pairs::{name, pairs, said as said_of_pairs};
 pub(crate) use remark::schedule;
 pub use remark::{Level, Remark, is_running, knows_rates, state_word};
 pub use services::{services, tally};
@@ -117,12 +117,12 @@ impl Lately {
 /// Services, instances, and units, a line each.
 #[must_use]
 pub fn overview(
-    (services, gone): (&[ServiceStatus], &[String]),
+    services: (&[ServiceStatus], &[String]),
     instances: &[PairReport],
     units: &[Unit<'_>],
     columns: usize,
 ) -> Vec<Line<'static>> {
-    let mut lines = self::services(services, gone, columns);
+    let mut lines = self::services(services, instances, columns);
     lines.extend(pairs(instances, columns));
     lines.push(tally(units, columns));
     if !units.is_empty() {

@@ -111,7 +111,7 @@ fn select(report: &mut Report, serials: &[String], tried: &str) -> Result<(), Co
     }
     let known = |serial: &&String| report.units.iter().any(|status| status.unit == **serial);
     if let Some(unknown) = serials.iter().find(|serial| !known(serial)) {
-        return Err(ConsoleError::unlisted(unknown, tried, &report.units, &report.services));
+        return Err(ConsoleError::unlisted(unknown, tried, &report.units, &report.instances));
     }
     report.units.retain(|status| serials.contains(&status.unit));
     report.services.retain(|service| report.units.iter().any(|status| status.instance == service.instance));
@@ -153,8 +153,7 @@ fn pages(report: &Report, columns: usize) -> Vec<Line<'static>> {
             lines.push(Line::default());
         }
         let (unit, service) = unit(report, status);
-        lines.extend(page::sheet(&unit, service, columns));
-        lines.extend(page::of_unit(&report.instances, &status.unit));
+        lines.extend(page::sheet(&unit, service, &report.instances, columns));
     }
     lines
 }
@@ -174,6 +173,8 @@ fn has_colours() -> bool {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_protocol::pair::Role;
+
     use super::page::tests::samples;
     use super::*;
 
@@ -182,15 +183,20 @@ mod tests {
         let units = samples::fleet(8);
         let other = ServiceStatus { instance: "other".to_owned(), ..ServiceStatus::default() };
         let services = vec![samples::service(&units), other];
-        let mut report = Report { services, units, instances: Vec::new() };
+        let instances =
+            ["ZLG-0002", "ZLG-0004"].map(|unit| samples::instance("south", &[(unit, Role::Standby)]));
+        let alone = PairReport { others: Vec::new(), ..instances[0].clone() };
+        let mut report = Report { services, units, instances: vec![alone, instances[1].clone()] };
         let serial = |serial: &str| [serial.to_owned()];
         let refused = |report: &mut Report, unit| {
             let error = select(report, &serial(unit), "here").unwrap_err().to_string();
-            report.units.retain(|status| status.unit != "ZLG-0002");
+            report.units.retain(|status| !["ZLG-0002", "ZLG-0004"].contains(&&*status.unit));
             error
         };
-        // The second of them its service has.
-        insta::assert_snapshot!(["ZLG-9999", "ZLG-0002"].map(|unit| refused(&mut report, unit)).join("\n"));
+        // The second of them its service has, the third another one.
+        insta::assert_snapshot!(
+            ["ZLG-9999", "ZLG-0002", "ZLG-0004"].map(|unit| refused(&mut report, unit)).join("\n")
+        );
         select(&mut report, &serial("ZLG-0003"), "here").unwrap();
         assert_eq!((report.units.len(), report.services.len()), (1, 1));
         assert_eq!(report.units[0].unit, "ZLG-0003");

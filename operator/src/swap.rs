@@ -4,7 +4,7 @@ use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 
 use clap::Args;
-use isotherm_cli::{Exit, failed, print, say, say_lines};
+use isotherm_cli::{Exit, failed, print, say, say_lines, say_warning};
 use isotherm_protocol::control::{CommandOrder, Order, Schedule, SwapOptions, SwapOutcome, SwapReply};
 use isotherm_protocol::key::{self, UnitId};
 
@@ -189,7 +189,7 @@ fn tell(reply: &SwapReply, sent: Option<(&str, &str)>) {
         say(show::problem(problem, sent));
     }
     for warning in &reply.warnings {
-        say(format_args!("{} (warning)", show::problem(warning, sent)));
+        say_warning(show::problem(warning, sent));
     }
 }
 

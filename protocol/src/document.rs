@@ -42,7 +42,7 @@ use isotherm_document::{Form, Reader, file, published, unplaced};
 use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
-pub use correction_change::{Side, correction_change};
+pub use correction_change::{Side, correction_change, turn_rad};
 pub use curve::{Curve, Shape};
 pub use difference::{difference, lost_sections};
 pub use measure::{Argument, BaseUnit, Unit};
@@ -76,6 +76,15 @@ static FORM: LazyLock<Form> =
 #[must_use]
 pub fn schema() -> Json {
     published::<Document>()
+}
+
+/// A problem with what stands at a key of a document's text, or around it; with the text as a whole where it has nothing of it.
+#[must_use]
+pub fn problem_at(text: &str, file: &str, key: &str, message: String) -> Problem {
+    let mut reader = Reader::new(text, Some(file));
+    // For the places alone.
+    let _ = reader.read::<Document>(&FORM);
+    reader.warning(key, message)
 }
 
 /// A document that holds, and what was made of it.

@@ -67,6 +67,13 @@ pub fn is_overlay(text: &str) -> bool {
     text.len() <= MAX_DOCUMENT_BYTES && parse_toml(text).0.get_ref().contains_key(OVERLAY_OF)
 }
 
+/// The document that a text lies on, where it is an overlay.
+#[must_use]
+pub fn base_of(bytes: &[u8]) -> Option<Digest> {
+    let text = std::str::from_utf8(bytes).ok().filter(|text| is_overlay(text))?;
+    Overlay::parse(text, None).ok()?.overlay.overlay_of.parse().ok()
+}
+
 impl Overlay {
     /// Reads an overlay; `file` is the name that its problems are to carry.
     ///

@@ -145,6 +145,28 @@ pub struct PairReport {
     /// Units whose messages it has heard in the last ten seconds and does not take.
     #[serde(default)]
     pub passed_over: Vec<String>,
+    /// Names of the other instances of its pair that are there.
+    #[serde(default)]
+    pub others: Vec<String>,
+    /// Where they are, as far as it is configured.
+    #[serde(default)]
+    pub addresses: Vec<String>,
+}
+
+impl PairReport {
+    /// What it does for a unit; `None` where it has not heard it.
+    #[must_use]
+    pub fn role(&self, unit: &str) -> Option<Role> {
+        self.units.iter().find(|other| other.unit == unit).map(|other| other.role)
+    }
+
+    /// The other instances of its pair, and where they are: "north at tcp/10.0.0.1:7447"; `None` where none is there.
+    #[must_use]
+    pub fn elsewhere(&self) -> Option<String> {
+        let (others, addresses) = (self.others.join(" or "), self.addresses.join(" or "));
+        let at = if addresses.is_empty() { addresses } else { format!(" at {addresses}") };
+        (!others.is_empty()).then(|| others + &at)
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod units;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use isotherm_bus::inquiry::pair_reports;
 use isotherm_bus::presence::ServiceWatch;
 use isotherm_bus::{BusError, ClientOptions, Role};
 use isotherm_log::faults::FaultOptions;
@@ -141,7 +142,12 @@ pub async fn play(
             () = stop.asked() => Err(Error::Stopped),
             ended = run(&opened, &tried, options, &mut player, watch) => ended,
         };
-        Played { report: player.report(ended.is_err()), log: player.log_report(), ended }
+        let mut report = player.report(ended.is_err());
+        if report.units.iter().any(UnitReport::is_mixed) {
+            let instances = pair_reports(&opened, options.wait).await.unwrap_or_default();
+            report.units.iter_mut().for_each(|unit| unit.note_instances(&instances));
+        }
+        Played { report, log: player.log_report(), ended }
     };
     let closed = isotherm_bus::close(opened, CLOSE_LIMIT).await;
     // Where playing has failed, that is what counts.

@@ -4,16 +4,17 @@ mod kinds;
 mod rivals;
 mod signer;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use isotherm_cli::{Exit, print, say};
+use isotherm_cli::{Exit, print, say, say_warning};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
 use serde::Serialize;
 
 pub use signer::Signer;
 
+use crate::control::watch::files_in;
 use crate::signing::read_trusted_keys;
 
 /// Arguments of `check`.
@@ -21,7 +22,7 @@ use crate::signing::read_trusted_keys;
 #[command(after_help = "\
 Examples:
   isotherm check config/service.toml config/zenoh/*.json5
-  isotherm check config/calibration/*.toml
+  isotherm check config/calibration
   isotherm check --json --kind calibration new.toml
   isotherm check --trusted-keys keys units/*.toml
   isotherm check state/overlays/*.toml
@@ -31,7 +32,7 @@ A calibration document need not be signed, but a wrong signature makes it bad.
 An overlay is checked by itself; a swap checks whether it fits its document.
 Exit codes: 0 all good, 78 a file is bad, 1 a file cannot be read (and none is bad).")]
 pub struct CheckArgs {
-    /// Files to validate
+    /// Files to validate, or folders: every *.toml in them, as a service takes it
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Kind of the files (default: by extension and content)
@@ -80,6 +81,12 @@ pub struct Finding {
     pub summary: Option<Summary>,
 }
 
+impl Finding {
+    fn unreadable(path: &Path, words: String) -> Self {
+        Self { file: path.display().to_string(), unreadable: Some(words), ..Self::default() }
+    }
+}
+
 /// What a good file holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Summary {
@@ -109,7 +116,11 @@ pub fn run(args: &CheckArgs) -> Exit {
     say_problems(&[], trusted.as_ref().map_or(&[][..], |(_, warnings)| warnings));
     let trusted = trusted.as_ref().map(|(trusted, _)| trusted);
     let check = |file: &PathBuf| kinds::check_file(file, args.kind, trusted);
-    let mut findings: Vec<_> = args.files.iter().map(check).collect();
+    let check_all = |path: &PathBuf| match files_of(path) {
+        Ok(files) => files.iter().map(check).collect(),
+        Err(words) => vec![Finding::unreadable(path, words)],
+    };
+    let mut findings: Vec<_> = args.files.iter().flat_map(check_all).collect();
     rivals::refuse(&mut findings);
     let text = if args.json {
         let good = findings.iter().all(|finding| finding.good);
@@ -118,6 +129,15 @@ pub fn run(args: &CheckArgs) -> Exit {
         findings.iter().map(in_words).collect()
     };
     print(&text, verdict(&findings))
+}
+
+/// The documents of a folder; a file by itself.
+fn files_of(path: &Path) -> Result<Vec<PathBuf>, String> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let files = files_in(path, "toml").map_err(|error| error.to_string())?;
+    if files.is_empty() { Err("the folder has no documents (*.toml)".to_owned()) } else { Ok(files) }
 }
 
 /// Problems to stderr; the line for stdout, where the file is good.
@@ -135,9 +155,7 @@ fn in_words(finding: &Finding) -> String {
 /// What is wrong and what is doubtful, on stderr.
 pub(crate) fn say_problems(problems: &[Problem], warnings: &[Problem]) {
     problems.iter().for_each(say);
-    for warning in warnings {
-        say(format_args!("{warning} (warning)"));
-    }
+    warnings.iter().for_each(say_warning);
 }
 
 fn verdict(findings: &[Finding]) -> Exit {

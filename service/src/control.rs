@@ -17,7 +17,7 @@
 //! | `start` | what holds when the service starts |
 //! | `command`, `pre_launch` | commands, rollback among them; the result of a pre-launch calibration |
 //! | `carry` | what another instance has written down, written down here too |
-//! | `unlikely` | what a document changes too much to be meant |
+//! | `jump`, `unlikely` | what a document changes too much, by configuration and in any case |
 //! | `refusals` | refused documents, written down once |
 //! | `control_status` | what the service's own status shows |
 //! | [`compressed`] | texts that are kept for long and read seldom |
@@ -31,6 +31,7 @@ mod decision;
 pub mod document;
 mod file;
 mod folder;
+mod jump;
 mod manager;
 mod pre_launch;
 mod queue;

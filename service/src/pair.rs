@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
+use isotherm_bus::endpoint::address;
 use isotherm_operator::status::unix_ms;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
@@ -48,6 +49,8 @@ pub(crate) struct Pair {
     me: Member,
     takeover: Duration,
     takes: Vec<String>,
+    /// Where others are, as configured, without what may be secret.
+    addresses: Vec<String>,
     others: RwLock<BTreeMap<String, Member>>,
     /// Whether another instance is meant to be there.
     is_meant: bool,
@@ -82,13 +85,18 @@ impl Pair {
         started_unix_ms: i64,
         others: Vec<Member>,
     ) -> Self {
-        let PairSettings { name, mode, priority, takeover, .. } = settings.pair.clone();
+        let PairSettings { name, mode, priority, takeover, other, .. } = settings.pair.clone();
         let name = name.unwrap_or_else(|| instance.chars().take(8).collect());
         let me = Member { instance, name, mode, priority, started_unix_ms, group: group(settings) };
         Self {
             me,
             takeover,
             takes: settings.units.clone(),
+            addresses: other
+                .into_iter()
+                .chain(settings.zenoh.session.connects_to().unwrap_or_default())
+                .map(|endpoint| address(&endpoint).to_owned())
+                .collect(),
             is_meant: settings.pair.is_meant(),
             opening: AtomicBool::new(!others.is_empty()),
             accompanied: AtomicBool::new(!others.is_empty()),
@@ -271,6 +279,8 @@ impl Pair {
             takes: self.takes.clone(),
             units: intake.each_unit(|actor| actor.role()),
             passed_over: passed_over.keys().cloned().collect(),
+            others: self.others().into_iter().map(|other| other.name).collect(),
+            addresses: self.addresses.clone(),
         }
     }
 }

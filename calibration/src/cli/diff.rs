@@ -11,6 +11,7 @@ use crate::document::Written;
 use crate::document::diff::series::Series;
 use crate::error::Error;
 use crate::limits::above_0;
+use crate::report::Report;
 
 /// Compare calibration documents in order of time, such as those before, between and after shock and vibration
 #[derive(Debug, Args)]
@@ -18,7 +19,7 @@ use crate::limits::above_0;
     isotherm-calibrate diff before.toml after.toml --html shock.html\n  \
     isotherm-calibrate diff before.toml after.toml --axis-sigma 12\n  \
     isotherm-calibrate diff before.toml between.toml after.toml\n\n\
-    Shows axes in ″ with their uncertainty, biases and scale factors over temperature, then every entry that differs. The exit code is 0 whether they differ or not.")]
+    Shows by how much each sensor's axis, bias and scale factor have changed at most; --all also where, and every entry that differs. The exit code is 0 whether they differ or not.")]
 pub(super) struct DiffArgs {
     /// The earlier document
     #[arg(value_name = "A")]
@@ -29,6 +30,9 @@ pub(super) struct DiffArgs {
     /// Standard error of a direction cosine (″), for a document that states none
     #[arg(long, value_name = "ARCSEC", value_parser = above_0)]
     axis_sigma: Option<f64>,
+    /// Print every change of two documents
+    #[arg(long)]
+    all: bool,
     #[command(flatten)]
     page: PageArgs,
 }
@@ -48,10 +52,10 @@ impl DiffArgs {
             }
         }
         let series = Series::of(&documents, self.axis_sigma)?;
-        let sheet = match series.steps.as_slice() {
-            [only] => only.sheet(),
-            _ => series.sheet(),
-        };
-        close(&files, &sheet)
+        match series.steps.as_slice() {
+            [only] if self.all || only.entries.is_empty() => close(&files, &only.sheet(), Report::whole_text),
+            [only] => close(&files, &only.sheet(), |_| only.in_brief()),
+            _ => close(&files, &series.sheet(), Report::whole_text),
+        }
     }
 }

@@ -155,10 +155,14 @@ pub(super) fn emit(
     print(if as_json { format!("{}\n", json()) } else { text() }.as_bytes())
 }
 
-/// What is said of documents: page, and all tables or JSON.
-pub(super) fn close(files: &Files<'_>, report: &Report) -> Result<(), Error> {
+/// What is said of documents: page, and text or JSON.
+pub(super) fn close(
+    files: &Files<'_>,
+    report: &Report,
+    text: impl FnOnce(&Report) -> String,
+) -> Result<(), Error> {
     files.page(Path::to_path_buf, || report.to_html())?;
-    emit(files.json, || report.to_json(), || report.whole_text())
+    emit(files.json, || report.to_json(), || text(report))
 }
 
 /// Writes to standard output; a reader that has gone away is no error.

@@ -11,11 +11,12 @@ use super::output::{a_date, date};
 use crate::document::merge::{Merged, Take, merge};
 use crate::document::{Written, name_of};
 use crate::error::Error;
+use crate::report::Report;
 
 /// Put parts of a calibration that different commands have made into one document
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    isotherm-calibrate merge nominal.toml thermal.toml positions.toml --out unit.toml\n  \
+    isotherm-calibrate merge nominal.toml positions.toml rates.toml --out unit.toml\n  \
     isotherm-calibrate merge nominal.toml a.toml b.toml --take gyro.sensor.x=b.toml --out unit.toml\n\n\
     Each part is compared with BASE, the document that the fits started from; its differences are taken. If two parts state a key differently, the key is reported, and nothing is written until --take decides.")]
 pub(super) struct MergeArgs {
@@ -56,7 +57,7 @@ impl MergeArgs {
         merged.written = Written::of(&document)?;
         merged.written.save(&self.out, self.overwrite)?;
         let name = name_of(&self.out);
-        close(&files, &merged.sheet(&name))
+        close(&files, &merged.sheet(&name), Report::whole_text)
     }
 }
 

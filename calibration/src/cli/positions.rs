@@ -25,6 +25,7 @@ use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
 use crate::limits::{above_0, from_0};
 use crate::numbers::ARCSEC_PER_RAD;
+use crate::report::Report;
 use crate::runs::{Run, Watch};
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
@@ -103,7 +104,7 @@ impl PositionsArgs {
             ..self.planned.clone()
         };
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
-        close(&self.output.files(), &budget.report(plan, levelling_rad))
+        close(&self.output.files(), &budget.report(plan, levelling_rad), Report::whole_text)
     }
 
     fn settings(&self, plan: Plan) -> Result<(Settings, Option<String>), Error> {

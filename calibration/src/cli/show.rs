@@ -9,6 +9,7 @@ use super::files::PageArgs;
 use crate::document::Written;
 use crate::document::show::show;
 use crate::error::Error;
+use crate::report::Report;
 
 /// Show a calibration document in words, as tables and as curves
 #[derive(Debug, Args)]
@@ -28,6 +29,6 @@ impl ShowArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         let files = self.page.files();
         files.check(&[&self.document])?;
-        close(&files, &show(&Written::read(&self.document)?)?)
+        close(&files, &show(&Written::read(&self.document)?)?, Report::whole_text)
     }
 }

@@ -12,8 +12,7 @@ mod tests;
 use isotherm_correction::calibration::Steady;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 use isotherm_protocol::control::DocumentChange;
-use isotherm_protocol::document::difference;
-use nalgebra::Vector3;
+use isotherm_protocol::document::{difference, turn_rad};
 use serde::Serialize;
 
 use crate::document::Written;
@@ -256,6 +255,5 @@ fn ppm([before, after]: [f64; 2]) -> f64 {
 
 /// Angle between two axes (″).
 fn angle(old: [f64; 3], new: [f64; 3]) -> f64 {
-    let [old, new] = [old, new].map(Vector3::from);
-    Angle::from_rad(libm::atan2(old.cross(&new).norm(), old.dot(&new))).as_arcsec()
+    Angle::from_rad(turn_rad(old, new)).as_arcsec()
 }

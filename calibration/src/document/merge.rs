@@ -195,6 +195,7 @@ fn covers(choice: &str, key: &str) -> bool {
     key.strip_prefix(choice).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
+/// What is in the way. Of two curves over temperature, made each as a whole, none adds to the other.
 fn conflict(key: &str, said: &[(&str, &Option<Value>)], chosen: Option<&Take>) -> String {
     let named = |(name, value): &(&str, &Option<Value>)| {
         if value.is_some() { (*name).to_owned() } else { format!("{name} (does without it)") }
@@ -204,7 +205,12 @@ fn conflict(key: &str, said: &[(&str, &Option<Value>)], chosen: Option<&Take>) -
         return format!("{key}: --take names {}, but only {parts} changed it", take.from);
     }
     let first = said.first().map_or("", |(name, _)| name);
-    format!("{key}: made differently by {parts}; choose with --take {key}={first}")
+    let again = if [" bias", " output"].iter().any(|curves| group(key).ends_with(curves)) {
+        "repeat the fit over temperature from the other document (--calibration) and leave that one out here, or "
+    } else {
+        ""
+    };
+    format!("{key}: made differently by {parts}; {again}choose with --take {key}={first}")
 }
 
 impl Merged {

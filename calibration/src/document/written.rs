@@ -12,8 +12,6 @@ use crate::error::Error;
 
 /// Line that lets editors check a document.
 const SCHEMA_LINE: &str = "#:schema ../calibration.schema.json\n\n";
-/// Digits that coefficients are written with: no conversion of units shows in them, and no fit is as good.
-const DIGITS: usize = 12;
 
 /// A document beside its text and the calibration that the service makes of it.
 #[derive(Debug, Clone)]
@@ -86,11 +84,6 @@ impl Written {
     pub fn save(&self, path: &Path, overwrite: bool) -> Result<(), Error> {
         write_file(path, self.text.as_bytes(), overwrite)
     }
-}
-
-/// A number as documents state it: without the dust of unit conversions, in twelve digits.
-pub fn tidy(value: f64) -> f64 {
-    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
 /// Writes a file; one that is there only where that is allowed.

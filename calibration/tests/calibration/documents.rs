@@ -7,7 +7,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Curve, Document, Measure, Origin, Residual, Sample, Shape};
 use serde_json::Value;
 
-use crate::command::{calibrate, json, shipped, told};
+use crate::command::{calibrate, json, shipped, succeeds, told};
 
 fn save(path: &str, change: impl FnOnce(&mut Document)) {
     let mut document = Written::read(&shipped("MEMS-0001.toml")).unwrap().document;
@@ -82,6 +82,10 @@ fn diff_tells_what_has_changed() {
     let verdict = changes["verdict"].as_str().unwrap();
     assert!(std::fs::read_to_string(&html).unwrap().contains("gyro x bias"));
     insta::assert_snapshot!(format!("{verdict}\n{}", told(files.path(), &["diff", &before, &before])));
+    let [brief, all] =
+        [&[][..], &["--all"]].map(|all| succeeds(&[&["diff", &before, &after][..], all].concat()));
+    let moved = "accel.orientation.rows[2]";
+    assert!(brief.lines().count() < 20 && !brief.contains(moved) && all.contains(moved), "{brief}\n{all}");
     assert_eq!(calibrate(&["diff", &before, &after, "--axis-sigma", "-1"]).status.code(), Some(2));
 }
 

@@ -91,7 +91,7 @@ pub enum OrientationError {
         tolerance: f64,
     },
     /// The axes are too close to one plane.
-    #[error("condition number {got} at {temperature_deg_c} °C; at most {limit} is allowed")]
+    #[error("condition number {got:.1} at {temperature_deg_c:.1} °C; at most {limit} is allowed")]
     Condition {
         /// Temperature of the offending matrix (°C): the reference or an end of the range.
         temperature_deg_c: f64,
@@ -102,7 +102,7 @@ pub enum OrientationError {
     },
     /// The axes come too close to one plane at a temperature within the range.
     #[error(
-        "C(T) has condition number {got} at {temperature_deg_c} °C, within range_deg_c; at most {limit} is allowed: check sign and \
+        "C(T) has condition number {got:.1} at {temperature_deg_c:.1} °C, within range_deg_c; at most {limit} is allowed: check sign and \
          unit of the slopes, or narrow range_deg_c"
     )]
     ConditionInside {

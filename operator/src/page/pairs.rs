@@ -8,10 +8,19 @@ use ratatui::text::{Line, Span};
 use super::figure::{fit, of};
 use super::{Level, tone};
 
+/// Characters of an instance without a name that are shown: enough to tell two of them apart.
+const INSTANCE: usize = 8;
 /// Differences of an instance that are told.
 const NAMED: usize = 8;
 
-/// The lines of all instances; none of one alone that takes every unit.
+/// What an instance calls itself; where that is not known, the head of its id, as it does without a name.
+#[must_use]
+pub fn name(reports: &[PairReport], instance: &str) -> String {
+    let known = reports.iter().find(|report| report.member.instance == instance);
+    known.map_or_else(|| instance.chars().take(INSTANCE).collect(), |report| report.member.name.clone())
+}
+
+/// The lines of all instances; none of one alone that takes and publishes every unit.
 #[must_use]
 pub fn pairs(reports: &[PairReport], width: usize) -> Vec<Line<'static>> {
     let line = |(level, columns): (Level, Vec<String>)| {
@@ -29,16 +38,17 @@ pub fn pairs(reports: &[PairReport], width: usize) -> Vec<Line<'static>> {
 #[must_use]
 pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
     let mut said = Vec::new();
-    if reports.len() > 1 {
+    let listens = |report: &PairReport| report.units.iter().any(|unit| unit.role != Role::Speaking);
+    if reports.len() > 1 || reports.iter().any(listens) {
         for report in reports {
-            said.push((Level::Fine, instance(report)));
+            said.push((Level::Fine, instance(report, reports.len())));
             let differences = report.units.iter().filter_map(|unit| unit.last_difference.as_deref());
             said.extend(differences.take(NAMED).map(|difference| {
                 (Level::Fault, vec![format!("{}: bits differ: {difference}", report.member.name)])
             }));
         }
         let twice = named(reports, |report, unit| {
-            let speaks = |other: &PairReport| role(other, unit) == Some(Role::Speaking);
+            let speaks = |other: &PairReport| other.role(unit) == Some(Role::Speaking);
             speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
         });
         if !twice.is_empty() {
@@ -46,7 +56,7 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
         }
     }
     let mut nobody: Vec<String> = reports.iter().flat_map(|report| report.passed_over.clone()).collect();
-    nobody.retain(|serial| reports.iter().all(|report| role(report, serial).is_none()));
+    nobody.retain(|serial| reports.iter().all(|report| report.role(serial).is_none()));
     nobody.sort_unstable();
     nobody.dedup();
     if !nobody.is_empty() {
@@ -55,14 +65,15 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
     said
 }
 
-/// "north", "publishes 20 units, standby for 3, joining for 1", "standby", "priority 1", "takeovers 2", "40 000 ticks compared, 0 differ".
-fn instance(report: &PairReport) -> Vec<String> {
+/// "north", "publishes 20 units, standby for 3, joining for 1", "standby", "priority 1", "takeovers 2", "40 000 ticks compared, 0 differ"; of
+/// one alone also whose standby it is.
+fn instance(report: &PairReport, of_how_many: usize) -> Vec<String> {
     let count = |role| report.units.iter().filter(|unit| unit.role == role).count();
     let sum = |number: fn(&UnitRole) -> u64| grouped(report.units.iter().map(number).sum());
     let member = &report.member;
     let silent = [Role::Standby, Role::Joining].into_iter().filter(|role| count(*role) > 0);
     let silent: Vec<_> = silent.map(|role| format!(", {} for {}", role.name(), count(role))).collect();
-    vec![
+    let mut columns = vec![
         member.name.clone(),
         format!("publishes {}{}", of(count(Role::Speaking), "unit"), silent.concat()),
         member.mode.name().to_owned(),
@@ -73,21 +84,20 @@ fn instance(report: &PairReport) -> Vec<String> {
             sum(|unit| unit.ticks_compared),
             sum(|unit| unit.ticks_differing)
         ),
-    ]
+    ];
+    let elsewhere = report.elsewhere().filter(|_| of_how_many == 1);
+    columns.extend(elsewhere.map(|elsewhere| format!("the other is {elsewhere}")));
+    columns
 }
 
 /// Who does what for one unit: "north speaks, south standby"; nothing where there is one instance.
 #[must_use]
-pub fn of_unit(reports: &[PairReport], serial: &str) -> Option<Line<'static>> {
+pub(super) fn of_unit(reports: &[PairReport], serial: &str) -> Option<Line<'static>> {
     let roles: Vec<_> = reports
         .iter()
-        .filter_map(|report| Some(format!("{} {}", report.member.name, role(report, serial)?.name())))
+        .filter_map(|report| Some(format!("{} {}", report.member.name, report.role(serial)?.name())))
         .collect();
     (reports.len() > 1).then(|| Line::from(format!("instances  {}", roles.join(", "))))
-}
-
-fn role(report: &PairReport, serial: &str) -> Option<Role> {
-    report.units.iter().find(|unit| unit.unit == serial).map(|unit| unit.role)
 }
 
 fn named(reports: &[PairReport], is: impl Fn(&PairReport, &str) -> bool) -> Vec<String> {
@@ -101,30 +111,8 @@ fn named(reports: &[PairReport], is: impl Fn(&PairReport, &str) -> bool) -> Vec<
 
 #[cfg(test)]
 mod tests {
-    use isotherm_protocol::pair::{Member, Mode};
-
+    use super::super::tests::samples::instance as report;
     use super::*;
-
-    fn report(name: &str, units: &[(&str, Role)], passed_over: &[&str]) -> PairReport {
-        let unit = |(unit, role): &(&str, Role)| UnitRole {
-            unit: (*unit).to_owned(),
-            role: *role,
-            ticks_compared: 1000,
-            ticks_differing: 0,
-            takeovers: 1,
-            last_difference: None,
-        };
-        let member = Member {
-            instance: name.to_owned(),
-            name: name.to_owned(),
-            mode: Mode::Standby,
-            priority: 1,
-            started_unix_ms: 0,
-            group: String::new(),
-        };
-        let passed_over = passed_over.iter().map(|unit| (*unit).to_owned()).collect();
-        PairReport { member, takes: Vec::new(), units: units.iter().map(unit).collect(), passed_over }
-    }
 
     fn text(reports: &[PairReport]) -> String {
         tone::text(&pairs(reports, 200), false)
@@ -132,20 +120,23 @@ mod tests {
 
     #[test]
     fn who_speaks_is_seen_and_one_instance_alone_says_nothing() {
-        assert_eq!(text(&[report("north", &[("A", Role::Speaking)], &[])]), "");
+        assert_eq!(text(&[report("north", &[("A", Role::Speaking)])]), "");
         let pair = [
-            report("north", &[("A", Role::Speaking), ("B", Role::Standby)], &[]),
-            report("south", &[("A", Role::Joining), ("B", Role::Speaking)], &[]),
+            report("north", &[("A", Role::Speaking), ("B", Role::Standby)]),
+            report("south", &[("A", Role::Joining), ("B", Role::Speaking)]),
         ];
-        insta::assert_snapshot!(format!("{}{}", text(&pair), of_unit(&pair, "A").unwrap()));
+        let alone = text(&pair[1..]);
+        insta::assert_snapshot!(format!("{}{}\n{alone}", text(&pair), of_unit(&pair, "A").unwrap()));
     }
 
     #[test]
     fn two_that_speak_and_units_of_nobody_are_told() {
-        let pair = [
-            report("north", &[("A", Role::Speaking)], &["B", "C"]),
-            report("south", &[("A", Role::Speaking), ("B", Role::Speaking)], &["C"]),
+        let mut pair = [
+            report("north", &[("A", Role::Speaking)]),
+            report("south", &[("A", Role::Speaking), ("B", Role::Speaking)]),
         ];
+        pair[0].passed_over = ["B", "C"].map(str::to_owned).to_vec();
+        pair[1].passed_over = vec!["C".to_owned()];
         insta::assert_snapshot!(text(&pair));
     }
 }

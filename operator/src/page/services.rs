@@ -1,26 +1,30 @@
 //! One line a service instance, and how many units are in which state.
 
 use isotherm_cli::grouped;
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::{FolderState, ServiceStatus};
 use isotherm_protocol::status::State;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::figure::{fit, of, since, width};
+use super::pairs::name;
 use super::remark::Level;
 use super::{Unit, state_word, tone};
 
 /// Bad documents that are named; more of them are counted.
 const NAMED: usize = 3;
-/// Characters of an instance that are shown: enough to tell two of them apart.
-const INSTANCE: usize = 8;
 
 /// The lines of all instances; `gone` says of which nobody answers any more.
 #[must_use]
-pub fn services(services: &[ServiceStatus], gone: &[String], columns: usize) -> Vec<Line<'static>> {
+pub fn services(
+    (services, gone): (&[ServiceStatus], &[String]),
+    instances: &[PairReport],
+    columns: usize,
+) -> Vec<Line<'static>> {
     let lines = services.iter().flat_map(|service| {
         let is_gone = gone.contains(&service.instance);
-        let mut lines = vec![line(service, is_gone, columns)];
+        let mut lines = vec![line(service, &name(instances, &service.instance), is_gone, columns)];
         if !is_gone {
             lines.extend(troubles(service, columns));
         }
@@ -30,13 +34,12 @@ pub fn services(services: &[ServiceStatus], gone: &[String], columns: usize) -> 
 }
 
 /// One instance: what does not fit is left out, the least important first.
-fn line(service: &ServiceStatus, gone: bool, columns: usize) -> Line<'static> {
-    let instance: String = service.instance.chars().take(INSTANCE).collect();
+fn line(service: &ServiceStatus, name: &str, gone: bool, columns: usize) -> Line<'static> {
     let uptime = std::time::Duration::try_from_secs_f64(service.uptime_s.max(0.0)).unwrap_or_default();
     let uptime = if gone { "gone".to_owned() } else { format!("up {}", since(uptime)) };
     // With the weight of each: the larger, the sooner it is left out.
     let mut parts = vec![
-        (0, format!("service {instance}")),
+        (0, format!("service {name}")),
         (2, format!("version {}", service.version)),
         (0, uptime),
         (1, of(service.units.len(), "unit")),

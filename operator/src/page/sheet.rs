@@ -7,6 +7,7 @@ mod sensors;
 mod temperatures;
 mod work;
 
+use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{SensorKind, SensorStatus, Status};
 use ratatui::layout::{Constraint, Layout};
@@ -16,6 +17,7 @@ use ratatui::widgets::{Paragraph, Widget};
 
 use super::figure::{fit, frequency, width, wrap};
 use super::grid::{Column, Grid, drawn};
+use super::pairs::{name, of_unit};
 use super::remark::{Level, knows_rates};
 use super::{Unit, tone};
 
@@ -79,15 +81,21 @@ pub(super) fn sensor_name(sensor: &SensorStatus) -> String {
     if sensor.name.starts_with(kind) { sensor.name.clone() } else { format!("{kind} {}", sensor.name) }
 }
 
-/// The page of a unit in at most `columns` columns; `service` is the instance that it belongs to, where that is known.
-pub fn sheet(unit: &Unit<'_>, service: Option<&ServiceStatus>, columns: usize) -> Vec<Line<'static>> {
+/// The page of a unit in at most `columns` columns; `service` is the instance that it belongs to, where that is known; the last line says what
+/// all `instances` do for it.
+pub fn sheet(
+    unit: &Unit<'_>,
+    service: Option<&ServiceStatus>,
+    instances: &[PairReport],
+    columns: usize,
+) -> Vec<Line<'static>> {
     let two = columns >= TWO_COLUMNS;
     let of_one = if two { (columns - GUTTER) / 2 } else { columns.min(WIDEST) };
     let mut lines = title(unit, columns.min(WIDEST));
     let status = unit.status;
     let sections = [
         Some(calibration::section(status, of_one)),
-        Some(stream(status, service, of_one)),
+        Some(stream(status, service, &name(instances, &status.instance), of_one)),
         temperatures::section(unit, of_one),
         calibration::correction(status, of_one),
         sensors::sensors(status, of_one),
@@ -111,6 +119,7 @@ pub fn sheet(unit: &Unit<'_>, service: Option<&ServiceStatus>, columns: usize) -
     while lines.last().is_some_and(|line| line.width() == 0) {
         lines.pop();
     }
+    lines.extend(of_unit(instances, &status.unit));
     lines
 }
 
@@ -158,12 +167,12 @@ fn operation(status: &Status) -> &'static str {
 }
 
 /// Where it comes from, what comes in, how far it is.
-fn stream(status: &Status, service: Option<&ServiceStatus>, columns: usize) -> Section {
+fn stream(status: &Status, service: Option<&ServiceStatus>, name: &str, columns: usize) -> Section {
     let mut section = Section::new("Stream");
     let mut field = |name: &str, text: &str| section.field(name, text, tone::PLAIN, columns);
     let mut by = format!("version {}", status.version);
-    if !status.instance.is_empty() {
-        by = format!("{}, {by}", status.instance);
+    if !name.is_empty() {
+        by = format!("{name}, {by}");
     }
     if let Some(pid) = service.and_then(|service| service.pid) {
         by = format!("{by}, pid {pid}");

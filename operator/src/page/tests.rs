@@ -68,18 +68,18 @@ fn the_page_of_a_unit_has_every_section_and_fits() {
     status.self_test = Some(samples::self_test(false));
     let service = samples::service(std::slice::from_ref(&status));
     for columns in (20..200).step_by(9).chain(WIDTHS) {
-        let lines = sheet(&Unit::now(&status, NOW_UNIX_MS), Some(&service), columns);
+        let lines = sheet(&Unit::now(&status, NOW_UNIX_MS), Some(&service), &[], columns);
         // Section titles and the names of counters are not broken.
         let widest = lines.iter().map(Line::width).max().unwrap();
         assert!(columns < 60 || widest <= columns, "{widest} > {columns}\n{}", words(&lines));
     }
-    insta::assert_snapshot!(words(&sheet(&Unit::now(&status, NOW_UNIX_MS), Some(&service), 80)));
+    insta::assert_snapshot!(words(&sheet(&Unit::now(&status, NOW_UNIX_MS), Some(&service), &[], 80)));
 }
 
 #[test]
 fn what_a_unit_does_not_say_leaves_no_empty_section() {
     let status = Status { unit: "ZLG-0001".to_owned(), ..Status::default() };
-    insta::assert_snapshot!(words(&sheet(&Unit::now(&status, NOW_UNIX_MS), None, 80)));
+    insta::assert_snapshot!(words(&sheet(&Unit::now(&status, NOW_UNIX_MS), None, &[], 80)));
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn somebody_who_looks_on_sees_the_course_of_temperatures() {
         })
         .collect();
     let unit = Unit { past: &past, ..Unit::now(&status, NOW_UNIX_MS) };
-    insta::assert_snapshot!(words(&sheet(&unit, None, 80)));
+    insta::assert_snapshot!(words(&sheet(&unit, None, &[], 80)));
 }
 
 #[test]
@@ -102,11 +102,12 @@ fn a_service_stands_in_one_line_and_its_troubles_below_it() {
     let statuses = samples::fleet(8);
     let mut service = samples::service(&statuses);
     for columns in [10, 40, 80, 120, 160] {
-        let lines = services(std::slice::from_ref(&service), &[], columns);
+        let lines = services((std::slice::from_ref(&service), &[]), &[], columns);
         assert!(lines.iter().all(|line| line.width() <= columns), "{}", words(&lines));
     }
-    let text =
-        |service: &ServiceStatus, gone: &[String]| words(&services(std::slice::from_ref(service), gone, 160));
+    let text = |service: &ServiceStatus, gone: &[String]| {
+        words(&services((std::slice::from_ref(service), gone), &[], 160))
+    };
     let watched = text(&service, &[]);
     service.calibrations.as_mut().unwrap().state = isotherm_protocol::service_status::FolderState::Gone;
     let gone = text(&service, &[samples::INSTANCE.to_owned()]);
@@ -139,7 +140,7 @@ fn screens_of_status() {
         for count in [1, 8, 200] {
             let statuses = samples::fleet(count);
             let seen = now(&statuses);
-            let mut lines = services(&[samples::service(&statuses)], &[], columns);
+            let mut lines = services((&[samples::service(&statuses)], &[]), &[], columns);
             let grid = units(&seen, columns);
             lines.extend([tally(&seen, columns), Line::default()]);
             lines.extend(grid.lines());
@@ -153,7 +154,7 @@ fn screens_of_status() {
             let service = samples::service(std::slice::from_ref(&status));
             write(
                 format!("status-page-{name}-{columns}"),
-                &sheet(&Unit::now(&status, NOW_UNIX_MS), Some(&service), columns),
+                &sheet(&Unit::now(&status, NOW_UNIX_MS), Some(&service), &[], columns),
             );
         }
     }

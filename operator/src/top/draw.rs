@@ -45,8 +45,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, fleet: &Fleet, view: &mut View, now: I
     let place = match (view.shown, selected) {
         (Shown::Help, _) => scrolled(frame, middle, view, help::lines()),
         (Shown::Page, Some(unit)) => {
-            let mut lines = page::sheet(unit, fleet.service_of(unit.status), columns);
-            lines.extend(page::of_unit(&fleet.pairs, &unit.status.unit));
+            let lines = page::sheet(unit, fleet.service_of(unit.status), &fleet.pairs, columns);
             scrolled(frame, middle, view, lines)
         }
         // Nothing to show a page of: the filter, or the last unit's end, has left none.
@@ -63,7 +62,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, fleet: &Fleet, view: &mut View, now: I
 fn head(fleet: &Fleet, units: &[Unit<'_>], columns: usize, height: usize) -> Vec<Line<'static>> {
     let (services, gone) = fleet.services();
     let mut lines = page::pairs(&fleet.pairs, columns);
-    lines.extend(page::services(&services, &gone, columns));
+    lines.extend(page::services((&services, &gone), &fleet.pairs, columns));
     let most = (height / SERVICES_SHARE).max(1);
     if lines.len() > most {
         let more = lines.len() - most + 1;

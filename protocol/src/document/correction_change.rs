@@ -40,7 +40,7 @@ pub fn correction_change(
             continue;
         };
         let (before, after) = match (then, now) {
-            (Value::Axis(old), Value::Axis(new)) => (0.0, turned_arcsec(*old, new)),
+            (Value::Axis(old), Value::Axis(new)) => (0.0, Angle::from_rad(turn_rad(*old, new)).as_arcsec()),
             (Value::Number(old), Value::Number(new)) => (*old, new),
             _ => continue,
         };
@@ -108,11 +108,12 @@ fn milli_g(force: f64) -> f64 {
     SpecificForce::from_m_per_s2(force).as_g() * 1e3
 }
 
-/// Angle between two axes (″).
-fn turned_arcsec(old: [f64; 3], new: [f64; 3]) -> f64 {
+/// Angle between two axes (rad).
+#[must_use]
+pub fn turn_rad(old: [f64; 3], new: [f64; 3]) -> f64 {
     let [old_x, old_y, old_z] = old;
     let [new_x, new_y, new_z] = new;
     let cross = [old_y * new_z - old_z * new_y, old_z * new_x - old_x * new_z, old_x * new_y - old_y * new_x];
     let sine = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
-    Angle::from_rad(sine.atan2(old_x * new_x + old_y * new_y + old_z * new_z)).as_arcsec()
+    sine.atan2(old_x * new_x + old_y * new_y + old_z * new_z)
 }

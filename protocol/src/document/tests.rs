@@ -12,7 +12,7 @@ use isotherm_correction::curve::{Curve, CurveParts};
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 
-use super::{Document, Parsed, Problem};
+use super::{Document, Parsed, Problem, problem_at};
 
 /// The document that shows every key.
 pub(super) const FULL: &str = include_str!("../../../config/calibration/example-full.toml");
@@ -47,6 +47,19 @@ fn the_examples_hold_and_raise_no_warnings() {
         let parsed = accept(text);
         assert_eq!(listed(&parsed.warnings), "");
     }
+}
+
+#[test]
+fn a_problem_stands_at_its_key_or_at_what_is_around_it() {
+    let text =
+        "# unit = \"no\"\nschema = 1\n  unit   = \"A\"\n[gyro]\ncreated = 1\n[[gyro.sensor]]\nname = \"x\"\n";
+    let place = |key| {
+        let problem = problem_at(text, "f", key, String::new());
+        (problem.line, problem.column)
+    };
+    assert_eq!(["unit", "gyro.sensor[0].name"].map(place), [(3, 12), (7, 8)]);
+    assert_eq!(["created", ""].map(place), [(1, 1); 2], "that of a table is another key");
+    assert_eq!(place("gyro.sensor[0].static_bias").0, 6);
 }
 
 #[test]

@@ -75,14 +75,11 @@ pub enum KeyError {
         advice: &'static str,
     },
     /// A key of another algorithm.
-    #[error("is a key of algorithm {oid}, must be Ed25519 (1.3.101.112): make one with `isotherm keygen`")]
-    Algorithm {
-        /// The algorithm's object identifier.
-        oid: String,
-    },
+    #[error("is a key of another algorithm, must be Ed25519: make one with `isotherm keygen`")]
+    Algorithm,
     /// The block cannot be decoded.
-    #[error("is damaged: {0}")]
-    Damaged(String),
+    #[error("is damaged: copy the file again, or make a new pair with `isotherm keygen`")]
+    Damaged,
     /// A public key for which signatures of anything can be made up.
     #[error("is a weak public key: anyone can forge its signatures; make a new key with `isotherm keygen`")]
     Weak,
@@ -111,7 +108,7 @@ impl PrivateKey {
         let pem = block(text, PRIVATE)?;
         SigningKey::from_pkcs8_pem(pem).map(Self).map_err(|error| match error {
             pkcs8::Error::PublicKey(error) => from_spki(&error),
-            other => KeyError::Damaged(other.to_string()),
+            _ => KeyError::Damaged,
         })
     }
 
@@ -123,7 +120,7 @@ impl PrivateKey {
         // With the public half the block would be of PKCS#8's second version, which OpenSSL 3.0 does not read.
         let key = KeypairBytes { secret_key: self.0.to_bytes(), public_key: None };
         let pem = key.to_pkcs8_pem(LineEnding::LF);
-        pem.map(|pem| pem.as_str().to_owned()).map_err(|error| KeyError::Damaged(error.to_string()))
+        pem.map(|pem| pem.as_str().to_owned()).map_err(|_| KeyError::Damaged)
     }
 
     /// Its public half.
@@ -163,7 +160,7 @@ impl PublicKey {
     /// # Errors
     /// [`KeyError::Damaged`] where the encoder refuses; it has no reason to.
     pub fn to_pem(&self) -> Result<String, KeyError> {
-        self.0.to_public_key_pem(LineEnding::LF).map_err(|error| KeyError::Damaged(error.to_string()))
+        self.0.to_public_key_pem(LineEnding::LF).map_err(|_| KeyError::Damaged)
     }
 
     /// SHA-256 of the 32 raw bytes, as 64 hexadecimal digits: what two people compare over the telephone.
@@ -218,7 +215,7 @@ fn block<'t>(text: &'t str, expected: &'static str) -> Result<&'t str, KeyError>
 
 fn from_spki(error: &spki::Error) -> KeyError {
     match error {
-        spki::Error::OidUnknown { oid } => KeyError::Algorithm { oid: oid.to_string() },
-        other => KeyError::Damaged(other.to_string()),
+        spki::Error::OidUnknown { .. } => KeyError::Algorithm,
+        _ => KeyError::Damaged,
     }
 }

@@ -16,6 +16,7 @@ use isotherm_protocol::status::Status;
 use serde_json::{Value, json};
 use zenoh::key_expr::OwnedKeyExpr;
 
+use super::log_args::unnamed;
 use super::play::key_expression;
 use super::{LogArgs, show};
 use crate::error::Error;
@@ -25,7 +26,7 @@ use crate::play::wanted;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay cat mems.csv --unit MEMS-0001 --topic 'imu/*/raw/temp' --limit 2\n\n\
+    isotherm-replay cat mems.csv --topic 'imu/*/raw/temp' --limit 2\n\n\
     Each line has `topic`, `received_ns` and `message`, with the fields of docs/wire.md; or `error`, if a frame cannot\n\
     be read (exit code 3).")]
 pub(super) struct CatArgs {
@@ -41,7 +42,7 @@ pub(super) struct CatArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
-    let mut messages = args.log.messages(1, None)?;
+    let mut messages = args.log.messages(1, unnamed().as_ref())?;
     let mut out = BufWriter::new(io::stdout().lock());
     let (mut printed, mut unread) = (0, false);
     while args.limit.is_none_or(|limit| printed < limit)

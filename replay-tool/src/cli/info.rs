@@ -7,16 +7,13 @@ use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
 use isotherm_log::text::LogReader;
-use isotherm_protocol::key::UnitId;
 
-use super::log_args::LogArgs;
+use super::log_args::{LogArgs, unnamed};
 use super::{print, show};
 use crate::error::Error;
 
 /// Ticks in one batch of a text log.
 const BATCH: usize = 256;
-/// What a text log's unit is called where nobody says.
-const UNNAMED: &str = "log";
 
 /// Summarise a log: topics, rates, gaps, jitter, temperatures, mode switches, calibrations, commands
 #[derive(Debug, Args)]
@@ -41,7 +38,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Exit, Error> {
 
 /// Reads the log to its end.
 pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
-    let opened = log.files(BATCH, UnitId::new(UNNAMED).ok().as_ref())?;
+    let opened = log.files(BATCH, unnamed().as_ref())?;
     let mut messages = opened.open(&log.part()?)?;
     let files = log.log_files()?;
     let files: Vec<_> = files.iter().map(|path| FileInfo::of(path)).collect::<Result<_, _>>()?;

@@ -7,6 +7,7 @@ use isotherm_cli::{Bar, Exit};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
+use super::log_args::unnamed;
 use super::play::key_expression;
 use super::{LogArgs, print, show};
 use crate::error::Error;
@@ -16,7 +17,7 @@ use crate::play::wanted;
 #[derive(Debug, Args)]
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
-    isotherm-replay list mems.csv --unit MEMS-0001\n\n\
+    isotherm-replay list mems.csv\n\n\
     Times are seconds from the log's first message. For contents use `isotherm-replay info` and `isotherm-replay cat`.")]
 pub(super) struct ListArgs {
     #[command(flatten)]
@@ -40,7 +41,7 @@ struct Listed {
 
 /// Runs the command.
 pub(super) fn run(args: &ListArgs) -> Result<Exit, Error> {
-    let mut messages = args.log.messages(1, None)?;
+    let mut messages = args.log.messages(1, unnamed().as_ref())?;
     let mut bar = Bar::over_log(messages.progress().watch());
     let mut topics = BTreeMap::<String, Listed>::new();
     let mut begin_ns = None;

@@ -38,6 +38,11 @@ pub(crate) struct LogArgs {
     pub(crate) end: Option<Span>,
 }
 
+/// What a text log's unit is called where nobody says, and nothing depends on it.
+pub(crate) fn unnamed() -> Option<UnitId> {
+    UnitId::new("log").ok()
+}
+
 impl LogArgs {
     /// Whether the log is recordings.
     ///

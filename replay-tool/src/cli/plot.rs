@@ -14,7 +14,7 @@ use isotherm_log::source::LogReport;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
-use super::log_args::LogArgs;
+use super::log_args::{LogArgs, unnamed};
 use super::{print, show};
 use crate::error::Error;
 
@@ -22,8 +22,6 @@ use crate::error::Error;
 const BATCH: usize = 256;
 /// Most bins of a quantity where nobody says.
 const DETAIL: u32 = 32_768;
-/// What a text log's unit is called where nobody says.
-const UNNAMED: &str = "log";
 
 /// Plot a log, or two over one time axis, as one HTML file with zoom
 #[derive(Debug, Args)]
@@ -133,7 +131,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let calibration = args.calibration.as_deref();
     let calibration = calibration.map(read_document).transpose()?;
 
-    let unnamed = UnitId::new(UNNAMED).ok();
+    let unnamed = unnamed();
     let first_units = args.log.units()?;
     let mut logs = Vec::new();
     let mut bar = None;

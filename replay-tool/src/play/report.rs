@@ -4,6 +4,7 @@ use std::ops::Add;
 use std::time::Duration;
 
 use isotherm_bus::outlet::Account;
+use isotherm_protocol::pair::PairReport;
 use serde::Serialize;
 
 use super::playlist::Load;
@@ -128,9 +129,11 @@ pub struct UnitReport {
     pub returned: Returned,
     /// Runs sent: series, or what began anew in one.
     pub runs: Option<u64>,
-    /// Times that the unit's corrected stream began anew; more than the runs behind the first only where somebody else plays
-    /// the unit.
+    /// Times that the unit's corrected stream began anew; of each instance more than the runs behind the first only where somebody
+    /// else plays the unit.
     pub restarts: Option<u64>,
+    /// Instances of one pair that have the unit, each of which may publish a tick; looked for where ticks or restarts are too many.
+    pub instances: Option<u64>,
 }
 
 impl UnitReport {
@@ -144,7 +147,16 @@ impl UnitReport {
             returned: account.as_ref().map(Returned::from).unwrap_or_default(),
             runs: told(|account| account.runs),
             restarts: told(|account| account.restarts),
+            instances: None,
         }
+    }
+
+    /// Notes how many instances have the unit, where those that have it are a pair.
+    pub(super) fn note_instances(&mut self, reports: &[PairReport]) {
+        let has = |report: &&PairReport| report.units.iter().any(|unit| unit.unit == self.unit);
+        let having: Vec<_> = reports.iter().filter(has).collect();
+        let are_pair = having.chunk_by(|a, b| a.member.group == b.member.group).count() == 1;
+        self.instances = are_pair.then_some(having.len() as u64);
     }
 
     /// What did not come back by the end counts as lost.
@@ -155,12 +167,13 @@ impl UnitReport {
         }
     }
 
-    /// Whether what came back is not what was sent: somebody else plays the unit, or more than one service answers.
+    /// Whether what came back is not what was sent: somebody else plays the unit, or services answer that are no pair.
     #[must_use]
     pub fn is_mixed(&self) -> bool {
-        let own = self.runs.map_or(0, |runs| runs.saturating_sub(1));
+        let instances = self.instances.unwrap_or(1);
+        let own = self.runs.map_or(0, |runs| runs.saturating_sub(1)) * instances;
         self.restarts.is_some_and(|restarts| restarts > own)
-            || self.returned.ticks_duplicated.is_some_and(|ticks| ticks > 0)
+            || (instances < 2 && self.returned.ticks_duplicated.is_some_and(|ticks| ticks > 0))
     }
 }
 
@@ -240,4 +253,47 @@ pub struct Position {
     pub actual_speed: f64,
     /// Nothing goes out.
     pub paused: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use isotherm_protocol::pair::{Member, Mode, Role, UnitRole};
+
+    use super::*;
+
+    #[test]
+    fn what_a_pair_sends_twice_is_no_other_player() {
+        let report = |group: &str| {
+            let (instance, name, group) = (String::new(), String::new(), group.to_owned());
+            let member =
+                Member { instance, name, mode: Mode::Active, priority: 0, started_unix_ms: 0, group };
+            let (unit, last_difference) = ("U".to_owned(), None);
+            let role = Role::Speaking;
+            let unit =
+                UnitRole { unit, role, ticks_compared: 0, ticks_differing: 0, takeovers: 0, last_difference };
+            let (takes, passed_over, others, addresses) = Default::default();
+            PairReport { member, takes, units: vec![unit], passed_over, others, addresses }
+        };
+        let (one, pair, strangers) = (
+            [report("a")].to_vec(),
+            [report("a"), report("a")].to_vec(),
+            [report("a"), report("b")].to_vec(),
+        );
+        // Of two runs: restarts and duplicated ticks.
+        for (reports, restarts, duplicated, is_mixed) in [
+            (&one, 1, 0, false),
+            (&one, 1, 5, true),
+            (&one, 2, 0, true),
+            (&pair, 2, 500, false),
+            (&pair, 3, 500, true),
+            (&strangers, 1, 500, true),
+        ] {
+            let returned = Returned { ticks_duplicated: Some(duplicated), ..Returned::default() };
+            let (runs, restarts) = (Some(2), Some(restarts));
+            let mut unit =
+                UnitReport { unit: "U".to_owned(), runs, restarts, returned, ..UnitReport::default() };
+            unit.note_instances(reports);
+            assert_eq!(unit.is_mixed(), is_mixed, "{} reports, {restarts:?}, {duplicated}", reports.len());
+        }
+    }
 }

@@ -140,6 +140,10 @@ fn topics_are_listed_and_their_messages_printed() {
         assert!(said["topics"]["imu/M-1/raw/gyro"]["messages"].as_u64() > Some(1), "{said}");
         assert_eq!(said["topics"].as_object().unwrap().len(), 3, "{said}");
     }
+    // A text log has one unit, whose serial nothing depends on here.
+    for command in ["list", "cat"] {
+        assert!(stdout(&replay(path, &[command, "log.csv"])).contains("imu/log/raw/gyro"), "{command}");
+    }
     let table = stdout(&replay(path, &["list", "log.mcap", "--topic", "imu/*/raw/temp"]));
     assert!(table.contains("imu/M-1/raw/temp") && !table.contains("gyro"), "{table}");
     let output = replay(path, &["cat", "log.mcap", "--topic", "imu/M-1/raw/gyro", "--limit", "2"]);

@@ -30,9 +30,7 @@ pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<
     let file = path.display().to_string();
     let bytes = match read_bounded(path) {
         Ok(bytes) => bytes,
-        Err(error) => {
-            return Finding { file, unreadable: Some(error.to_string()), ..Finding::default() };
-        }
+        Err(error) => return Finding::unreadable(path, error.to_string()),
     };
     let recognised = recognise(path, &bytes);
     let kind = forced.or(recognised.ok());

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use isotherm_bus::endpoint::address;
 use isotherm_correction::units::{AngularRate, Span, SpecificForce};
+use isotherm_document::tidy;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -83,14 +84,14 @@ form!(Ms, Duration => u32, |set| u32::try_from(set.as_millis()).unwrap_or(u32::M
 form!(Ms, Option<Duration> => Option<u32>, |set| set.as_ref().map(Self::write), |ms| ms.map(Self::read));
 form!(Ms, Span => u32, |set| u32::try_from(set.as_ns() / 1_000_000).unwrap_or_default(), |ms| Span::from_ms(ms));
 form!(Seconds, Duration => f64, |set| set.as_secs_f64(), |s| Duration::from_secs_f64(s));
-form!(Seconds, Span => f64, |set| set.as_s(), |s| Span::from_s(s));
+form!(Seconds, Span => f64, |set| tidy(set.as_s()), |s| Span::from_s(s));
 form!(Days, Option<Duration> => u64, |set| set.map_or(0, |age| age.as_secs() / DAY_S),
     |days| (days > 0).then(|| Duration::from_secs(days * DAY_S)));
-form!(DegPerH, f64 => f64, |set| AngularRate::from_rad_per_s(*set).as_deg_per_h(),
+form!(DegPerH, f64 => f64, |set| tidy(AngularRate::from_rad_per_s(*set).as_deg_per_h()),
     |rate| AngularRate::from_deg_per_h(rate).as_rad_per_s());
 form!(SomeDegPerH, Option<f64> => f64, |set| set.as_ref().map_or(0.0, DegPerH::write),
     |rate| (rate > 0.0).then(|| DegPerH::read(rate)));
-form!(SomeMilliG, Option<f64> => f64, |set| set.map_or(0.0, |force| SpecificForce::from_m_per_s2(force).as_g() * 1e3),
+form!(SomeMilliG, Option<f64> => f64, |set| set.map_or(0.0, |force| tidy(SpecificForce::from_m_per_s2(force).as_g() * 1e3)),
     |force| (force > 0.0).then(|| SpecificForce::from_g(force * 1e-3).as_m_per_s2()));
 form!(PathText, Option<PathBuf> => Option<String>, |set| set.as_ref().map(|path| path.display().to_string()),
     |text| text.map(PathBuf::from));

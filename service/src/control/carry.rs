@@ -10,7 +10,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, CommandRecord, FirstTick, Source};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::key::{self, UnitId};
-use isotherm_protocol::overlay::{Overlay, is_overlay};
+use isotherm_protocol::overlay::base_of;
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 
@@ -43,7 +43,7 @@ impl Worker {
             _ => &[],
         });
         let named = accepted.chain(sets.map(|set| [Some(set.digest), set.overlay])).flatten().flatten();
-        let below = kept.values().filter_map(|bytes| overlay(bytes)?.overlay_of.parse().ok());
+        let below = kept.values().filter_map(|bytes| base_of(bytes));
         let lacking: BTreeSet<Digest> = named.chain(below).collect();
         lacking.into_iter().filter(|digest| !kept.contains_key(digest) && !self.holds(digest)).collect()
     }
@@ -61,7 +61,7 @@ impl Worker {
             return false;
         }
         let done = kept.values().try_for_each(|bytes| {
-            let put = if overlay(bytes).is_some() {
+            let put = if base_of(bytes).is_some() {
                 self.store.put_overlay(bytes)
             } else {
                 self.store.put_document(bytes)
@@ -221,10 +221,4 @@ fn running(before: Option<PreLaunchRun>, entries: &[AuditEntry]) -> Option<PreLa
         None if record.command == PRE_LAUNCH_ENDED => None,
         _ => run,
     })
-}
-
-/// The overlay that a text is, if it is one.
-fn overlay(bytes: &[u8]) -> Option<Overlay> {
-    let text = std::str::from_utf8(bytes).ok().filter(|text| is_overlay(text))?;
-    Some(Overlay::parse(text, None).ok()?.overlay)
 }

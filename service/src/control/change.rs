@@ -222,6 +222,7 @@ impl Worker {
         // A rollback to an overlaid document asks for no signature either; a document under it was asked for one.
         record.untrusted = None;
         record.accepted += u64::from(!first);
+        self.accepted += u64::from(!first);
         let account = record.account();
         self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
         self.refusals.forget(unit);

@@ -84,7 +84,7 @@ impl Worker {
                 .folder()
                 .map(|path| StoreStatus { path: shown(&path.display()), audit_entries: self.entries }),
             problems: self.problems(),
-            accepted: self.records.values().map(|record| record.accepted).sum(),
+            accepted: self.accepted,
             refused: self.refusals.count(),
         };
         let mut control_status = self.control_status.0.lock().unwrap_or_else(PoisonError::into_inner);

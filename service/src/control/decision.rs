@@ -3,17 +3,17 @@
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use isotherm_correction::calibration::{Calibration, Steady};
+use isotherm_correction::calibration::Calibration;
 use isotherm_correction::operation::State;
-use isotherm_correction::units::{AngularRate, SpecificForce};
 use isotherm_document::{file, parse_toml, unplaced};
-use isotherm_protocol::control::Difference;
+use isotherm_protocol::control::{Difference, DocumentChange};
 use isotherm_protocol::document::{self, CURRENT_SCHEMA, Problem, Side};
 use isotherm_protocol::history::WallTime;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::overlay::{Candidate, Overlay, is_overlay};
 
 use super::document::{Document, Layers};
+use super::jump::jump;
 use super::manager::Worker;
 use super::request::Request;
 use super::revision::{Record, Revision};
@@ -22,8 +22,6 @@ use crate::config::{Severity, SwapSettings};
 use crate::receive::unit::Present;
 use crate::signing::check_signature;
 
-/// Names of the case axes.
-const AXES: [char; 3] = ['x', 'y', 'z'];
 /// Seconds of a day.
 const DAY_S: i64 = 86_400;
 
@@ -82,7 +80,7 @@ impl Worker {
         if document.unit != unit.as_str() && self.takes_any_serial(request) {
             let other = &document.unit;
             let message = format!("is \"{other}\": accepted for unit {unit}, as requested (any_serial)");
-            warnings.push(at_key(text, &request.name, "unit", message));
+            warnings.push(document::problem_at(text, &request.name, "unit", message));
         }
         // That of an overlay's text may be another than that of the document below it.
         let named = if document.layers.is_some() { unit_of(text) } else { UnitId::new(&document.unit).ok() };
@@ -96,10 +94,11 @@ impl Worker {
         let active: Option<&Revision> = self.in_force(&unit).map(|active| &**active);
         let compared = active.and_then(|active| compare(active, &document, present.as_ref()));
         let (difference, lost) = compared.map_or((None, Vec::new()), |(found, lost)| (Some(found), lost));
-        let found = doubts(&self.swap, &document, active, present.as_ref(), SystemTime::now());
+        let changes = difference.as_ref().map_or(&[][..], |difference| &difference.document);
+        let found = doubts(&self.swap, &document, active, (present.as_ref(), changes), SystemTime::now());
         for doubt in found.into_iter().chain(loss(&lost)) {
             let lenient = request.is_own() || request.options.force;
-            let problem = at_key(text, &request.name, doubt.key, doubt.message(lenient));
+            let problem = document::problem_at(text, &request.name, &doubt.key, doubt.message(lenient));
             if doubt.refuses && !lenient { problems.push(problem) } else { warnings.push(problem) }
         }
         Decision { unit: Some(unit), document: Some(Arc::new(document)), problems, warnings, difference }
@@ -121,7 +120,7 @@ impl Worker {
         let message =
             format!("is \"{other}\", but the document was sent to unit {unit}: send it to {other}, {next}");
         let wrong = other != *unit && !self.takes_any_serial(request);
-        wrong.then(|| at_key(text, &request.name, "unit", message))
+        wrong.then(|| document::problem_at(text, &request.name, "unit", message))
     }
 }
 
@@ -181,7 +180,7 @@ pub(super) fn unit_of(text: &str) -> Option<UnitId> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Doubt {
     /// Key of the document that it is about; empty for the document as a whole.
-    key: &'static str,
+    key: String,
     /// Whether the configuration has it refused.
     refuses: bool,
     /// Key of the configuration that says so; empty where none does.
@@ -190,8 +189,8 @@ struct Doubt {
 }
 
 impl Doubt {
-    fn new(key: &'static str, severity: Severity, policy: &'static str, words: String) -> Self {
-        Self { key, refuses: severity == Severity::Refuse, policy, words }
+    fn new(key: &str, severity: Severity, policy: &'static str, words: String) -> Self {
+        Self { key: key.to_owned(), refuses: severity == Severity::Refuse, policy, words }
     }
 
     /// What is wrong, and what to do where it refuses.
@@ -218,7 +217,7 @@ fn doubts(
     settings: &SwapSettings,
     candidate: &Document,
     active: Option<&Revision>,
-    present: Option<&Present>,
+    (present, changes): (Option<&Present>, &[DocumentChange]),
     now: SystemTime,
 ) -> Vec<Doubt> {
     let mut doubts = Vec::new();
@@ -241,7 +240,8 @@ fn doubts(
     if let Some(present) = present {
         doubts.extend(range(settings, candidate, present));
     }
-    doubts.extend(both.iter().flat_map(|both| jump(settings, candidate, both, present)));
+    let jumps = both.iter().flat_map(|both| jump(settings, candidate, both, changes, present));
+    doubts.extend(jumps.map(|(key, words)| Doubt::new(&key, settings.jump, "jump", words)));
     doubts
 }
 
@@ -313,88 +313,4 @@ fn range<'a>(
             Doubt::new("", settings.outside_range, "outside_range", words)
         })
     })
-}
-
-fn jump(
-    settings: &SwapSettings,
-    candidate: &Document,
-    [before, after]: &[Steady; 2],
-    present: Option<&Present>,
-) -> Vec<Doubt> {
-    if settings.max_jump_rad_per_s.is_none() && settings.max_jump_m_per_s2.is_none() {
-        return Vec::new();
-    }
-    let doubt = |words| Doubt::new("", settings.jump, "jump", words);
-    let Some(jump) = before.jump(after) else {
-        return vec![doubt(
-            "has other sensors or another kind of output than the document in force: the jump of the output is \
-             unknown"
-                .to_owned(),
-        )];
-    };
-    let deg_per_h = |rate: f64| AngularRate::from_rad_per_s(rate).as_deg_per_h();
-    let milli_g = |force: f64| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
-    let assumed = candidate.content().filter(|_| present.is_none_or(|present| present.words().is_empty()));
-    let at = assumed.map_or_else(String::new, |document| {
-        format!(
-            " at the assumed {} °C (no temperature of the unit is known)",
-            document.temperature.assumed_deg_c
-        )
-    });
-    let mut doubts = Vec::new();
-    let mut check =
-        |steps: [f64; 3], limit: Option<f64>, what: &str, shown: &dyn Fn(f64) -> f64, unit: &str| {
-            let Some(limit) = limit else { return };
-            for (axis, step) in AXES.iter().zip(steps).filter(|(_, step)| step.abs() > limit) {
-                let (step, limit) = (shown(step), shown(limit));
-                doubts.push(doubt(format!(
-                    "{what} {axis} would jump by {step:+.4} {unit}{at}, more than {limit} {unit}"
-                )));
-            }
-        };
-    check(
-        jump.angular_rate,
-        settings.max_jump_rad_per_s,
-        "the corrected angular rate about",
-        &deg_per_h,
-        "°/h",
-    );
-    check(
-        jump.specific_force,
-        settings.max_jump_m_per_s2,
-        "the corrected specific force along",
-        &milli_g,
-        "mg",
-    );
-    doubts
-}
-
-/// A problem at a key of the top level, where the text has it; otherwise at its start.
-fn at_key(text: &str, file: &str, key: &str, message: String) -> Problem {
-    let value_of = |line: &str| {
-        let rest = line.trim_start().strip_prefix(key)?.trim_start().strip_prefix('=')?.trim_start();
-        let before = line.strip_suffix(rest).unwrap_or_default();
-        Some(before.chars().count() + 1)
-    };
-    let mut lines = text.lines().take_while(|line| !line.trim_start().starts_with('[')).enumerate();
-    let found = lines.find_map(|(index, line)| Some((index + 1, value_of(line)?)));
-    let (line, column) = found.filter(|_| !key.is_empty()).unwrap_or((1, 1));
-    Problem { file: Some(file.to_owned()), line, column, key: key.to_owned(), message }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_problem_stands_at_the_value_of_its_key() {
-        let text = "# unit = \"no\"\nschema = 1\n  unit   = \"A\"\n[gyro]\ncreated = 1\n";
-        let place = |key| {
-            let problem = at_key(text, "f", key, String::new());
-            (problem.line, problem.column)
-        };
-        assert_eq!(place("unit"), (3, 12));
-        assert_eq!(place("created"), (1, 1), "that of a table is another key");
-        assert_eq!(place(""), (1, 1));
-    }
 }

@@ -88,6 +88,8 @@ pub(crate) struct Worker {
     pub(super) entries: u64,
     pub(super) records: BTreeMap<UnitId, Record>,
     pub(super) folder: Folder,
+    /// Swaps accepted since the service started, those of units that were forgotten too.
+    pub(super) accepted: u64,
     pub(super) refusals: Refusals,
     pub(super) control_status: Arc<ControlStatus>,
     /// Why nothing can be written down.
@@ -123,6 +125,7 @@ impl Worker {
             store,
             records: BTreeMap::new(),
             folder: Folder::new(settings.calibrations.as_deref()),
+            accepted: 0,
             refusals: Refusals::default(),
             control_status: Arc::default(),
             lost: None,
@@ -197,6 +200,8 @@ impl Worker {
                     "the state folder was replaced: what is in force was written into the new one; earlier documents \
                      and entries are in the old one"
                 );
+                // That it can be written is said by that.
+                self.lost = None;
                 None
             }
             Err(error) => Some(error.to_string()),

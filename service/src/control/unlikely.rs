@@ -1,6 +1,7 @@
 //! What a document changes so much that hardly anybody means it: told whatever the limits of the configuration are.
 
 use isotherm_correction::calibration::Steady;
+use isotherm_protocol::document::turn_rad;
 
 /// Largest turn of an input axis that is nothing special (°).
 const LARGEST_TURN_DEG: f64 = 1.0;
@@ -13,7 +14,7 @@ pub(super) fn unlikely([before, after]: &[Steady; 2]) -> Vec<String> {
         return Vec::new();
     }
     let turns = |what, old: &[[f64; 3]], new: &[[f64; 3]]| {
-        let angles = old.iter().zip(new).map(|(old, new)| angle_deg(old, new));
+        let angles = old.iter().zip(new).map(|(old, new)| turn_rad(*old, *new).to_degrees());
         let (numbers, largest) = beyond(angles, LARGEST_TURN_DEG)?;
         Some(format!(
             "turns the input axis of {what} {numbers} by {largest:.1}°: are sensors or axes swapped?"
@@ -42,12 +43,6 @@ fn beyond(values: impl Iterator<Item = f64>, limit: f64) -> Option<(String, f64)
     let largest = found.iter().map(|(value, _)| *value).reduce(f64::max)?;
     let numbers: Vec<_> = found.iter().map(|(_, number): &(f64, u32)| number.to_string()).collect();
     Some((numbers.join(", "), largest))
-}
-
-/// Angle between two unit vectors (°); exact enough for what is far apart.
-fn angle_deg(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    let cosine: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-    cosine.clamp(-1.0, 1.0).acos().to_degrees()
 }
 
 #[cfg(test)]

@@ -54,7 +54,8 @@ pub(crate) fn create(path: &Path, text: &str, mode: u32) -> io::Result<()> {
 fn written(path: &Path, text: &str, mode: u32) -> io::Result<NamedTempFile> {
     let folder = folder_of(path);
     if !folder.is_dir() {
-        return Err(io::Error::new(ErrorKind::NotFound, "its folder does not exist"));
+        let words = format!("there is no folder {}: make it first, or name another", folder.display());
+        return Err(io::Error::new(ErrorKind::NotFound, words));
     }
     let mut builder = Builder::new();
     builder.prefix(PREFIX).permissions(Permissions::from_mode(mode));

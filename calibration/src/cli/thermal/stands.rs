@@ -2,6 +2,7 @@
 
 use clap::Args;
 
+use crate::cli::place::misplaced;
 use crate::error::Error;
 use crate::fits::rates::steps::axis;
 use crate::fits::thermal::{Site, Stand, Turning};
@@ -69,9 +70,7 @@ impl StandArgs {
             return Ok(Site::Unknown);
         };
         let tilt = of_run(&self.pitch, run).zip(of_run(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
-        Site::at(latitude, heading, tilt, self.gravity).map_err(|errors| {
-            Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-        })
+        Site::at(latitude, heading, tilt, self.gravity).map_err(misplaced)
     }
 
     fn turning(&self, run: usize) -> Result<Option<Turning>, Error> {

@@ -1,11 +1,11 @@
 //! Changes in words, tables and charts.
 
-use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
+use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use serde_json::{Map, Value, json};
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
-use crate::report::{Report, or_dash, short};
+use crate::report::{Report, counted, or_dash, short};
 
 /// Entries of an origin that are shown one by one.
 const MOST_ABOUT: usize = 12;
@@ -99,6 +99,28 @@ impl Changes {
         self.charts(&mut sheet);
         sheet.figures = self.figures();
         sheet
+    }
+
+    /// The largest changes of each sensor, and how many entries there are beside.
+    pub fn in_brief(&self) -> String {
+        let row = |axis: &AxisChange| {
+            let largest = |is_scale: bool| {
+                let own = |value: &&ValueChange| value.of.starts_with(&format!("{} ", axis.of));
+                let mut own = self.values.iter().filter(own);
+                let value = own.find(|value| (value.unit == "ppm") == is_scale)?;
+                Some(format!("{} {}", short(largest_of(value)), value.unit))
+            };
+            let turned = format!("{} ″", tenths(axis.largest_arcsec));
+            vec![axis.of.clone(), turned, or_dash(largest(false)), or_dash(largest(true))]
+        };
+        let head = ["largest change", "input axis", "bias", "scale"];
+        let summary = Table::of(head, self.axes.iter().map(row));
+        let sheet = Report { summary: Some(summary), ..self.sheet() };
+        let entries = counted(self.entries.len(), "entry differs", "entries differ");
+        format!(
+            "{}{entries}: --all lists them, --html draws the changes over temperature\n",
+            sheet.summary_text()
+        )
     }
 
     fn axes_table(&self, sheet: &mut Report) {

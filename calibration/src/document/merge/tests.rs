@@ -88,7 +88,11 @@ fn the_same_key_made_twice_is_a_conflict_until_someone_decides() {
     let base = named("base.toml", |_| ());
     let parts = [named("a.toml", bias(7.0)), named("b.toml", bias(8.0))];
     let Err(Error::Refused(conflicts)) = merge(&base, &parts, &[]) else { panic!("a conflict") };
-    insta::assert_snapshot!(conflicts.join("\n"));
+    let turned = |document: &mut Document| document.gyro.orientation.rows[0] = [1.0, 1e-5, 0.0];
+    let back = |document: &mut Document| document.gyro.orientation.rows[0] = [1.0, -1e-5, 0.0];
+    let axes = [named("a.toml", turned), named("b.toml", back)];
+    let Err(Error::Refused(of_axes)) = merge(&base, &axes, &[]) else { panic!("a conflict") };
+    insta::assert_snapshot!([conflicts, of_axes].concat().join("\n"));
     let take = |from: &str| Take { key: "gyro.sensor.x".into(), from: from.into() };
     let merged = merge(&base, &parts, &[take("b.toml")]).unwrap();
     assert_eq!(from(&merged, "gyro.sensor.x.static_bias"), "b.toml");

@@ -1,6 +1,7 @@
 //! Commands over the bus: states, refusals, what is written down.
 
 use isotherm_correction::operation::State;
+use isotherm_operator::client::Client;
 use isotherm_protocol::control::SwapOptions;
 use isotherm_protocol::history::{AuditEvent, CommandRecord};
 use isotherm_service::Settings;
@@ -114,12 +115,15 @@ async fn a_unit_that_sends_no_more_can_be_forgotten() {
     assert!(error.contains("NOPE"), "{error}");
     let reply = stand.command(UNIT, forget).await;
     assert!(!reply.accepted && reply.reason.unwrap().contains("a.toml"));
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.5), &SwapOptions::default()).await, 2);
     std::fs::remove_file(file).unwrap();
     let deadline = tokio::time::Instant::now() + LIMIT;
     while !stand.command(UNIT, forget).await.accepted {
         assert!(tokio::time::Instant::now() < deadline);
     }
     assert!(stand.active(UNIT).await.is_err());
+    let services = Client::on(stand.session.clone(), LIMIT).services().await.unwrap();
+    assert_eq!(services[0].swaps_accepted, 1, "counters do not fall");
     stand.stop().await;
 
     let mut stand = Stand::start(folders.settings()).await;
@@ -127,6 +131,6 @@ async fn a_unit_that_sends_no_more_can_be_forgotten() {
     let reply = stand.command(UNIT, forget).await;
     assert!(!reply.accepted);
     insta::assert_snapshot!(reply.reason.unwrap());
-    assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &SwapOptions::default()).await, 2);
+    assert_accepted(&stand.swap(UNIT, &document(UNIT, 2.0), &SwapOptions::default()).await, 3);
     stand.stop().await;
 }

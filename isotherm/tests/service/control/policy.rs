@@ -82,7 +82,8 @@ async fn a_jump_of_the_output_is_warned_about_or_refused() {
         settings.swap.max_jump_rad_per_s = Some(2.0_f64.to_radians() / 3600.0);
         settings.swap.jump = severity;
     };
-    policy(set, 25.0, &document(UNIT, 4.5), &["rate about x", "-3.5000 °/h", "2"]).await;
+    let words = ["gyro.sensor[0].static_bias: ", "rate about x", "-3.5000 °/h", "2", "bias of gyro[0]"];
+    policy(set, 25.0, &document(UNIT, 4.5), &words).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -6,6 +6,7 @@ use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
 use isotherm_protocol::digest::Digest;
+use isotherm_protocol::pair::{self, Member, PairReport, Role, UnitRole};
 use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, ServiceStatus, StoreStatus, UnitSummary,
 };
@@ -17,6 +18,34 @@ use super::Level;
 pub(crate) const NOW_UNIX_MS: i64 = 1_795_000_000_000;
 /// The instance that they all belong to.
 pub(crate) const INSTANCE: &str = "1f2e3d4c5b6a79880123456789abcdef";
+
+/// An instance of a pair, by its name, with what it does for units; the other is north.
+pub(crate) fn instance(name: &str, units: &[(&str, Role)]) -> PairReport {
+    let unit = |(unit, role): &(&str, Role)| UnitRole {
+        unit: (*unit).to_owned(),
+        role: *role,
+        ticks_compared: 1000,
+        ticks_differing: 0,
+        takeovers: 1,
+        last_difference: None,
+    };
+    let member = Member {
+        instance: name.to_owned(),
+        name: name.to_owned(),
+        mode: pair::Mode::Standby,
+        priority: 1,
+        started_unix_ms: 0,
+        group: String::new(),
+    };
+    PairReport {
+        member,
+        takes: Vec::new(),
+        units: units.iter().map(unit).collect(),
+        passed_over: Vec::new(),
+        others: vec!["north".to_owned()],
+        addresses: vec!["tcp/10.0.0.1:7447".to_owned()],
+    }
+}
 
 fn deg_per_h(rate: f64) -> f64 {
     AngularRate::from_deg_per_h(rate).as_rad_per_s()

@@ -76,7 +76,7 @@ fn changes_are_told_by_key_value_and_size() {
         (
             "coefficients_deg_per_h = [1.284, -0.0131",
             "coefficients_deg_per_h = [1.29, -0.0131",
-            &["gyro.sensor[0].static_bias.coefficients_deg_per_h[0]: 1.284 -> 1.29 (+0.006, +4673 ppm)"][..],
+            &["gyro.sensor[0].static_bias.coefficients_deg_per_h[0]: 1.284 -> 1.29 (+0.006, +0.4673 %)"][..],
         ),
         (
             "[3.18, 0.0161]",

@@ -2,8 +2,6 @@
 
 use crate::control::DocumentChange;
 
-/// Relative changes below this are told in ppm.
-const PPM_BELOW: f64 = 0.01;
 /// Relative changes above this say nothing: the number is another one.
 const PERCENT_BELOW: f64 = 10.0;
 /// Longest value that is shown whole.
@@ -16,7 +14,7 @@ impl DocumentChange {
     /// use isotherm_protocol::control::DocumentChange;
     ///
     /// let change = DocumentChange { key: "k_deg_per_h".into(), before: Some("1.25".into()), after: Some("1.26".into()) };
-    /// assert_eq!(change.words(), "k_deg_per_h: 1.25 -> 1.26 (+0.01, +8000 ppm)");
+    /// assert_eq!(change.words(), "k_deg_per_h: 1.25 -> 1.26 (+0.01, +0.8 %)");
     /// ```
     #[must_use]
     pub fn words(&self) -> String {
@@ -39,11 +37,8 @@ fn size(before: &str, after: &str) -> Option<String> {
     let change = after - before;
     let relative = change / before.abs();
     let absolute = short(change);
-    Some(match relative.abs() {
-        size if size < PPM_BELOW => format!("{absolute}, {} ppm", short(relative * 1e6)),
-        size if size < PERCENT_BELOW => format!("{absolute}, {} %", short(relative * 100.0)),
-        _ => absolute,
-    })
+    let is_telling = relative.abs() < PERCENT_BELOW;
+    Some(if is_telling { format!("{absolute}, {} %", short(relative * 100.0)) } else { absolute })
 }
 
 /// A number with its sign and four digits: differences of decimal numbers end in dust.

@@ -38,7 +38,7 @@ fn a_private_key_with_its_public_half_is_read() {
         public_key: KeypairBytes::from(&SigningKey::from_bytes(&[2; 32])).public_key,
     };
     let wrong = wrong.to_pkcs8_pem(LineEnding::LF).unwrap();
-    assert!(matches!(PrivateKey::from_pem(&wrong), Err(KeyError::Damaged(_))));
+    assert!(matches!(PrivateKey::from_pem(&wrong), Err(KeyError::Damaged)));
 }
 
 #[test]
@@ -83,12 +83,12 @@ fn garbage_in_a_block_is_refused() {
         ("ZuE=", "ZuE=\n\n"),
     ] {
         let text = RFC_PUBLIC.replace(from, to);
-        assert!(matches!(PublicKey::from_pem(&text), Err(KeyError::Damaged(_))), "{text}");
+        assert!(matches!(PublicKey::from_pem(&text), Err(KeyError::Damaged)), "{text}");
     }
     // Half of the y-coordinates belong to no point of the curve.
     let no_point = (0..=255_u8).map(|byte| [byte; 32]).find(|bytes| VerifyingKey::from_bytes(bytes).is_err());
     let pem = spki_of(no_point.unwrap());
-    assert!(matches!(PublicKey::from_pem(&pem), Err(KeyError::Damaged(_))));
+    assert!(matches!(PublicKey::from_pem(&pem), Err(KeyError::Damaged)));
 }
 
 #[test]

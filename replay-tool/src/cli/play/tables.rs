@@ -20,7 +20,9 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
             )
         });
     let mixed = of(UnitReport::is_mixed).map(|units| {
-        format!("{units}: another player, or more than one service: what came back may not be what was sent")
+        format!(
+            "{units}: another player, or services that are no pair: what came back may not be what was sent"
+        )
     });
     let unreadable = of(|unit| unit.counts.messages_unreadable > 0).map(|units| {
         format!("{units}: some of the log's messages cannot be read; they were played unchanged")

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::{Duration, SystemTime};
 
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::overlay::Overlay;
+use isotherm_protocol::overlay::base_of;
 
 use super::log::full_files;
 use super::{Journal, Store};
@@ -33,18 +33,13 @@ impl Store {
             return;
         }
         let named: BTreeSet<Digest> = self.index.digests().collect();
-        let bases: BTreeSet<Digest> = named.iter().filter_map(|digest| self.base_of(digest)).collect();
+        let bases: BTreeSet<Digest> =
+            named.iter().filter_map(|digest| base_of(&self.overlays.get(digest).ok()??)).collect();
         let unnamed = |digest: &Digest| !named.contains(digest) && !bases.contains(digest);
         let removed =
             [&self.documents, &self.overlays].map(|blobs| blobs.prune(now, KEPT, unnamed)).iter().sum();
         if let 1_usize.. = removed {
             tracing::info!(removed, "documents that no rollback can reach are removed");
         }
-    }
-
-    /// The document that an overlay lies on, where the digest is an overlay's.
-    fn base_of(&self, overlay: &Digest) -> Option<Digest> {
-        let text = String::from_utf8(self.overlays.get(overlay).ok()??).ok()?;
-        Overlay::parse(&text, None).ok()?.overlay.overlay_of.parse().ok()
     }
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::history::chain::{Broken, Head, Verifier};
+use isotherm_protocol::overlay::base_of;
 use serde::Serialize;
 
 use super::blobs::BlobStore;
@@ -140,7 +141,8 @@ fn lost(folder: &Path, index: &Index) -> Vec<Lost> {
     let [documents, overlays] = &shelves;
     let mut named = BTreeMap::new();
     for (unit, set) in index.all_sets() {
-        let files = [(documents, Some(set.digest)), (overlays, set.overlay)];
+        let below = set.overlay.and_then(|overlay| base_of(&overlays.get(&overlay).ok()??));
+        let files = [(documents, Some(set.digest)), (overlays, set.overlay), (documents, below)];
         for (shelf, digest) in files.into_iter().filter_map(|(shelf, digest)| Some((shelf, digest?))) {
             let Some(file) = shelf.file(&digest) else { continue };
             named.insert(file, (shelf, digest, unit, set.revision));

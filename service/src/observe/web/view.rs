@@ -11,8 +11,8 @@ use serde::{Serialize, Serializer};
 
 use super::Web;
 use isotherm_operator::page::{
-    Lately, Level, Remark, Unit, applied, channel_in_view, is_running, knows_rates, range, said_of_pairs,
-    state_word,
+    Lately, Level, Remark, Unit, applied, channel_in_view, is_running, knows_rates, name, range,
+    said_of_pairs, state_word,
 };
 use isotherm_operator::status::unix_ms;
 use isotherm_operator::{Fleet, worst_first};
@@ -36,6 +36,8 @@ struct Overview<'f> {
 /// A service instance.
 #[derive(Debug, Serialize)]
 struct Service {
+    /// Its name for people.
+    name: String,
     gone: bool,
     #[serde(flatten)]
     status: ServiceStatus,
@@ -165,9 +167,9 @@ impl Web {
         let (now, now_unix_ms) = (Instant::now(), unix_ms());
         let (services, gone) = fleet.services();
         let services = services.into_iter().map(|status| {
-            let gone = gone.contains(&status.instance);
+            let (name, gone) = (name(&fleet.pairs, &status.instance), gone.contains(&status.instance));
             // Their names and states are told in the lines of the units.
-            Service { gone, status: ServiceStatus { units: Vec::new(), ..status } }
+            Service { name, gone, status: ServiceStatus { units: Vec::new(), ..status } }
         });
         let pair = said_of_pairs(&fleet.pairs).into_iter().map(|(level, columns)| Columns { level, columns });
         serde_json::to_string(&Overview {

@@ -230,12 +230,24 @@ fn a_document_that_can_be_rolled_back_to_and_was_altered_or_removed_is_told() {
     let folder = TempDir::new().unwrap();
     let unit = UnitId::new("ZLG-1").unwrap();
     let (mut store, _) = Store::open(folder.path()).unwrap();
+    let on = |base: &str| {
+        let base = Digest::of(base.as_bytes());
+        format!(
+            "schema = 1\noverlay_of = \"{base}\"\nunit = \"ZLG-1\"\n[[gyro]]\nname = \"x\"\n\
+                 static_bias_change_deg_per_h = 0.031\nstatic_bias_sigma_deg_per_h = 0.004\n"
+        )
+    };
+    let overlays = [on("base"), "gone".to_owned()];
+    store.put_document(b"base").unwrap();
     for revision in 1..=3 {
         let digest = store.put_document(format!("text {revision}").as_bytes()).unwrap();
         let accepted = Acceptance {
             revision,
             digest,
-            overlay: (revision == 3).then(|| store.put_overlay(b"overlay").unwrap()),
+            overlay: (revision > 1).then(|| {
+                let [below, other] = &overlays;
+                store.put_overlay(if revision == 2 { below } else { other }.as_bytes()).unwrap()
+            }),
             source: Source::Bus,
             base: None,
             changed: Vec::new(),
@@ -248,12 +260,14 @@ fn a_document_that_can_be_rolled_back_to_and_was_altered_or_removed_is_told() {
     let file = |shelf: &str, text: &str| {
         folder.path().join(shelf).join(format!("{}.toml", Digest::of(text.as_bytes())))
     };
-    let overlay = file("overlays", "overlay");
-    fs::remove_file(&overlay).unwrap();
+    let [overlay, base] = [file("overlays", "gone"), file("documents", "base")];
+    [&overlay, &base].into_iter().for_each(|file| fs::remove_file(file).unwrap());
     let altered = file("documents", "text 1");
     fs::write(&altered, "text 2").unwrap();
     let found = verified(&folder);
     assert!(!found.holds && found.broken == 0, "{found:?}");
     let lost: Vec<_> = found.lost.iter().map(|lost| (&lost.file, &*lost.unit, lost.revision)).collect();
-    assert_eq!(lost, [(&altered, "ZLG-1", 1), (&overlay, "ZLG-1", 3)]);
+    let mut expected = [(&altered, "ZLG-1", 1), (&base, "ZLG-1", 2), (&overlay, "ZLG-1", 3)];
+    expected.sort_unstable();
+    assert_eq!(lost, expected);
 }

@@ -17,7 +17,7 @@ class HistoryPart {
     try {
       const entries = await ask(unitPath(this.page.serial, "history?limit=" + (this.all.checked ? 50 : 1000)));
       entries.sort((a, b) => b.number - a.number);
-      const shown = entries.filter(entry => this.all.checked || entry.event === "accepted").slice(0, 50);
+      const shown = entries.filter(entry => this.all.checked || ["accepted", "withdrawn"].includes(entry.event)).slice(0, 50);
       this.table.hidden = !shown.length;
       this.table.show(shown.map(row));
       say(this.note, shown.length ? "" : "Nothing yet.");

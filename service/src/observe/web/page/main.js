@@ -78,10 +78,10 @@ class App {
   showServices({ services, instance, write, pair }) {
     const own = services.find(service => service.instance === instance);
     const others = services.length - 1;
-    say(this.service, own ? [own.instance.slice(0, 8), "version " + own.version, "up " + since(own.uptime_s), write ? "" : "read-only",
+    say(this.service, own ? [own.name, "version " + own.version, "up " + since(own.uptime_s), write ? "" : "read-only",
       others > 0 ? plural(others, "other service") : ""].filter(Boolean).join(" · ") : "");
     const troubles = services.flatMap(service => {
-      const name = services.length > 1 ? service.instance.slice(0, 8) + ": " : "";
+      const name = services.length > 1 ? service.name + ": " : "";
       const folder = service.calibrations;
       return [
         service.gone ? ["gone", "the service does not answer any more"] : null,

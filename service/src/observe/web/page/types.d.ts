@@ -18,7 +18,7 @@ declare global {
     write: boolean;
     options: string;
     now_unix_ms: number;
-    services: Array<wire.ServiceStatus & { gone: boolean }>;
+    services: Array<wire.ServiceStatus & { name: string; gone: boolean }>;
     units: Array<Row>;
     pair: Array<{ level: string; columns: Array<string> }>;
   }
