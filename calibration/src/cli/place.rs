@@ -49,7 +49,7 @@ impl GravityArgs {
 }
 
 /// That there is no such place or attitude.
-pub(super) fn misplaced(errors: Vec<PlaceError>) -> Error {
+pub(super) fn misplaced(errors: &[PlaceError]) -> Error {
     Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
 }
 
@@ -80,6 +80,6 @@ impl PlaceArgs {
             };
         };
         let tilt = self.pitch.zip(self.roll).map(|(pitch, roll)| [pitch, roll]);
-        Place::new(latitude, heading, tilt).map(Some).map_err(misplaced)
+        Place::new(latitude, heading, tilt).map(Some).map_err(|errors| misplaced(&errors))
     }
 }

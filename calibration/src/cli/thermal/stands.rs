@@ -70,7 +70,7 @@ impl StandArgs {
             return Ok(Site::Unknown);
         };
         let tilt = of_run(&self.pitch, run).zip(of_run(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
-        Site::at(latitude, heading, tilt, self.gravity).map_err(misplaced)
+        Site::at(latitude, heading, tilt, self.gravity).map_err(|errors| misplaced(&errors))
     }
 
     fn turning(&self, run: usize) -> Result<Option<Turning>, Error> {
