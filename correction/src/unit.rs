@@ -226,11 +226,10 @@ impl Unit {
     #[inline(never)]
     fn release_waiting<E: FnMut(&CorrectedTick) + ?Sized>(&mut self, flushing: bool, emit: &mut E) {
         let window = self.pipeline.settings.pairing_window;
-        loop {
-            if let Some(end_time) = self.gyros.restarts_at() {
-                self.accels.starts_anew(end_time, &mut self.pipeline.counters);
+        while let Some(front) = self.gyros.front(window, flushing) {
+            if front.restart {
+                self.accels.starts_anew(front.tick.end_time, &mut self.pipeline.counters);
             }
-            let Some(front) = self.gyros.front(window, flushing) else { return };
             let accel = self.accels.partner(front.tick, &mut self.pipeline.counters);
             let met = accel.is_some();
             if !met && self.pipeline.expects_accels() && !front.expired {

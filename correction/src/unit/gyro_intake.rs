@@ -34,18 +34,8 @@ pub(super) struct Pending {
     /// End of the last tick that was admitted with it from one batch, once that is known. The window counts from
     /// here, so that the size of a batch does not eat into it.
     batch_end: Option<Timestamp>,
-    /// It starts a new series. Where no tick before it was refused it waits out its window, as the first of all does: the series may
-    /// have begun with an earlier one.
     restart: bool,
     refused_before: u64,
-}
-
-impl Pending {
-    /// Whether a tick may have come before this one, the first of a series so far.
-    fn waits_for_earlier(&self, tick: &GyroTick) -> bool {
-        let earlier = Newest { sequence: tick.sequence, end_time: tick.end_time };
-        self.refused_before == 0 && plausible_step(earlier, &self.tick)
-    }
 }
 
 /// The tick that is to leave next.
@@ -54,6 +44,8 @@ pub(super) struct Front<'a> {
     pub(super) tick: &'a GyroTick,
     /// Its window has passed: it waits for nothing any more.
     pub(super) expired: bool,
+    /// It starts a new series.
+    pub(super) restart: bool,
 }
 
 /// A tick that has left.
@@ -281,7 +273,6 @@ impl GyroIntake {
                     counters.gyro_duplicates += 1;
                     Admission::Refused
                 }
-                Ordering::Less if first.waits_for_earlier(tick) => Admission::PLAIN,
                 Ordering::Less => {
                     counters.gyro_implausible += 1;
                     self.follow_jump(tick, OLD_BELIEVED_AFTER, counters)
@@ -332,17 +323,8 @@ impl GyroIntake {
 
     /// Puts a tick that came out of order in its place among those that wait.
     fn insert_between(&mut self, pending: Pending, counters: &mut Counters) {
-        // Only ticks behind the last restart can still be joined, or one that turns out to be the first of its series.
-        let restart = self.pending.iter().rposition(|p| p.restart);
-        if let Some((place, first)) = restart.and_then(|place| Some((place, self.pending.get_mut(place)?)))
-            && pending.tick.sequence < first.tick.sequence
-        {
-            first.restart = false;
-            self.pending.insert(place, Pending { restart: true, ..pending });
-            self.batch += 1;
-            return;
-        }
-        let from = restart.map_or(0, |place| place + 1);
+        // Only ticks behind the last restart can still be joined.
+        let from = self.pending.iter().rposition(|p| p.restart).map_or(0, |i| i + 1);
         let behind = self.pending.iter().skip(from);
         let place = from + behind.take_while(|p| p.tick.sequence < pending.tick.sequence).count();
         let neighbour = self.pending.get(place);
@@ -372,14 +354,8 @@ impl GyroIntake {
             .newest
             .is_some_and(|newest| newest.end_time > batch_end && newest.end_time >= batch_end + window);
         let expired = flushing || restarted_behind || passed || self.pending.len() > MAX_PENDING;
-        let in_sequence =
-            if front.restart { front.refused_before > 0 } else { self.distance(&front.tick) == Some(1) };
-        (in_sequence || expired).then_some(Front { tick: &front.tick, expired })
-    }
-
-    /// End of the tick that is to leave next, where it starts a new series.
-    pub(super) fn restarts_at(&self) -> Option<Timestamp> {
-        self.pending.front().filter(|front| front.restart).map(|front| front.tick.end_time)
+        let in_sequence = front.restart || self.distance(&front.tick) == Some(1);
+        (in_sequence || expired).then_some(Front { tick: &front.tick, expired, restart: front.restart })
     }
 
     /// How far a tick lies ahead of the last one that was released; `None` before the first.

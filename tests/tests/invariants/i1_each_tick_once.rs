@@ -178,26 +178,6 @@ fn i1_the_last_number_of_all_is_given_once() {
 }
 
 #[test]
-fn i1_the_first_ticks_of_a_new_run_come_in_any_order() {
-    let of_run = |series: u64, k: u64| {
-        let gyro = GyroTick { series, ..gyro(k, &RATES) };
-        [Owned::Accel(vec![accel(k, &RATES)]), Owned::Gyro(vec![gyro])]
-    };
-    let second = [3, 4, 0, 2, 1].into_iter().chain(5..60);
-    let events: Vec<_> =
-        (0..50).flat_map(|k| of_run(7, k)).chain(second.flat_map(|k| of_run(8, k))).collect();
-    let mut unit = drive::unit(&compile(&identity()));
-    let out = drive::run(&mut unit, &events);
-    assert!(out.iter().map(|tick| tick.sequence).eq((0..50).chain(0..60)));
-    let is_restart = |tick: &CorrectedTick| tick.flags.contains(TickFlags::RESTART);
-    assert_eq!(out.iter().position(is_restart), Some(50));
-    assert_eq!(out.iter().filter(|tick| is_restart(tick)).count(), 1);
-    assert!(out.iter().all(|tick| tick.missed == 0));
-    let counters = unit.counters();
-    assert_eq!((counters.gyro_late, counters.accel_missing, counters.restarts), (0, 0, 1));
-}
-
-#[test]
 fn a_tick_that_does_not_begin_where_the_last_one_ended_says_so() {
     // From the tenth tick on the clock is ahead, by ticks that nobody numbered; from the twentieth on it is back.
     let later = |k: u64| if (10..20).contains(&k) { k + 3 } else { k };
