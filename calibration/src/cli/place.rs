@@ -75,9 +75,6 @@ impl PlaceArgs {
             };
         };
         let tilt = self.pitch.zip(self.roll).map(|(pitch, roll)| [pitch, roll]);
-        let place = Place::new(latitude, heading, tilt).map_err(|errors| {
-            Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-        })?;
-        Ok(Some(place))
+        Ok(Some(Place::new(latitude, heading, tilt)?))
     }
 }
