@@ -1,9 +1,16 @@
-//! Small tables that people write as CSV: a line that names the columns, then a row for each thing; empty lines and those that begin with
-//! `#` do not count.
+//! Small tables that people write as TOML, or as CSV: a line that names the columns, then a row for each thing; empty lines and those that
+//! begin with `#` do not count.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::str::FromStr;
 
+use isotherm_document::{listed, parse};
+use isotherm_log::file::read_small_text;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+
+use crate::error::Error;
 use crate::report::counted;
 
 /// One row.
@@ -13,11 +20,36 @@ pub(crate) struct Row<'a> {
     cells: BTreeMap<&'a str, &'a str>,
 }
 
-/// The rows of a text whose columns are among those that are known.
+/// What a file has: CSV where its name ends so, else TOML. `action` is what could not be done, such as "read the plan", and `hint` goes
+/// behind what is wrong.
+///
+/// # Errors
+/// [`Error::Log`] where it cannot be read, [`Error::Usage`] with what is wrong in it.
+pub(crate) fn read<T: DeserializeOwned + JsonSchema>(
+    path: &Path,
+    (action, hint): (&'static str, &str),
+    of_csv: impl FnOnce(&str) -> Result<T, String>,
+) -> Result<T, Error> {
+    let text = read_small_text(path, action)?;
+    let name = path.display().to_string();
+    let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+    let found = if is_csv {
+        of_csv(&text).map_err(|what| format!("{name}: {what}"))
+    } else {
+        parse(&text, &name).map_err(|problems| listed(&problems))
+    };
+    found.map_err(|what| Error::Usage(format!("{what}{hint}")))
+}
+
+/// What the rows of a text make, whose columns are among those that are known.
 ///
 /// # Errors
 /// What is wrong with which line.
-pub(crate) fn rows<'a>(text: &'a str, known: &[&str]) -> Result<Vec<Row<'a>>, String> {
+pub(crate) fn rows<'a, T>(
+    text: &'a str,
+    known: &[&str],
+    made: impl Fn(Row<'a>) -> Result<T, String>,
+) -> Result<Vec<T>, String> {
     let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let (first, head) = lines.next().ok_or("it is empty")?;
@@ -32,7 +64,7 @@ pub(crate) fn rows<'a>(text: &'a str, known: &[&str]) -> Result<Vec<Row<'a>>, St
             return Err(format!("line {line}: {fields}, the first line has {}", head.len()));
         }
         let cells = head.iter().copied().zip(cells).filter(|(_, cell)| !cell.is_empty());
-        Ok(Row { line, cells: cells.collect() })
+        made(Row { line, cells: cells.collect() })
     };
     lines.map(row).collect()
 }

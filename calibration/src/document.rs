@@ -25,6 +25,16 @@ pub(crate) use provenance::files_of;
 pub use provenance::{TOOL, command_line, origin, recordings_in};
 pub use written::{Written, name_of, write_file};
 
+/// Name of a gyro of a document by its number; a question mark where there is none.
+pub(crate) fn gyro_name(document: &Document, index: usize) -> &str {
+    document.gyro.sensor.get(index).map_or("?", |sensor| &sensor.name)
+}
+
+/// Likewise of an accelerometer.
+pub(crate) fn accel_name(document: &Document, index: usize) -> &str {
+    accelerometers(document).get(index).map_or("?", |sensor| &sensor.name)
+}
+
 /// The accelerometers of a document.
 pub fn accelerometers(document: &Document) -> &[AccelSensor] {
     document.accel.as_ref().map_or(&[], |accel| &accel.sensor)

@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 
 use isotherm_cli::Exit;
+use isotherm_correction::earth::PlaceError;
 use thiserror::Error;
 
 use crate::finding::Finding;
@@ -36,6 +37,13 @@ pub enum Error {
         /// Why.
         source: io::Error,
     },
+}
+
+/// Everything that is wrong with a stated place or attitude.
+impl From<Vec<PlaceError>> for Error {
+    fn from(errors: Vec<PlaceError>) -> Self {
+        Self::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+    }
 }
 
 impl Error {

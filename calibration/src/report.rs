@@ -34,7 +34,7 @@ pub use curve::{Curve, Judged, Rest, judge, output_unit};
 pub use figures::{alike, counted, fixed, or_dash, per_deg_c, short, six, superscript, table, within};
 pub(crate) use page::bars;
 pub use sigma::Sigmas;
-pub use verdict::{FLAT, SAME_SHARE, Verdict, residuals};
+pub use verdict::{FLAT, SAME_SHARE, Verdict, beside, residuals};
 
 pub(crate) use words::{grouped, gyros, of_logs, together};
 
@@ -91,12 +91,6 @@ impl Report {
     /// A report with nothing in it but what was done to which unit.
     pub fn new(title: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { title: title.into(), unit: unit.into(), ..Self::default() }
-    }
-
-    /// With the name of what its sizes are over.
-    pub fn counting(mut self, what: &'static str) -> Self {
-        self.counted = Some(what);
-        self
     }
 
     /// A report of something that has one sentence to say.

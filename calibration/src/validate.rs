@@ -78,7 +78,9 @@ pub fn validate(
     for (log, (faults, _)) in logs.iter().zip(readings) {
         let run = &log.run;
         let documents = [written.loaded.clone(), bare.clone()];
-        let mut tables = Table::together(run, &documents, Rows::valid(window_s), &mut watch)?.into_iter();
+        let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
+        let tables = Table::together_seen(run, &documents, Rows::valid(window_s), &mut watch, seen)?;
+        let mut tables = tables.into_iter();
         let mut next = || tables.next().unwrap_or_default();
         let (after, nominal) = (next(), next());
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
@@ -89,7 +91,6 @@ pub fn validate(
             );
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
         }
-        coverage.count(run, written, &mut watch)?;
         if let Some(reason) = at_rest(&run.name, &after) {
             return Err(Error::Refused([vec![reason], faults].concat()));
         }

@@ -377,12 +377,14 @@ static inline void isotherm_put_text(isotherm_writer *w, uint32_t most, isotherm
 #define ISOTHERM_TICK_PARITY_EXCEEDED (1u << 9)
 /* do not use: usable gyros do not span three axes, or uncalibrated */
 #define ISOTHERM_TICK_ANGLE_INVALID (1u << 10)
-/* likewise, of accelerometers */
+/* likewise, of accelerometers; or their tick lasts a quarter longer or shorter */
 #define ISOTHERM_TICK_VELOCITY_INVALID (1u << 11)
 /* servo transient subtracted */
 #define ISOTHERM_TICK_SERVO_TRANSIENT (1u << 12)
 /* servo transient without usable half-period counts */
 #define ISOTHERM_TICK_SERVO_UNMEASURED (1u << 13)
+/* none is missing, but the last end and this start are half a tick apart */
+#define ISOTHERM_TICK_TIME_STEP (1u << 14)
 
 /* used as read */
 #define ISOTHERM_SENSOR_VALID (1u << 0)

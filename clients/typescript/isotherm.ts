@@ -25,12 +25,14 @@ export const tickFlags = {
   PARITY_EXCEEDED: 512,
   /** do not use: usable gyros do not span three axes, or uncalibrated */
   ANGLE_INVALID: 1024,
-  /** likewise, of accelerometers */
+  /** likewise, of accelerometers; or their tick lasts a quarter longer or shorter */
   VELOCITY_INVALID: 2048,
   /** servo transient subtracted */
   SERVO_TRANSIENT: 4096,
   /** servo transient without usable half-period counts */
   SERVO_UNMEASURED: 8192,
+  /** none is missing, but the last end and this start are half a tick apart */
+  TIME_STEP: 16384,
 } as const;
 
 export const sensorFlags = {

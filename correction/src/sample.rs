@@ -97,6 +97,14 @@ pub struct GyroTick {
     pub series: u64,
 }
 
+impl GyroTick {
+    /// Whether it begins where another ended, to less than half its own duration.
+    pub(crate) fn follows(&self, last_end: Timestamp) -> bool {
+        let (since, own) = (self.end_time.since(last_end).as_ns(), self.duration.as_ns());
+        since.abs_diff(own) < self.duration.half().as_ns().unsigned_abs()
+    }
+}
+
 /// One raw tick of all accelerometers of a unit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AccelTick {
@@ -168,12 +176,16 @@ bitflags! {
         const PARITY_EXCEEDED = 1 << 9;
         /// Fewer than three usable gyros: the angle increments are not to be trusted.
         const ANGLE_INVALID = 1 << 10;
-        /// Fewer than three usable accelerometers: the velocity increments are not to be trusted.
+        /// Fewer than three usable accelerometers, or their tick lasted a quarter longer or shorter than the gyros': the velocity
+        /// increments are not to be trusted.
         const VELOCITY_INVALID = 1 << 11;
         /// The modelled or measured perimeter-servo transient was subtracted.
         const SERVO_TRANSIENT = 1 << 12;
         /// A perimeter-servo transient is running, but the half-period counts that would measure it are missing.
         const SERVO_UNMEASURED = 1 << 13;
+        /// The tick begins half a tick or more after the end of the one before it, or before that, and none is missing: the
+        /// increments are those of its own duration.
+        const TIME_STEP = 1 << 14;
     }
 }
 

@@ -1,7 +1,7 @@
 //! The arguments that say where a unit is, how it stands at rest, and how strong gravity is there.
 
 use clap::Args;
-use isotherm_correction::earth::{Place, PlaceError};
+use isotherm_correction::earth::Place;
 
 use crate::error::Error;
 use crate::fits::positions::gravity;
@@ -48,11 +48,6 @@ impl GravityArgs {
     }
 }
 
-/// That there is no such place or attitude.
-pub(super) fn misplaced(errors: Vec<PlaceError>) -> Error {
-    Error::Usage(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-}
-
 impl PlaceArgs {
     /// The place, where it must be known; `None` where it is said not to be.
     pub(crate) fn place(&self) -> Result<Option<Place>, Error> {
@@ -80,6 +75,6 @@ impl PlaceArgs {
             };
         };
         let tilt = self.pitch.zip(self.roll).map(|(pitch, roll)| [pitch, roll]);
-        Place::new(latitude, heading, tilt).map(Some).map_err(misplaced)
+        Ok(Some(Place::new(latitude, heading, tilt)?))
     }
 }

@@ -5,9 +5,8 @@
 //! are central differences over a millionth.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
-use nalgebra::DMatrix;
-use nalgebra_0_34 as minpack;
-use nalgebra_0_34::{Dyn, storage::Owned};
+use nalgebra::storage::Owned;
+use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::linear::{self, Undetermined};
 use crate::numbers::real;
@@ -68,7 +67,7 @@ impl Solution {
 /// # Errors
 /// Where the residuals do not determine the parameters, or no minimum was found.
 pub fn solve(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution> {
-    let problem = Problem { parameters: minpack::DVector::from_column_slice(start), residuals };
+    let problem = Problem { parameters: DVector::from_column_slice(start), residuals };
     let (problem, report) = LevenbergMarquardt::new().with_patience(100).minimize(problem);
     let good = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
@@ -83,29 +82,27 @@ pub fn solve(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<So
 /// # Errors
 /// Where the residuals do not determine the parameters.
 pub fn known(parameters: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution> {
-    solution(&Problem { parameters: minpack::DVector::from_column_slice(parameters), residuals })
+    solution(&Problem { parameters: DVector::from_column_slice(parameters), residuals })
 }
 
 fn solution<F: Fn(&[f64]) -> Vec<f64>>(problem: &Problem<F>) -> Result<Solution, NoSolution> {
     let parameters: Vec<f64> = problem.parameters.iter().copied().collect();
     let residuals = (problem.residuals)(&parameters);
-    let slopes = problem.slopes();
-    let slopes = DMatrix::from_iterator(slopes.nrows(), slopes.ncols(), slopes.iter().copied());
     let covariance =
-        linear::inverse(&slopes).map_err(|Undetermined(index)| NoSolution::NotDetermined(index))?;
+        linear::inverse(&problem.slopes()).map_err(|Undetermined(index)| NoSolution::NotDetermined(index))?;
     let chi_square = residuals.iter().map(|residual| residual * residual).sum();
     let degrees = residuals.len().saturating_sub(parameters.len());
     Ok(Solution { parameters, covariance, residuals, chi_square, degrees })
 }
 
 struct Problem<F> {
-    parameters: minpack::DVector<f64>,
+    parameters: DVector<f64>,
     residuals: F,
 }
 
 impl<F: Fn(&[f64]) -> Vec<f64>> Problem<F> {
     /// Derivatives of the residuals, one column per parameter.
-    fn slopes(&self) -> minpack::DMatrix<f64> {
+    fn slopes(&self) -> DMatrix<f64> {
         let mut at = self.parameters.as_slice().to_vec();
         let mut columns = Vec::with_capacity(at.len());
         for index in 0..at.len() {
@@ -116,9 +113,9 @@ impl<F: Fn(&[f64]) -> Vec<f64>> Problem<F> {
             let below = (self.residuals)(&at);
             at[index] = middle;
             let differences = above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * STEP));
-            columns.push(minpack::DVector::from_iterator(above.len(), differences));
+            columns.push(DVector::from_iterator(above.len(), differences));
         }
-        minpack::DMatrix::from_columns(&columns)
+        DMatrix::from_columns(&columns)
     }
 }
 
@@ -127,19 +124,19 @@ impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<F
     type JacobianStorage = Owned<f64, Dyn, Dyn>;
     type ParameterStorage = Owned<f64, Dyn>;
 
-    fn set_params(&mut self, parameters: &minpack::DVector<f64>) {
+    fn set_params(&mut self, parameters: &DVector<f64>) {
         self.parameters.copy_from(parameters);
     }
 
-    fn params(&self) -> minpack::DVector<f64> {
+    fn params(&self) -> DVector<f64> {
         self.parameters.clone()
     }
 
-    fn residuals(&self) -> Option<minpack::DVector<f64>> {
-        Some(minpack::DVector::from_vec((self.residuals)(self.parameters.as_slice())))
+    fn residuals(&self) -> Option<DVector<f64>> {
+        Some(DVector::from_vec((self.residuals)(self.parameters.as_slice())))
     }
 
-    fn jacobian(&self) -> Option<minpack::DMatrix<f64>> {
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
         Some(self.slopes())
     }
 }

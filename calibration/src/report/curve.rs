@@ -132,12 +132,6 @@ impl Curve {
     /// One verdict for each sensor of some curves, in the order of their first appearance, over all runs in and out of
     /// sample together, as [`Verdict::of_values`].
     pub fn verdicts(curves: &[Self]) -> Vec<Verdict> {
-        let mut names: Vec<&Self> = Vec::new();
-        for curve in curves {
-            if names.iter().all(|named| named.of != curve.of) {
-                names.push(curve);
-            }
-        }
         let values = |of: &str, sample: Sample| {
             let mine = || curves.iter().filter(|curve| curve.of == of && curve.sample == sample);
             let all = |values: fn(&Self) -> &[f64]| -> Vec<f64> {
@@ -149,7 +143,17 @@ impl Curve {
             let inside = values(&named.of, Sample::In).unwrap_or_default();
             Verdict::of_values(&named.of, &named.measure, inside, values(&named.of, Sample::Out))
         };
-        names.into_iter().map(verdict).collect()
+        Self::firsts(curves).into_iter().map(verdict).collect()
+    }
+
+    /// The first curve of each sensor.
+    pub(super) fn firsts<'a>(curves: impl IntoIterator<Item = &'a Self>) -> Vec<&'a Self> {
+        curves.into_iter().fold(Vec::new(), |mut firsts: Vec<&'a Self>, curve| {
+            if firsts.iter().all(|first| first.of != curve.of) {
+                firsts.push(curve);
+            }
+            firsts
+        })
     }
 }
 

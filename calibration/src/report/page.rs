@@ -239,12 +239,6 @@ fn spectrum(curves: &[Curve]) -> Option<Chart> {
         .iter()
         .filter(|curve| (curve.sample == Sample::Out) == outside && curve.window_s > 0.0)
         .collect();
-    let mut names: Vec<&Curve> = Vec::new();
-    for curve in &deciding {
-        if names.iter().all(|named| named.of != curve.of) {
-            names.push(curve);
-        }
-    }
     let panel_of = |named: &Curve| {
         let of = |values: fn(&Curve) -> &[f64]| {
             let same = |curve: &&&Curve| {
@@ -259,6 +253,7 @@ fn spectrum(curves: &[Curve]) -> Option<Chart> {
         let content = pair(of(|curve| &curve.before)?, of(|curve| &curve.after)?, Series::line);
         Some(Panel::of(&named.of, unit, HEIGHT, content).logarithmic())
     };
+    let names = Curve::firsts(deciding.iter().copied());
     let panels: Vec<Panel> = names.into_iter().filter_map(panel_of).collect();
     let caption = format!(
         "Square root of the power spectral density of the window means, {}: a slope to the left is left by \

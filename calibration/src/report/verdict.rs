@@ -200,6 +200,13 @@ fn worse(before: &[f64], after: &[f64]) -> Worse {
     if by_chance >= ACCIDENT && !doubled { Worse::ByNoise } else { Worse::Yes }
 }
 
+/// Verdicts of a second judgement, without what was refused in the first, whose own verdicts stay.
+pub fn beside(first: &[Verdict], second: Vec<Verdict>) -> Vec<Verdict> {
+    let refused =
+        |verdict: &Verdict| first.iter().find(|other| other.of == verdict.of && !other.accepted).cloned();
+    second.into_iter().map(|verdict| refused(&verdict).unwrap_or(verdict)).collect()
+}
+
 /// All verdicts, one sentence each.
 pub(super) fn sentences(verdicts: &[Verdict]) -> Vec<String> {
     if verdicts.is_empty() {

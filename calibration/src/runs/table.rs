@@ -176,17 +176,27 @@ impl Table {
     ///
     /// # Errors
     /// As [`Run::correct_together`].
-    pub fn together(
+    pub fn together(run: &Run, loaded: &[Loaded], rows: Rows, watch: impl Watch) -> Result<Vec<Self>, Error> {
+        Self::together_seen(run, loaded, rows, watch, |_, _| ())
+    }
+
+    /// The same; `seen` sees each tick of the first calibration, and its unit as it stands behind it.
+    ///
+    /// # Errors
+    /// As [`Run::correct_together`].
+    pub fn together_seen(
         run: &Run,
         loaded: &[Loaded],
         Rows { length_s: window_s, takes, whole }: Rows,
         watch: impl Watch,
+        mut seen: impl FnMut(&CorrectedTick, &Unit),
     ) -> Result<Vec<Self>, Error> {
         let mut tables = vec![Self { window_s, ..Self::default() }; loaded.len()];
         let mut rows: Vec<Row> = loaded.iter().map(|_| Row::default()).collect();
         let mut first = None;
         let each = |_: &GyroTick, ticks: &[CorrectedTick], unit: &Unit| {
             let Some(tick) = ticks.first() else { return };
+            seen(tick, unit);
             rows.iter_mut().zip(ticks).for_each(|(row, tick)| row.take(tick, takes));
             let Some(begin) = rows.first().and_then(|row| row.begin) else { return };
             let first = *first.get_or_insert(begin);

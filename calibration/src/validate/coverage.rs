@@ -1,15 +1,12 @@
 //! What of the fitted range of temperature the logs cover, and how often it was left.
 
-use std::slice;
-
-use isotherm_correction::sample::SensorFlags;
+use isotherm_correction::sample::{CorrectedTick, SensorFlags};
+use isotherm_correction::unit::Unit;
 use isotherm_pages::Table;
 
 use crate::document::{Written, accelerometers};
-use crate::error::Error;
 use crate::numbers::real;
 use crate::report::{or_dash, short};
-use crate::runs::{Run, Watch};
 
 /// Share of the fitted range that a judgement should cover.
 const ENOUGH: f64 = 0.5;
@@ -72,28 +69,23 @@ impl Coverage {
         }
     }
 
-    /// Goes through a run tick by tick.
-    pub(super) fn count(&mut self, run: &Run, written: &Written, watch: impl Watch) -> Result<(), Error> {
-        let (channels, gyros, accels) = (&mut self.channels, &mut self.gyros, &mut self.accels);
-        run.correct_together(slice::from_ref(&written.loaded), watch, |_, ticks, unit| {
-            let Some(tick) = ticks.first() else { return };
-            let flagged = gyros.iter_mut().zip(&tick.gyro_flags);
-            for (sensor, flags) in flagged.chain(accels.iter_mut().zip(&tick.accel_flags)) {
-                sensor.ticks += 1;
-                sensor.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
-                sensor.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
-                sensor.invalid += u64::from(!flags.contains(SensorFlags::VALID));
-            }
-            for (channel, report) in channels.iter_mut().zip(unit.channels()) {
-                if let Some(state) = report.state.filter(|_| !report.stale) {
-                    widen(&mut channel.seen, state.temperature);
-                    if !report.warming_up {
-                        widen(&mut channel.rate, state.rate);
-                    }
+    /// Counts a tick, with the unit as it stands behind it.
+    pub(super) fn count(&mut self, tick: &CorrectedTick, unit: &Unit) {
+        let flagged = self.gyros.iter_mut().zip(&tick.gyro_flags);
+        for (sensor, flags) in flagged.chain(self.accels.iter_mut().zip(&tick.accel_flags)) {
+            sensor.ticks += 1;
+            sensor.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
+            sensor.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
+            sensor.invalid += u64::from(!flags.contains(SensorFlags::VALID));
+        }
+        for (channel, report) in self.channels.iter_mut().zip(unit.channels()) {
+            if let Some(state) = report.state.filter(|_| !report.stale) {
+                widen(&mut channel.seen, state.temperature);
+                if !report.warming_up {
+                    widen(&mut channel.rate, state.rate);
                 }
             }
-        })?;
-        Ok(())
+        }
     }
 
     /// Names of the channels, where there was no reading of any of them.

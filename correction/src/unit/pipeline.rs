@@ -205,6 +205,7 @@ impl Pipeline {
             self.waiting.restart(first.end_time);
             self.turn_on = None;
         }
+        let mut begins = self.turn_on.is_none();
         let turn_on = *self.turn_on.get_or_insert(first.end_time);
         let uncalibrated = self.active.is_none();
         let held = uncalibrated && self.settings.uncalibrated == Uncalibrated::Hold;
@@ -215,6 +216,8 @@ impl Pipeline {
         let mut unseen = run.before.after(core::mem::take(&mut self.unseen));
         let mut accels = run.accels.iter();
         for tick in run.ticks {
+            let steps = !tick.follows(self.last_end) && !begins;
+            begins = false;
             self.last_end = tick.end_time;
             let accel = accels.next().map(|accel| &accel.tick);
             match &mut self.active {
@@ -250,6 +253,8 @@ impl Pipeline {
                 self.corrected.flags |= TickFlags::GAP;
                 self.counters.gaps += 1;
                 self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(untold.missed);
+            } else if steps {
+                self.corrected.flags |= TickFlags::TIME_STEP;
             }
             if untold.restart {
                 self.corrected.flags |= TickFlags::RESTART;

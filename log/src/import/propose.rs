@@ -112,7 +112,7 @@ impl<'a> File<'a> {
             let Some((columns, first)) = group else { continue };
             let (unit, scale) = self.sensor_unit(columns, &first, kind, proposal);
             let there: Vec<usize> = columns.into_iter().flatten().collect();
-            let may_be_empty = there.iter().any(|column| self.is_sparse(*column));
+            let may_be_empty = there.iter().all(|column| self.is_in_some_rows(*column));
             let part = scale.map_or_else(String::new, |scale| format!("{scale:?} "));
             let axes = |there: bool| {
                 let named =
@@ -394,14 +394,19 @@ impl<'a> File<'a> {
                 column.minimum,
                 column.maximum
             ));
-            found.push(Temperature { channel, column: *index, unit, may_be_empty: self.is_sparse(*index) });
+            let may_be_empty = column.empty > 0;
+            found.push(Temperature { channel, column: *index, unit, may_be_empty });
         }
         found
     }
 
-    /// Whether some rows have nothing in a column.
-    fn is_sparse(self, column: usize) -> bool {
-        self.figures.columns.get(column).is_some_and(|column| column.empty > 0)
+    /// Whether a column has a rhythm of its own. An empty cell now and then is a reading that is missing: its row is passed over, and
+    /// leaves a gap in every sensor's ticks.
+    fn is_in_some_rows(self, column: usize) -> bool {
+        self.figures
+            .columns
+            .get(column)
+            .is_some_and(|column| column.empty * 10 > column.numbers + column.other)
     }
 
     fn ask_columns(self) -> Question {

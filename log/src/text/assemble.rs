@@ -111,15 +111,11 @@ impl Assembler {
         self.settled = stamp;
     }
 
-    /// A row that could not be read; `stamp` where that much of it could.
-    pub(super) fn skip(&mut self, stamp: Option<i64>, columns: &Columns) {
+    /// A row that could not be read, which had ticks of gyros and of accelerometers or not; `stamp` where that much of it could.
+    pub(super) fn skip(&mut self, stamp: Option<i64>, had: [bool; 2], columns: &Columns) {
         self.close_all(stamp, columns);
-        for (timeline, cells) in [
-            (&mut self.gyro, columns.gyro.as_ref().map(|gyro| &gyro.ticks)),
-            (&mut self.accel, columns.accel.as_ref()),
-        ] {
-            // Where rows may be without such ticks, nobody knows whether this one had one.
-            if cells.is_some_and(|cells| !cells.may_be_empty) {
+        for (timeline, had) in [&mut self.gyro, &mut self.accel].into_iter().zip(had) {
+            if had {
                 timeline.skip(stamp);
             }
         }

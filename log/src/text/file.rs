@@ -153,6 +153,7 @@ impl FileReader {
     /// Reads one row, or notes the end.
     fn row(&mut self) -> Result<(), LogError> {
         let mut stamp = None;
+        self.cells.clear();
         let parts = match self.line() {
             Ok(false) => {
                 self.end();
@@ -185,7 +186,7 @@ impl FileReader {
         if matches!(fault.reason, Reason::BadStatus) {
             self.report.bad_status_rows += 1;
             self.bad_since += 1;
-            self.assembler.skip(stamp, &self.columns);
+            self.skip(stamp);
             return Ok(());
         }
         let cut_short = matches!(fault.reason, Reason::CutShort);
@@ -207,8 +208,18 @@ impl FileReader {
             // The rows behind it follow it, not what is before it.
             self.last_stamp = stamp;
         }
-        self.assembler.skip(stamp, &self.columns);
+        self.skip(stamp);
         Ok(())
+    }
+
+    /// Leaves a gap where the row had ticks.
+    fn skip(&mut self, stamp: Option<i64>) {
+        let row = Row::new(self.lines.line(), &self.cells, &self.layout);
+        // Of a row without a cell nobody knows.
+        let has = |cells: &TickCells| !cells.may_be_empty || row.has_readings(cells).unwrap_or(false);
+        let gyro = self.columns.gyro.as_ref().is_some_and(|gyro| has(&gyro.ticks));
+        let accel = self.columns.accel.as_ref().is_some_and(has);
+        self.assembler.skip(stamp, [gyro, accel], &self.columns);
     }
 
     /// There are no further rows: everything can be given.
@@ -254,8 +265,7 @@ impl FileReader {
 
     /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
     fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Parts, Fault> {
-        let row =
-            Row { line: self.lines.line(), cells: &self.cells, decimal_mark: self.layout.decimal_mark as u8 };
+        let row = Row::new(self.lines.line(), &self.cells, &self.layout);
         let now = if let Some(cell) = self.columns.stamps {
             let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
             if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {

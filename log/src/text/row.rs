@@ -8,7 +8,7 @@ use super::dates::stamp_ns;
 use super::error::Reason;
 use super::number;
 use super::resolve::{GyroCells, Source, StateCell, TickCells, TimeCell};
-use crate::mapping::StatusMapping;
+use crate::mapping::{Layout, StatusMapping};
 
 /// What is wrong with a row: the cell's index and the reason.
 #[derive(Debug)]
@@ -23,11 +23,11 @@ pub(super) struct Fault {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<'a> {
     /// The line.
-    pub(super) line: &'a [u8],
+    line: &'a [u8],
     /// Where its cells are.
-    pub(super) cells: &'a [Cell],
+    cells: &'a [Cell],
     /// Decimal mark.
-    pub(super) decimal_mark: u8,
+    decimal_mark: u8,
 }
 
 /// Readings of one kind in a row, before they have a time.
@@ -55,6 +55,11 @@ pub(super) struct GyroStates {
 }
 
 impl<'a> Row<'a> {
+    /// The cells of a line.
+    pub(super) fn new(line: &'a [u8], cells: &'a [Cell], layout: &Layout) -> Self {
+        Self { line, cells, decimal_mark: layout.decimal_mark as u8 }
+    }
+
     /// What a cell holds; an empty cell is in order.
     fn text(&self, cell: usize) -> Result<&'a [u8], Fault> {
         let found = self.cells.get(cell).and_then(|at| self.line.get(at.start..at.end));
@@ -139,7 +144,7 @@ impl<'a> Row<'a> {
 
     /// Readings of one kind; `None` where the row has none and may have none.
     pub(super) fn readings(&self, cells: &TickCells) -> Result<Option<Readings>, Fault> {
-        if cells.may_be_empty && self.all_empty(cells)? {
+        if cells.may_be_empty && !self.has_readings(cells)? {
             return Ok(None);
         }
         let mut values = sample::Readings::default();
@@ -174,14 +179,14 @@ impl<'a> Row<'a> {
         sequence.ok_or(Fault { cell: Some(cell), reason: Reason::NotASequence })
     }
 
-    /// Whether all sensors' cells hold nothing.
-    fn all_empty(&self, cells: &TickCells) -> Result<bool, Fault> {
+    /// Whether any sensor's cell holds something.
+    pub(super) fn has_readings(&self, cells: &TickCells) -> Result<bool, Fault> {
         for cell in cells.sensors.iter().filter_map(|(source, _)| source.cell()) {
             if !self.is_empty(cell)? {
-                return Ok(false);
+                return Ok(true);
             }
         }
-        Ok(true)
+        Ok(false)
     }
 
     /// What gyros have beside their readings.

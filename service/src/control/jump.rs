@@ -20,6 +20,9 @@ const BIAS: &str = "bias";
 const SCALE: &str = "scale";
 const AXIS: &str = "input axis";
 
+/// Bias, scale and input axis of each sensor.
+type Sensors<'a> = (&'a [f64], &'a [f64], &'a [[f64; 3]]);
+
 /// Sensors of one kind: what is said of them, in which unit, and how far their output steps.
 struct Kind {
     section: &'static str,
@@ -31,8 +34,7 @@ struct Kind {
     steps: [f64; 3],
     /// Most that they sense at rest.
     input: f64,
-    /// Bias, scale and input axis of each.
-    sensors: fn(&Steady) -> (&[f64], &[f64], &[[f64; 3]]),
+    sensors: fn(&Steady) -> Sensors<'_>,
 }
 
 /// Each axis along which the output would jump by more than is allowed: the entry that does most of it, and words.
@@ -106,10 +108,10 @@ impl Kind {
     }
 
     /// Of which sensor which part does most along a case axis, and how much: a bias as it is, of the others the most that they can do.
-    fn most(&self, both: &[Steady; 2], axis: usize) -> Option<(usize, &'static str, f64)> {
+    fn most(&self, both: &[Steady; 2], case_axis: usize) -> Option<(usize, &'static str, f64)> {
         let [(old_bias, old_scale, old_axes), (bias, scale, axes)] = both.each_ref().map(self.sensors);
         let parts = (0..bias.len()).filter_map(|i| {
-            let along = *axes.get(i)?.get(axis)?;
+            let along = *axes.get(i)?.get(case_axis)?;
             let scaled = (scale.get(i)? / old_scale.get(i)? - 1.0) * self.input;
             let turned = turn_rad(*old_axes.get(i)?, *axes.get(i)?) * self.input;
             // It is subtracted.
@@ -128,8 +130,8 @@ impl Kind {
             _ => element(&join(self.section, "sensor"), sensor),
         };
         let is_of = |key: &str| SCALES.iter().any(|scale| key.contains(scale)) == (part == SCALE);
-        let mut changed =
+        let mut entries =
             changes.iter().filter(|change| change.key.starts_with(&within) && is_of(&change.key));
-        changed.next().map_or(within, |change| change.key.clone())
+        entries.next().map_or(within, |change| change.key.clone())
     }
 }

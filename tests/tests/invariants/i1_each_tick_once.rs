@@ -1,8 +1,9 @@
 //! I1: every raw gyro tick gives exactly one corrected tick, or is counted in a gap that the next output announces.
 //! Duplicates give none.
 
-use isotherm_correction::sample::{CorrectedTick, GyroTick, TickFlags};
+use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TickFlags};
 use isotherm_correction::unit::{Event, Uncalibrated, Unit, UnitSettings};
+use isotherm_correction::units::Span;
 use isotherm_tests::calibrations::{compile, identity};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro};
@@ -174,4 +175,38 @@ fn i1_the_last_number_of_all_is_given_once() {
     }
     assert_eq!(out.len(), 3, "{out:?}");
     assert_eq!(unit.counters().gyro_duplicates, 2);
+}
+
+#[test]
+fn a_tick_that_does_not_begin_where_the_last_one_ended_says_so() {
+    // From the tenth tick on the clock is ahead, by ticks that nobody numbered; from the twentieth on it is back.
+    let later = |k: u64| if (10..20).contains(&k) { k + 3 } else { k };
+    let events = (0..30).flat_map(|k| {
+        let time = gyro(later(k), &RATES).end_time;
+        let (gyro, accel) = (gyro(k, &RATES), accel(k, &RATES));
+        [
+            Owned::Accel(vec![AccelTick { end_time: time, ..accel }]),
+            Owned::Gyro(vec![GyroTick { end_time: time, ..gyro }]),
+        ]
+    });
+    let mut unit = drive::unit(&compile(&identity()));
+    let out = drive::run(&mut unit, &events.collect::<Vec<_>>());
+    let stepped = out.iter().filter(|tick| tick.flags.contains(TickFlags::TIME_STEP));
+    assert_eq!(stepped.map(|tick| tick.sequence).collect::<Vec<_>>(), [10]);
+    assert!(out.iter().all(|tick| !tick.flags.contains(TickFlags::GAP) || tick.missed > 0));
+}
+
+#[test]
+fn velocity_over_another_time_than_the_angle_is_not_to_be_trusted() {
+    let lasting = |k: u64, percent: i64| {
+        let tick = accel(k, &RATES);
+        let duration = Span::from_ns(tick.duration.as_ns() / 100 * percent);
+        [Owned::Accel(vec![AccelTick { duration, ..tick }]), Owned::Gyro(vec![gyro(k, &RATES)])]
+    };
+    for (percent, trusted) in [(50, false), (80, true), (100, true), (120, true), (200, false)] {
+        let mut unit = drive::unit(&compile(&identity()));
+        let out = drive::run(&mut unit, &(0..20).flat_map(|k| lasting(k, percent)).collect::<Vec<_>>());
+        let is_trusted = |tick: &CorrectedTick| !tick.flags.contains(TickFlags::VELOCITY_INVALID);
+        assert!(out.len() == 20 && out.iter().all(|tick| is_trusted(tick) == trusted), "{percent} %");
+    }
 }

@@ -2,11 +2,11 @@
 
 use clap::Args;
 
-use crate::cli::place::misplaced;
 use crate::error::Error;
 use crate::fits::rates::steps::axis;
 use crate::fits::thermal::{Site, Stand, Turning};
 use crate::limits::within;
+use crate::report::counted;
 
 /// Rates of a table that can be used (°/s).
 const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
@@ -53,10 +53,10 @@ impl StandArgs {
         ];
         if let Some((name, count)) = counts.into_iter().find(|(_, count)| *count > 1 && *count != all) {
             let judging = if judges > 0 { format!(" and {judges} of --judge") } else { String::new() };
-            let logs = if runs == 1 { "log" } else { "logs" };
             return Err(Error::Usage(format!(
-                "{count} times {name} for {runs} {logs}{judging}: state it once for all, or once for each log in \
-                 their order, then for those of --judge"
+                "{count} times {name} for {}{judging}: state it once for all, or once for each log in their order, \
+                 then for those of --judge",
+                counted(runs, "log", "logs")
             )));
         }
         if self.latitude.is_none() && self.rate.is_empty() {
@@ -70,7 +70,7 @@ impl StandArgs {
             return Ok(Site::Unknown);
         };
         let tilt = of_run(&self.pitch, run).zip(of_run(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
-        Site::at(latitude, heading, tilt, self.gravity).map_err(misplaced)
+        Ok(Site::at(latitude, heading, tilt, self.gravity)?)
     }
 
     fn turning(&self, run: usize) -> Result<Option<Turning>, Error> {

@@ -50,7 +50,8 @@ pub(super) fn tables(sheet: &mut Report, document: &Document) {
     let mut rows = Vec::new();
     for part in &parts {
         for residual in part.about.get("residual").and_then(Value::as_array).into_iter().flatten() {
-            let Some(mut row) = residual.as_table().and_then(of_table) else { continue };
+            let Ok(residual) = residual.clone().try_into::<Residual>() else { continue };
+            let mut row = of_residual(&residual);
             row[0] = format!("{}: {}", part.name, row[0]);
             rows.push(row);
         }
@@ -76,23 +77,12 @@ pub(super) fn of_residual(residual: &Residual) -> Vec<String> {
         Measure::DegPerH => "°/h",
         Measure::MetresPerSecondSquared => "m/s²",
     };
-    let peaks = residual.peak_to_peak_before.zip(residual.peak_to_peak_after).map(|(a, b)| [a, b]);
-    let rms = [residual.rms_before, residual.rms_after];
-    row(&residual.of, measure, residual.sample == Sample::In, rms, peaks)
-}
-
-/// The same as a part's origin keeps it.
-fn of_table(residual: &Table) -> Option<Vec<String>> {
-    let number = |key: &str| residual.get(key).and_then(Value::as_float);
-    let measure = if residual.get("measure")?.as_str()? == "deg/h" { "°/h" } else { "m/s²" };
-    let inside = residual.get("sample")?.as_str()? == "in";
-    let peaks = number("peak_to_peak_before").zip(number("peak_to_peak_after")).map(|(a, b)| [a, b]);
-    let rms = [number("rms_before")?, number("rms_after")?];
-    Some(row(residual.get("of")?.as_str()?, measure, inside, rms, peaks))
-}
-
-fn row(of: &str, measure: &str, inside: bool, rms: [f64; 2], peaks: Option<[f64; 2]>) -> Vec<String> {
-    let pair = |[before, after]: [f64; 2]| format!("{} → {}", short(before), short(after));
-    let sample = if inside { "in sample" } else { "out of sample" };
-    vec![format!("{of}, {measure}, {sample}"), pair(rms), or_dash(peaks.map(pair))]
+    let pair = |(before, after): (f64, f64)| format!("{} → {}", short(before), short(after));
+    let sample = if residual.sample == Sample::In { "in sample" } else { "out of sample" };
+    let peaks = residual.peak_to_peak_before.zip(residual.peak_to_peak_after);
+    vec![
+        format!("{}, {measure}, {sample}", residual.of),
+        pair((residual.rms_before, residual.rms_after)),
+        or_dash(peaks.map(pair)),
+    ]
 }

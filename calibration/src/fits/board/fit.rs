@@ -12,7 +12,7 @@ use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
 use crate::numbers::{dot, hull, once_each};
-use crate::report::{Curve, Judged, Report, Rest, Sigmas, fixed, judge, per_deg_c, short};
+use crate::report::{Curve, Judged, Report, Rest, Sigmas, beside, fixed, judge, per_deg_c, short};
 use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
@@ -93,8 +93,6 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
         })
         .collect();
     if !worse.is_empty() {
-        // Verdicts of these axes stay; the others are judged again, without them.
-        let kept: Vec<_> = verdicts.iter().filter(|verdict| !verdict.accepted).cloned().collect();
         for (found, axis) in found.iter_mut().zip(&mains).filter(|(_, axis)| worse.contains(axis)) {
             if found.is_ok() {
                 *found = Err(AccelKind::MadeWorse { axis: *axis });
@@ -103,12 +101,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
         written = Written::of(&with(wanted.base, &found))?;
         let again = judged(wanted, [&given, &written], &mut watch)?;
         (curves, troubles) = (again.curves, once_each([troubles, again.troubles].concat()));
-        verdicts = Curve::verdicts(&curves);
-        for verdict in &mut verdicts {
-            if let Some(refused) = kept.iter().find(|kept| kept.of == verdict.of) {
-                *verdict = refused.clone();
-            }
-        }
+        verdicts = beside(&verdicts, Curve::verdicts(&curves));
     }
     let mut report =
         Report::new("Ratio of the accelerometers' board over its temperature", &wanted.base.unit);

@@ -218,11 +218,6 @@ impl Columns {
         let time = self.end_ns.get(tick).zip(self.end_ns.first());
         time.map_or(0.0, |(end, first)| seconds(end.saturating_sub(*first)))
     }
-
-    /// Symbol of the readings' unit of measure.
-    pub fn measure(&self) -> &'static str {
-        self.kind.measure()
-    }
 }
 
 impl Kind {

@@ -76,14 +76,19 @@ impl Found {
         report
     }
 
+    /// What a sensor's fit says of a coefficient, and the unit that it is stated in.
+    fn coefficient(&self, sensor: &Analysis, term: Term) -> (Option<Coefficient>, &'static str) {
+        let (factor, unit) = stated_in(term, self.kind);
+        (sensor.stated_noise().map(|noise| noise.of_term(term).times(factor)), unit)
+    }
+
     /// What was found of a sensor, in one sentence.
     fn verdict(&self, sensor: &Analysis) -> Verdict {
-        let walk = sensor.stated_noise().map(|noise| noise.of_term(Term::AngleRandomWalk));
-        let (factor, unit) = stated_in(Term::AngleRandomWalk, self.kind);
+        let (walk, unit) = self.coefficient(sensor, Term::AngleRandomWalk);
         let mut words = match walk {
             None if sensor.noise.is_some() => "more than the five noise terms".to_owned(),
-            Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value * factor)),
-            Some(Coefficient::NotObservable { below }) => format!("N below {} {unit}", short(below * factor)),
+            Some(Coefficient::Observed { value, .. }) => format!("N {} {unit}", short(value)),
+            Some(Coefficient::NotObservable { below }) => format!("N below {} {unit}", short(below)),
             None => "too short for noise coefficients".to_owned(),
         };
         let _ = match sensor.slow_drift() {
@@ -116,15 +121,12 @@ impl Found {
         let trends = format!("trend, {}", self.kind.over_hours(1));
         let head = [String::new()].into_iter().chain(stated).chain(slow).chain([trends]);
         let row = |sensor: &Analysis| {
-            let noise = Term::ALL.map(|term| {
-                let factor = stated_in(term, self.kind).0;
-                match sensor.stated_noise().map(|noise| noise.of_term(term)) {
-                    Some(Coefficient::Observed { value, .. }) => short(value * factor),
-                    Some(Coefficient::NotObservable { below }) if below.is_finite() => {
-                        format!("< {}", short(below * factor))
-                    }
-                    _ => "–".to_owned(),
+            let noise = Term::ALL.map(|term| match self.coefficient(sensor, term).0 {
+                Some(Coefficient::Observed { value, .. }) => short(value),
+                Some(Coefficient::NotObservable { below }) if below.is_finite() => {
+                    format!("< {}", short(below))
                 }
+                _ => "–".to_owned(),
             });
             let part = sensor.slow_drift().filter(|(_, time)| time.value <= self.length_h);
             let slope = match trend(sensor) {
@@ -182,18 +184,14 @@ impl Found {
     /// The noise coefficients, one row per coefficient.
     fn noise_rows(&self) -> Table {
         let row = |term: Term| {
-            let (factor, unit) = stated_in(term, self.kind);
-            let cells = self.sensors.iter().map(|sensor| {
-                match sensor.stated_noise().map(|noise| noise.of_term(term)) {
-                    None if sensor.noise.is_some() => "not stated".to_owned(),
-                    Some(Coefficient::Observed { value, interval }) => {
-                        within(value * factor, interval.map(|end| end * factor))
-                    }
-                    Some(Coefficient::NotObservable { below }) if below.is_finite() => {
-                        format!("not observable (< {})", short(below * factor))
-                    }
-                    _ => "not observable".to_owned(),
+            let (_, unit) = stated_in(term, self.kind);
+            let cells = self.sensors.iter().map(|sensor| match self.coefficient(sensor, term).0 {
+                None if sensor.noise.is_some() => "not stated".to_owned(),
+                Some(Coefficient::Observed { value, interval }) => within(value, interval),
+                Some(Coefficient::NotObservable { below }) if below.is_finite() => {
+                    format!("not observable (< {})", short(below))
                 }
+                _ => "not observable".to_owned(),
             });
             std::iter::once(format!("{} {}, {unit}", term.symbol(), term.name())).chain(cells).collect()
         };
@@ -328,14 +326,12 @@ impl Found {
         let allan: Vec<Value> = sensor.allan.iter().map(deviations).collect();
         let mut noise = Map::new();
         for term in Term::ALL {
-            let (factor, unit) = stated_in(term, self.kind);
-            let value = match sensor.stated_noise().map(|noise| noise.of_term(term)) {
+            let (found, unit) = self.coefficient(sensor, term);
+            let value = match found {
                 Some(Coefficient::Observed { value, interval }) => {
-                    json!({ "value": value * factor, "interval": interval.map(|end| end * factor), "unit": unit })
+                    json!({ "value": value, "interval": interval, "unit": unit })
                 }
-                Some(Coefficient::NotObservable { below }) => {
-                    json!({ "below": below * factor, "unit": unit })
-                }
+                Some(Coefficient::NotObservable { below }) => json!({ "below": below, "unit": unit }),
                 None => Value::Null,
             };
             noise.insert(term.symbol().to_owned(), value);

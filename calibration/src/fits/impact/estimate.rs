@@ -92,13 +92,3 @@ pub fn residual(
     }
     Ok(left)
 }
-
-/// The same parts without the state of the trend.
-pub fn without_trend(parts: &DriftParts) -> DriftParts {
-    DriftParts { trend_sigma_rad_per_s2: 0.0, ..*parts }
-}
-
-/// The same parts without the Markov part.
-pub fn trend_alone(parts: &DriftParts) -> DriftParts {
-    DriftParts { sigma_rad_per_s: 0.0, ..*parts }
-}

@@ -4,7 +4,7 @@ use clap::{ArgAction, Args};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 
-use super::estimate::{Aiding, TICK_S, residual, trend_alone, without_trend};
+use super::estimate::{Aiding, TICK_S, residual};
 use super::ins::{Errors, GREATEST_LATITUDE_DEG, Ins, TURN_RATIO};
 use crate::error::Error;
 use crate::limits::within;
@@ -155,8 +155,10 @@ impl Voyage {
                 };
                 let parts = match care {
                     Care::WithTrend => *parts,
-                    Care::TrendAlone => parts.each_ref().map(trend_alone),
-                    Care::Held | Care::WithoutTrend => parts.each_ref().map(without_trend),
+                    Care::TrendAlone => parts.map(|parts| DriftParts { sigma_rad_per_s: 0.0, ..parts }),
+                    Care::Held | Care::WithoutTrend => {
+                        parts.map(|parts| DriftParts { trend_sigma_rad_per_s2: 0.0, ..parts })
+                    }
                 };
                 residual(&drift.truth, &drift.measured, &parts, &aiding).map_err(Error::Refused)?
             }

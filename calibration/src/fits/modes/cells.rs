@@ -3,14 +3,14 @@
 //! The columns are the corrector's own: static bias (T − `T_ref`)ʲ with the coefficient 1 °/h, less the bare correction. The
 //! magnetic and the slow-meander term are the same polynomials with the tick's signs, so signs times columns are theirs.
 
-mod jackknife;
+mod cutter;
 
 use isotherm_correction::sample::TickFlags;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Curve, Document, Orientation, OrientationThermal, Shape};
 
-use jackknife::Jackknife;
+use cutter::Cutter;
 
 use crate::document::Written;
 use crate::error::Error;
@@ -145,8 +145,8 @@ pub fn gather(
     for (number, run) in runs.iter().enumerate() {
         let begin_s = real(number) * BETWEEN_RUNS_S;
         let run = run.of_gyros(group);
-        let mut jackknife =
-            Jackknife::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
+        let mut cutter =
+            Cutter::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
         let troubles = run.correct_together(&loaded, &mut *watch, |raw, ticks, unit| {
             let Some(bare) = ticks.first() else { return };
             gathered.ticks[0] += 1;
@@ -155,9 +155,9 @@ pub fn gather(
                 velocity.iter_mut().zip(bare.delta_velocity).for_each(|(sum, dv)| *sum += dv);
                 force_s += bare.duration.as_s();
             }
-            jackknife.take(raw, ticks, unit, &mut gathered);
+            cutter.take(raw, ticks, unit, &mut gathered);
         })?;
-        jackknife.close(&mut gathered);
+        cutter.close(&mut gathered);
         gathered.troubles.extend(troubles.into_iter().next().unwrap_or_default());
     }
     gathered.force = (force_s > 0.0).then(|| velocity.map(|sum| sum / force_s));

@@ -9,6 +9,7 @@ use super::seen::Stay;
 use super::switches::Switches;
 use super::{steps, units};
 use crate::axes::AXES;
+use crate::document::gyro_name;
 use crate::numbers::{Size, dot, ends, median, real, scatter_of_steps};
 use crate::report::{counted, short, six};
 use crate::runs::swapped::Shown;
@@ -91,8 +92,7 @@ pub fn before(switches: &Switches, document: &Document, transition_ticks: Option
              document"
         ));
     }
-    let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("?", |sensor| sensor.name.as_str());
-    let seen = || switches.seen.iter().enumerate().map(|(sensor, seen)| (name(sensor), seen));
+    let seen = || switches.seen.iter().enumerate().map(|(sensor, seen)| (gyro_name(document, sensor), seen));
     for (dead, _) in seen().filter(|(_, seen)| seen.is_dead()) {
         reasons.push(format!(
             "gyro {dead} has a constant reading, or no number, in all {} ticks: it is dead, or its column is wrong",

@@ -3,13 +3,12 @@
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
-use super::cells::{Cut, gather, groups};
+use super::cells::{Cell, Cut, gather, groups};
 use super::checks;
 use super::dither;
 use super::document::{self, base_constant, reference_of};
-
 use super::model::{Asked, Given, GyroFit, fit};
-use super::prepare::{check, earth_of, earth_rate, gaps, provisional, transition_ticks, window_s};
+use super::prepare::{check, earth_rate, gaps, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
 use super::switches::Switches;
 use super::{temperatures, units};
@@ -125,8 +124,11 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
             warnings.extend(units::other_dither(&switches, wanted.base, median(&deg_c)));
         }
         for (place, sensor) in group.into_iter().enumerate() {
-            let along: Vec<f64> =
-                gathered.cells.iter().map(|cell| earth_of(&bare, sensor, cell, earth)).collect();
+            let of_cell = |cell: &Cell| {
+                let row = document::row(&bare, sensor, cell.axes_deg_c);
+                earth.map_or(0.0, |earth| checks::earth_along(row, earth))
+            };
+            let along: Vec<f64> = gathered.cells.iter().map(of_cell).collect();
             let given = Given {
                 cells: &gathered.cells,
                 place,
@@ -145,11 +147,8 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     let gyros: Vec<Result<GyroFit, String>> = gyros.into_iter().flatten().collect();
     let servos: Vec<Result<ServoFit, String>> = servos.into_iter().flatten().collect();
     if gyros.iter().all(Result::is_err) {
-        let name = |sensor: usize| &wanted.base.gyro.sensor[sensor].name;
-        let reasons = gyros
-            .iter()
-            .enumerate()
-            .filter_map(|(sensor, fit)| Some(format!("gyro {}: {}", name(sensor), fit.as_ref().err()?)));
+        let sensors = wanted.base.gyro.sensor.iter().zip(gyros);
+        let reasons = sensors.filter_map(|(of, fit)| Some(format!("gyro {}: {}", of.name, fit.err()?)));
         return Err(Error::Refused(reasons.collect()));
     }
     warnings.extend(document::inverted(wanted.base, &gyros, reference_deg_c));

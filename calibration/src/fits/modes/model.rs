@@ -24,6 +24,8 @@ const FAR_SIGMAS: f64 = 6.0;
 const FAR_SHARE: f64 = 0.1;
 /// Rounds of leaving out.
 const ROUNDS: usize = 3;
+/// What is wrong where there is no solution.
+const SINGULAR: &str = "its terms cannot be separated: both modes are needed at every temperature";
 
 /// A term of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,9 +156,7 @@ pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
     for _ in 0..ROUNDS {
         let whole = data.with_columns(&full.columns());
         noise = whole.noise();
-        let solution = whole
-            .solve(noise)
-            .ok_or("its terms cannot be separated: both modes are needed at every temperature")?;
+        let solution = whole.solve(noise).ok_or(SINGULAR)?;
         let white = whole.whitened(noise);
         let left = &white.value - &white.columns * &solution.coefficients;
         let far: Vec<bool> = left.iter().map(|x| x.abs() > FAR_SIGMAS).collect();
@@ -181,9 +181,8 @@ pub fn fit(given: Given<'_>, asked: Asked) -> Result<GyroFit, String> {
         return Err(format!("{} means are too few for {width} coefficients: take a longer run", own.len()));
     }
     let noise = own.noise();
-    let singular = "its terms cannot be separated: both modes are needed at every temperature";
-    let solution = own.solve(noise).ok_or(singular)?;
-    let covariance = own.covariance(noise).ok_or(singular)?;
+    let solution = own.solve(noise).ok_or(SINGULAR)?;
+    let covariance = own.covariance(noise).ok_or(SINGULAR)?;
     let coefficients = model.terms().into_iter().enumerate().map(|(index, (term, power))| Fitted {
         term,
         power,

@@ -3,11 +3,12 @@
 use isotherm_correction::units::Span;
 use isotherm_protocol::document::{Curve, Document, Servo, ServoKind, Shape, Unit};
 
-use super::cells::{Cell, Gathered};
+use super::cells::Gathered;
 use super::fit::Wanted;
 use super::servo::Transient;
 use super::switches::Switches;
 use super::{checks, document, temperatures};
+use crate::document::gyro_name;
 use crate::error::Error;
 use crate::runs::Watch;
 use crate::runs::swapped::force_at_rest;
@@ -55,11 +56,6 @@ pub(super) fn earth_rate(wanted: &Wanted<'_>, gathered: &Gathered) -> Result<Opt
     wanted.place.as_ref().map(|place| table::earth_rate(place, gathered.force)).transpose()
 }
 
-/// Earth rate along the input axis of a gyro in a cell (°/h).
-pub(super) fn earth_of(document: &Document, sensor: usize, cell: &Cell, earth: Option<[f64; 3]>) -> f64 {
-    earth.map_or(0.0, |earth| checks::earth_along(document::row(document, sensor, cell.axes_deg_c), earth))
-}
-
 /// Looks at what was gathered of three gyros: warnings.
 ///
 /// # Errors
@@ -71,7 +67,7 @@ pub(super) fn check(
     earth: Option<[f64; 3]>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<String>, Error> {
-    let names = group.map(|sensor| bare.gyro.sensor[sensor].name.as_str());
+    let names = group.map(|sensor| gyro_name(bare, sensor));
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
     let along = earth
         .map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));

@@ -62,13 +62,12 @@ impl Made {
 fn notes(made: &Made, report: &mut Report) {
     let switches = &made.switches;
     report.notes.push(format!(
-        "{} ticks of {} s, {} mode switches, every {} s; a switch loses {} {}.",
+        "{} ticks of {} s, {} mode switches, every {} s; a switch loses {}.",
         switches.ticks,
         short(switches.tick_s),
         switches.between_s.len() + 1,
         short(switches.period_s()),
-        made.transition_ticks,
-        if made.transition_ticks == 1 { "tick" } else { "ticks" },
+        counted(made.transition_ticks.into(), "tick", "ticks"),
     ));
     report.notes.push(format!(
         "Drift is the mean rate in running mode over {} s, whole reversal periods, less the Earth's. Before: without static, \

@@ -6,6 +6,7 @@ use isotherm_protocol::document::{Document, GyroOutput};
 use super::checks::TURNING_DEG_PER_H;
 use super::document::count_arcsec;
 use super::switches::Switches;
+use crate::document::gyro_name;
 use crate::numbers::{median, real};
 use crate::report::{gyros, short};
 
@@ -48,17 +49,18 @@ pub(super) fn rates(switches: &Switches, document: &Document) -> Option<String> 
 pub(super) fn half_periods(switches: &Switches, document: &Document) -> Vec<String> {
     const MEND: &str = "The correction removes the dither by them: correct their columns in the mapping, or leave \
                         them out";
-    let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("?", |sensor| sensor.name.as_str());
     let mut reasons = Vec::new();
     let seen = || switches.seen.iter().enumerate();
-    let dead: Vec<&str> =
-        seen().filter(|(_, seen)| seen.has_dead_halves()).map(|(sensor, _)| name(sensor)).collect();
+    let dead: Vec<&str> = seen()
+        .filter(|(_, seen)| seen.has_dead_halves())
+        .map(|(sensor, _)| gyro_name(document, sensor))
+        .collect();
     if !dead.is_empty() {
         reasons.push(format!("{}: all half-period counts are zero. {MEND}", gyros(&dead)));
     }
     let impossible: Vec<(&str, f64)> = seen()
         .filter(|(_, seen)| !seen.has_dead_halves())
-        .filter_map(|(sensor, _)| Some((name(sensor), dither_hz(switches, sensor)?)))
+        .filter_map(|(sensor, _)| Some((gyro_name(document, sensor), dither_hz(switches, sensor)?)))
         .filter(|(_, hz)| !(0.0..LARGEST_HZ).contains(hz))
         .collect();
     if !impossible.is_empty() {

@@ -152,7 +152,7 @@ pub(super) fn spread(plan: &Plan, taken: &[Taken], (bad, sensors): (&[usize], us
     };
     vec![format!(
         "{} not determine scale factor, bias and axis of {}: {lacking}",
-        if taken.len() == 1 { "1 position does".to_owned() } else { format!("{} positions do", taken.len()) },
+        counted(taken.len(), "position does", "positions do"),
         several("accelerometer", bad, sensors)
     )]
 }

@@ -1,58 +1,32 @@
 //! Sensors that nothing can be made of.
 
+use std::collections::BTreeMap;
+
 use super::pose::Pose;
 use super::track::Track;
 use crate::axes::{sensor_name, several};
-use crate::report::{counted, six};
+use crate::report::{counted, grouped, six};
 use crate::runs::faults::{self, Fault};
-
-/// Takes another fault of the same kind in; false where it is another one.
-fn takes(known: &mut Fault, other: Fault) -> bool {
-    match (known, other) {
-        (Fault::Dead(one), Fault::Dead(other)) => one.total_cmp(&other).is_eq(),
-        (Fault::Twin(one), Fault::Twin(other)) => *one == other,
-        (Fault::Missing(one), Fault::Missing(other)) => {
-            if other[0] > one[0] {
-                *one = other;
-            }
-            true
-        }
-        _ => false,
-    }
-}
 
 /// Sensors of runs that read the same in every tick, the same as another one, or too often nothing: what is wrong and what to do.
 /// Those with one fault are named together, and so are runs.
 pub fn dead(tracks: &[Track]) -> Vec<String> {
-    // Kind and number of sensors, the sensors, the runs, and what is wrong with them.
-    type Found<'a> = ((&'a str, usize), Vec<usize>, Vec<&'a str>, Fault);
-    let mut faults: Vec<Found<'_>> = Vec::new();
+    let mut told: Vec<(&str, String)> = Vec::new();
     for track in tracks {
         for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
-            let kind = (kind, columns.len());
+            let mut faults: BTreeMap<String, Vec<usize>> = BTreeMap::new();
             for index in 0..columns.len() {
-                let Some(fault) = Fault::among(columns, index) else { continue };
-                let known = faults.iter_mut().find_map(|(of, sensors, runs, known)| {
-                    (*of == kind && takes(known, fault)).then_some((sensors, runs))
-                });
-                let Some((sensors, runs)) = known else {
-                    faults.push((kind, vec![index], vec![&track.run], fault));
-                    continue;
-                };
-                if !sensors.contains(&index) {
-                    sensors.push(index);
-                }
-                if !runs.contains(&track.run.as_str()) {
-                    runs.push(&track.run);
+                if let Some(fault) = Fault::among(columns, index) {
+                    faults.entry(fault.words(kind, columns.len())).or_default().push(index);
                 }
             }
+            let of = |(words, sensors): (String, Vec<usize>)| {
+                (track.run.as_str(), format!("{}: {words}", several(kind, &sensors, columns.len())))
+            };
+            told.extend(faults.into_iter().map(of));
         }
     }
-    let words = |((kind, of), mut sensors, runs, fault): ((&str, usize), Vec<usize>, Vec<&str>, Fault)| {
-        sensors.sort_unstable();
-        format!("{}: {}: {}", logs(&runs), several(kind, &sensors, of), fault.words(kind, of))
-    };
-    faults.into_iter().map(words).collect()
+    grouped(&told).into_iter().map(|(words, runs)| format!("{}: {words}", logs(&runs))).collect()
 }
 
 /// Names of logs, of many only the first.

@@ -18,7 +18,7 @@ use super::temperature::{
 };
 use super::times::Times;
 use super::track::Track;
-use crate::document::accelerometers;
+use crate::document::accel_name;
 use crate::numbers::ends;
 use crate::report::counted;
 
@@ -155,9 +155,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let returns = returns(&all, &plain, &found, &levels_deg_c);
     let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
     for (sensor, kind) in returns.iter().filter_map(|back| back.finding(&names)) {
-        let own = accelerometers(document).get(sensor);
-        let name = own.map_or_else(|| sensor.to_string(), |own| own.name.clone());
-        warnings.push(kind.of(&name).to_string());
+        warnings.push(kind.of(accel_name(document, sensor)).to_string());
     }
     let analysis = Analysis {
         poses,

@@ -111,15 +111,8 @@ impl Guess {
     }
 }
 
-impl Guess {
-    /// Two unit vectors at right angles to a unit vector.
-    pub fn across_of(axis: [f64; 3]) -> [[f64; 3]; 2] {
-        across(axis)
-    }
-}
-
 /// Two unit vectors at right angles to a unit vector, the first near the case axis that is farthest from it.
-fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
+pub fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
     let n = nalgebra::Vector3::from(n);
     let mut unit = nalgebra::Vector3::zeros();
     unit[n.iamin()] = 1.0;
@@ -128,25 +121,29 @@ fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
 }
 
 impl Model<'_> {
-    /// Parameters of one accelerometer.
-    pub fn of_sensor(&self) -> usize {
-        self.degrees.of_sensor()
-    }
-
     /// All parameters: accelerometer by accelerometer K, S, a, b, each by powers; then δ1, δ2, δ3 (in thousandths).
     pub fn count(&self) -> usize {
-        self.guess.len() * self.of_sensor() + 3
+        self.guess.len() * self.degrees.of_sensor() + 3
     }
 
     /// The stand's errors (rad).
     pub fn errors(&self, parameters: &[f64]) -> StandErrors {
-        let from = self.guess.len() * self.of_sensor();
+        let from = self.guess.len() * self.degrees.of_sensor();
         [0, 1, 2].map(|i| parameters.get(from + i).copied().unwrap_or(0.0) * SMALL)
     }
 
     /// Place of a parameter of an accelerometer's axis: `which` of the two directions, power.
     pub fn axis_index(&self, sensor: usize, which: usize, power: usize) -> usize {
-        sensor * self.of_sensor() + 2 * (self.degrees.sensor + 1) + which * (self.degrees.axes + 1) + power
+        sensor * self.degrees.of_sensor()
+            + 2 * (self.degrees.sensor + 1)
+            + which * (self.degrees.axes + 1)
+            + power
+    }
+
+    /// The parameters of one accelerometer.
+    fn own<'a>(&self, parameters: &'a [f64], sensor: usize) -> &'a [f64] {
+        let count = self.degrees.of_sensor();
+        parameters.get(sensor * count..(sensor + 1) * count).unwrap_or_default()
     }
 
     /// Outputs of all accelerometers in a position.
@@ -160,8 +157,7 @@ impl Model<'_> {
     pub fn outputs_under(&self, parameters: &[f64], taken: &Taken, up: [f64; 3]) -> Vec<f64> {
         let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let output = |(index, guess): (usize, &Guess)| {
-            let p =
-                parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
+            let p = self.own(parameters, index);
             let t = taken.sensor_t.get(index).copied().unwrap_or(0.0);
             let at = |from: usize, count: usize, x: f64| {
                 p[from..from + count].iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
@@ -182,8 +178,7 @@ impl Model<'_> {
     pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
         let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
         let sensor = |(index, guess): (usize, &Guess)| {
-            let p =
-                parameters.get(index * self.of_sensor()..(index + 1) * self.of_sensor()).unwrap_or_default();
+            let p = self.own(parameters, index);
             let [first, second] = guess.across;
             let row = |power: usize| {
                 let (a, b) = (p[2 * own + power] * SMALL, p[2 * own + axes + power] * SMALL);

@@ -21,8 +21,6 @@ mod file;
 
 use std::path::Path;
 
-use isotherm_log::file::read_small_text;
-
 use super::doubts::GOOD_POSITIONS;
 use crate::error::Error;
 
@@ -101,18 +99,10 @@ impl Plan {
     /// [`Error::Log`] where it cannot be read, [`Error::Usage`] with what is wrong in it.
     pub fn named(name: &str) -> Result<Self, Error> {
         match name {
-            "twelve" => return Ok(Self::twelve()),
-            "six" => return Ok(Self::six()),
-            _ => {}
+            "twelve" => Ok(Self::twelve()),
+            "six" => Ok(Self::six()),
+            path => file::read(Path::new(path)),
         }
-        let path = Path::new(name);
-        let text = read_small_text(path, "read the plan")?;
-        let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        file::read(&text, name, is_csv).map_err(|what| {
-            Error::Usage(format!(
-                "{what}; a plan is \"twelve\", \"six\", or a file as docs/calibration/positions.md shows"
-            ))
-        })
     }
 
     /// Direction of "up" in case axes in a position.

@@ -11,7 +11,7 @@ use super::judged::{Judgement, curves, lengths};
 use super::model::SMALL;
 use super::solve::Fit;
 use crate::axes::AXES;
-use crate::document::accelerometers;
+use crate::document::accel_name;
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Curve, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six};
 
@@ -32,8 +32,8 @@ pub fn report(
     inside: Set<'_>,
     outside: Option<Set<'_>>,
 ) -> Report {
-    let mut report =
-        Report::new("Accelerometers from positions of a stand", &document.unit).counting("positions");
+    let title = "Accelerometers from positions of a stand";
+    let mut report = Report { counted: Some("positions"), ..Report::new(title, &document.unit) };
     report.residuals = curves(inside.judged, inside.runs, Sample::In);
     if let Some(set) = outside {
         report.residuals.extend(curves(set.judged, set.runs, Sample::Out));
@@ -48,7 +48,8 @@ pub fn report(
     report.verdicts = as_a_whole(report.verdicts);
     report.warnings.clone_from(&analysis.warnings);
     report.notes = notes(document, analysis, settings);
-    let names = names(document, analysis.fit.guess.len());
+    let names = (0..analysis.fit.guess.len()).map(|index| accel_name(document, index).to_owned());
+    let names: Vec<String> = names.collect();
     coefficients(&mut report, document, (analysis, settings), &names);
     report.charts.push(("What is left".to_owned(), left_chart(settings, inside.judged)));
     report.tables.push(("Positions".to_owned(), position_rows(settings, inside)));
@@ -102,15 +103,6 @@ fn as_a_whole(verdicts: Vec<Verdict>) -> Vec<Verdict> {
         ))
     };
     verdicts.into_iter().map(with).collect()
-}
-
-/// Names of the accelerometers.
-fn names(document: &Document, count: usize) -> Vec<String> {
-    let of = |index: usize| {
-        let sensor = accelerometers(document).get(index);
-        sensor.map_or_else(|| index.to_string(), |sensor| sensor.name.clone())
-    };
-    (0..count).map(of).collect()
 }
 
 fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<String> {

@@ -13,7 +13,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::{Degrees, Guess, Model, SMALL, Sensor, Taken};
+use super::model::{Degrees, Guess, Model, SMALL, Sensor, Taken, across};
 use super::plan::{Attitude, Plan};
 use crate::lsq::linear;
 use crate::lsq::nonlinear::{NoSolution, Solution, known, solve};
@@ -176,7 +176,7 @@ fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights)
     });
     let at_rest = DVector::from_vec(model.outputs_under(start, taken, [0.0; 3]));
     let up = nalgebra::Vector3::from(up);
-    let first = nalgebra::Vector3::from(Guess::across_of(up.into())[0]);
+    let first = nalgebra::Vector3::from(across(up.into())[0]);
     for direction in [first, up.cross(&first)] {
         let change = DVector::from_vec(model.outputs_under(start, taken, direction.into())) - &at_rest;
         covariance += &change * change.transpose() * (sigma * sigma);

@@ -35,8 +35,7 @@ impl Times {
             }
             Ok((span, row.need("position")?, row.get("log")?))
         };
-        let rows = csv::rows(&text, &["start_s", "end_s", "position", "log"])
-            .and_then(|rows| rows.into_iter().map(row).collect::<Result<_, String>>());
+        let rows = csv::rows(&text, &["start_s", "end_s", "position", "log"], row);
         let wrong = |words| {
             Error::Usage(format!("{}: {words}; a row is start_s,end_s,position[,log]", path.display()))
         };

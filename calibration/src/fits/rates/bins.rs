@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_log::offline::Loaded;
 use isotherm_protocol::document::{Document, OrientationThermal};
 
 use crate::document::Written;
@@ -118,19 +117,4 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
         .filter(|value| value.is_finite())
         .fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
     (count > 0.0).then(|| sum / count)
-}
-
-/// Mean corrected rates in case axes (°/h) over windows of a run (s since its beginning), by the ticks whose middle lies
-/// in them.
-///
-/// # Errors
-/// As [`Run::correct_together`].
-pub fn means_within(
-    run: &Run,
-    loaded: &Loaded,
-    windows: &[[f64; 2]],
-    watch: impl Watch,
-) -> Result<Vec<[f64; 3]>, Error> {
-    let ticks = Table::of_rows(run, loaded, Rows::TICKS, watch)?;
-    Ok(windows.iter().map(|window| ticks.mean_rate_within(*window)).collect())
 }

@@ -9,6 +9,7 @@ use super::model::GyroRates;
 use super::plateaus::scatter;
 use super::steps::Step;
 use crate::axes::main_axis;
+use crate::document::gyro_name;
 use crate::finding::{Instead, Kind};
 use crate::fits::modes::document::row;
 use crate::numbers::{Size, dot, ends, median, norm, real};
@@ -55,14 +56,16 @@ pub(super) fn turned_as_stated(
         if angle_deg <= LARGEST_ANGLE_DEG && right_size {
             continue;
         }
-        let name = |sensor: usize| document.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str());
         let along = |sensor: usize| axes.get(sensor).map_or(0.0, |axis| dot(*axis, one.step.axis).abs());
         let mut telling = vec![largest(sensors, along), largest(sensors, |sensor| shown(sensor).abs())];
         telling.dedup();
         return Err(Kind::TurnedOtherwise {
             window_s: one.plateau.window_s,
             stated: (rate, one.step.axis),
-            shown: telling.into_iter().map(|sensor| (name(sensor).to_owned(), shown(sensor))).collect(),
+            shown: telling
+                .into_iter()
+                .map(|sensor| (gyro_name(document, sensor).to_owned(), shown(sensor)))
+                .collect(),
             instead: Box::new(if right_size {
                 Instead::Axis(turned.map(|x| x / size), [angle_deg, LARGEST_ANGLE_DEG])
             } else {

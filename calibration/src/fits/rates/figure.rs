@@ -5,7 +5,7 @@ use isotherm_protocol::document::Document;
 
 use super::over_temperature::{Level, OverTemperature};
 use crate::axes::{AXES, main_axis};
-use crate::document::accelerometers;
+use crate::document::{accel_name, gyro_name};
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Sigmas, bars, fixed};
 
@@ -81,7 +81,6 @@ impl Element<'_> {
 
 /// The figure.
 pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
-    let name = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
     let panel = |element: Element<'_>| {
         let all: Vec<(f64, [f64; 2])> =
             over.levels.iter().map(|level| (level.deg_c, element.measured(level))).collect();
@@ -100,7 +99,8 @@ pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
             let apart = ends().map(|t| (t, element.line_at(t) - accel.at(t)));
             content.push(Series::line("gyro less accelerometer", Ink::Third, apart));
         }
-        Panel::of(format!("gyro {} along {}", name(element.gyro), AXES[element.along]), "″", HEIGHT, content)
+        let title = format!("gyro {} along {}", gyro_name(document, element.gyro), AXES[element.along]);
+        Panel::of(title, "″", HEIGHT, content)
     };
     let caption = "Elements of C over temperature: gyros, the document's accelerometers, and the difference.";
     let panels = elements(over, document).into_iter().map(panel).collect();
@@ -110,16 +110,11 @@ pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
 /// The figure's numbers.
 pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
     let elements = elements(over, document);
-    let gyro = |index: usize| document.gyro.sensor.get(index).map_or("", |sensor| sensor.name.as_str());
-    let accel = |index: usize| accelerometers(document).get(index).map_or("", |sensor| sensor.name.as_str());
     let heads = elements.iter().map(|element| {
-        let along = AXES[element.along];
-        match element.accel {
-            None => format!("gyro {} along {along}", gyro(element.gyro)),
-            Some(own) => {
-                format!("gyro {} along {along} (less accelerometer {})", gyro(element.gyro), accel(own.index))
-            }
-        }
+        let less = element.accel.map_or_else(String::new, |own| {
+            format!(" (less accelerometer {})", accel_name(document, own.index))
+        });
+        format!("gyro {} along {}{less}", gyro_name(document, element.gyro), AXES[element.along])
     });
     let head = std::iter::once("°C".to_owned()).chain(heads);
     let row = |level: &Level| {

@@ -4,7 +4,6 @@ use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
 use super::attitude;
-use super::bins::means_within;
 use super::checks::{no_result, one_way};
 use super::document;
 use super::matching::Matched;
@@ -19,7 +18,8 @@ use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
 use crate::numbers::{Size, hull, median};
-use crate::report::{Verdict, of_logs};
+use crate::report::{Verdict, beside, of_logs};
+use crate::runs::table::{Rows, Table};
 use crate::runs::{Run, Watch};
 
 /// Rounds in which the Earth's turning and the fit settle.
@@ -239,11 +239,7 @@ impl Made {
                 *gyro = Err(Kind::Worse { axis: *main });
             }
             self.write(wanted, axes_deg_c, watch)?;
-            for (axis, verdict) in verdicts(&self.steps, &self.judged).into_iter().enumerate() {
-                if !worse.contains(&axis) {
-                    self.verdicts[axis] = verdict;
-                }
-            }
+            self.verdicts = beside(&self.verdicts, verdicts(&self.steps, &self.judged));
         }
         for (sensor, what) in doubted {
             if let Some(verdict) = main_axes.get(*sensor).and_then(|axis| self.verdicts.get_mut(*axis)) {
@@ -274,7 +270,11 @@ impl Made {
     fn judge(&mut self, wanted: &Wanted<'_>, sample: usize, watch: &mut dyn Watch) -> Result<(), Error> {
         for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
             let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
-            errors((number, run), &self.written, steps, sample, &mut *watch)?;
+            let ticks = Table::of_rows(run, &self.written.loaded, Rows::TICKS, &mut *watch)?;
+            for step in steps.iter_mut().filter(|step| step.matched.step.run == number) {
+                let mean = ticks.mean_rate_within(step.matched.plateau.window_s);
+                step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
+            }
         }
         Ok(())
     }
@@ -289,27 +289,6 @@ impl Made {
         let ends = self.temperatures_deg_c.iter().map(|deg_c| [*deg_c, *deg_c]);
         hull(ends).map(widened)
     }
-}
-
-/// Errors of the corrected rate in the windows of a run's steps, by the service's own code with a document.
-fn errors(
-    (number, run): (usize, &Run),
-    written: &Written,
-    steps: &mut [Measured],
-    sample: usize,
-    watch: &mut dyn Watch,
-) -> Result<(), Error> {
-    let windows: Vec<[f64; 2]> = steps
-        .iter()
-        .filter(|step| step.matched.step.run == number)
-        .map(|step| step.matched.plateau.window_s)
-        .collect();
-    let means = means_within(run, &written.loaded, &windows, &mut *watch)?;
-    let own = steps.iter_mut().filter(|step| step.matched.step.run == number);
-    for (step, mean) in own.zip(means) {
-        step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
-    }
-    Ok(())
 }
 
 /// Before and after by case axis, of the steps that were fitted and of those that were not, which decide where there are any; the

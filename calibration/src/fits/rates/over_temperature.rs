@@ -13,7 +13,7 @@ use super::read::Turned;
 use crate::document::tidy;
 use crate::finding::Kind;
 use crate::fits::modes::document::row;
-use crate::fits::positions::model::Guess;
+use crate::fits::positions::model::across;
 use crate::fits::positions::temperature::{levels, reference};
 use crate::fits::thermal::scale::{Holds, put};
 use crate::lsq::linear::{self, Weak};
@@ -226,7 +226,7 @@ fn polynomial(
 fn line(levels: &[Level], sensor: usize, reference_deg_c: f64) -> Option<Line> {
     let of = |level: &Level| level.gyros[sensor].clone();
     let first = of(levels.first()?).axis?;
-    let across = Guess::across_of(first);
+    let across = across(first);
 
     let away: Vec<f64> = levels.iter().map(|level| level.deg_c - reference_deg_c).collect();
     let (mut axis, mut slope, mut variance) = (first, [0.0; 3], [0.0; 3]);

@@ -6,6 +6,7 @@ use super::fit::Wanted;
 use super::matching::{Matched, matched, slow};
 use super::plateaus::{self, Plateau};
 use super::steps::Step;
+use crate::document::gyro_name;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::count_arcsec;
@@ -43,8 +44,7 @@ pub(super) fn read(
         return Ok(Err(Kind::NoStepStated { log: run.name.clone() }.in_log(number)));
     }
     if let Some(sensor) = dead(&binned.bins) {
-        let name = wanted.base.gyro.sensor.get(sensor).map_or("", |sensor| sensor.name.as_str());
-        let mut finding = Kind::Dead { log: run.name.clone() }.of_gyro(name);
+        let mut finding = Kind::Dead { log: run.name.clone() }.of_gyro(gyro_name(wanted.base, sensor));
         finding.place.log = Some(number);
         return Ok(Err(finding));
     }

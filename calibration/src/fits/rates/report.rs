@@ -24,9 +24,8 @@ impl Made {
     pub fn report(&self) -> Report {
         let made = self;
         let document = &made.written.document;
-        let mut report =
-            Report::new("Rate table: scale factor, asymmetry, linearity, input axes", document.unit.clone())
-                .counting("steps");
+        let title = "Rate table: scale factor, asymmetry, linearity, input axes";
+        let mut report = Report { counted: Some("steps"), ..Report::new(title, &document.unit) };
         report.verdicts.clone_from(&made.verdicts);
         report.warnings.extend(made.warnings.iter().map(ToString::to_string));
         let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use isotherm_log::file::read_small_text;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -118,15 +117,8 @@ pub fn listed(
 /// # Errors
 /// [`Error::Usage`] with the line or the step that is wrong; [`Error::Log`] where it cannot be read.
 pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
-    let text = read_small_text(path, "read the table of steps")?;
     let wrong = |what: String| Error::Usage(format!("{}: {what}", path.display()));
-    let is_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-    let rows = if is_csv {
-        of_csv(&text).map_err(wrong)?
-    } else {
-        let file = isotherm_document::parse::<File>(&text, &path.display().to_string());
-        file.map(|file| file.step).map_err(|problems| Error::Usage(isotherm_document::listed(&problems)))?
-    };
+    let File { step: rows } = csv::read(path, ("read the table of steps", ""), of_csv)?;
     if rows.is_empty() || rows.len() > MOST {
         return Err(wrong(format!("{}, must be 1 to {MOST}", counted(rows.len(), "step", "steps"))));
     }
@@ -169,7 +161,7 @@ fn checked(step: Step, runs: usize) -> Result<Step, String> {
     }
 }
 
-fn of_csv(text: &str) -> Result<Vec<Row>, String> {
+fn of_csv(text: &str) -> Result<File, String> {
     let row = |row: csv::Row<'_>| {
         Ok(Row {
             log: row.get("log")?,
@@ -179,5 +171,6 @@ fn of_csv(text: &str) -> Result<Vec<Row>, String> {
             end_s: row.get("end_s")?,
         })
     };
-    csv::rows(text, &["log", "axis", "rate_deg_per_s", "begin_s", "end_s"])?.into_iter().map(row).collect()
+    let step = csv::rows(text, &["log", "axis", "rate_deg_per_s", "begin_s", "end_s"], row)?;
+    Ok(File { step })
 }

@@ -17,9 +17,10 @@ use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
 
 /// Axes: gyros, then accelerometers.
-const COLUMNS: usize = 6;
+const AXES: usize = 6;
 /// What is compared, in the order of the columns; a document of each but of the mean, which needs none.
-const HEAD: [&str; 6] = ["raw", "mean", "cubic", "cubic + Ṫ", "this document", "the one before"];
+const HEAD: [&str; DOCUMENTS + 1] = ["raw", "mean", "cubic", "cubic + Ṫ", "this document", "the one before"];
+const DOCUMENTS: usize = 5;
 
 /// Heading of the table that states each axis' accuracy.
 pub(super) const HEADING: &str = "Accuracy: rms of windows on the judging runs; noise of a window, and of single ticks from the thermometer";
@@ -47,8 +48,8 @@ struct Stage<'a> {
 /// it was fitted.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Compared {
-    rms: [Option<[f64; 6]>; COLUMNS],
-    levels: [[f64; 2]; COLUMNS],
+    rms: [Option<[f64; HEAD.len()]>; AXES],
+    levels: [[f64; 2]; AXES],
 }
 
 /// Which of the rivals.
@@ -59,13 +60,13 @@ type Sum = (f64, f64);
 impl Compared {
     /// Of documents without terms, with cubics, with Ṫ beside them, the new one, and the one before it.
     fn of(
-        documents: [&Document; 5],
+        documents: [&Document; DOCUMENTS],
         fitted: &[Stage<'_>],
         judging: &[Stage<'_>],
         mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let loaded: Vec<Loaded> = documents.into_iter().map(Written::compiled).collect::<Result<_, _>>()?;
-        let mut levels = [[(0.0, 0.0); 5]; COLUMNS];
+        let mut levels = [[(0.0, 0.0); DOCUMENTS]; AXES];
         for stage in fitted {
             let tables = stage.tables(&loaded, &mut watch)?;
             for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| stage.counts(*axis)) {
@@ -78,11 +79,11 @@ impl Compared {
         }
         let levels =
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
-        let mut sums: [[Sum; 6]; COLUMNS] = Default::default();
+        let mut sums: [[Sum; HEAD.len()]; AXES] = Default::default();
         for stage in judging {
             let tables = stage.tables(&loaded, &mut watch)?;
             let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
-            for axis in (0..COLUMNS).filter(|axis| stage.counts(*axis)) {
+            for axis in (0..AXES).filter(|axis| stage.counts(*axis)) {
                 add(&mut sums[axis], &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
             }
         }
@@ -94,7 +95,7 @@ impl Compared {
     }
 
     /// Levels before and after, for a run that is another part of a log of the fit.
-    pub(super) fn levels(&self) -> [[f64; 2]; COLUMNS] {
+    pub(super) fn levels(&self) -> [[f64; 2]; AXES] {
         self.levels
     }
 
@@ -213,10 +214,10 @@ impl Stage<'_> {
 
 /// Adds the squares of what is left of an axis in windows that all have.
 fn add(
-    sums: &mut [Sum; 6],
+    sums: &mut [Sum; HEAD.len()],
     tables: &[Table],
     (axis, truth): (usize, Option<f64>),
-    levels: [f64; 5],
+    levels: [f64; DOCUMENTS],
     shared: bool,
 ) {
     let columns: Vec<&[f64]> = tables.iter().map(|table| column(table, axis)).collect();

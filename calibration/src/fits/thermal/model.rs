@@ -119,10 +119,20 @@ fn scaled(old: &Curve, basis: &Basis, found: &[(Term, f64)], holds: Holds) -> Op
     Some(put(old, (basis.reference_deg_c, basis.range_deg_c), &error, holds))
 }
 
-/// Puts found coefficients (°/h and so on) into a gyro that has none of these terms; its scale factor keeps what it has, times the
-/// error that was found.
-pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.set(Feature::One, curve(basis, found, &[Effect::Static]));
+/// The bias that was found. Where the runs could not tell its level, it has that of the bias before in the middle of the fitted range.
+fn bias(basis: &Basis, found: &[(Term, f64)], old: Option<&Curve>) -> Option<Curve> {
+    let new = curve(basis, found, &[Effect::Static]);
+    let old = old.filter(|_| found.iter().all(|(term, _)| *term != Effect::Static.power(0)));
+    let at = |[low, high]: [f64; 2]| basis.reference_deg_c.clamp(low, high);
+    let level = old.and_then(|old| old.shape().at(old.range().map_or(basis.reference_deg_c, at)));
+    let Some(value) = level else { return new };
+    Some(new.map_or_else(|| Curve::new(Shape::Constant { value }), |new| new.plus(value)))
+}
+
+/// Puts found coefficients (°/h and so on) into a gyro that has none of these terms, in place of an `old` one; its scale factor keeps what
+/// it has, times the error that was found.
+pub fn put_gyro(sensor: &mut GyroSensor, basis: &Basis, found: &[(Term, f64)], old: Option<&GyroSensor>) {
+    sensor.set(Feature::One, bias(basis, found, old.and_then(|old| old.terms.curve(Feature::One))));
     let mut put_branches = |feature, of: fn(Branch) -> Effect| {
         if let Some(curves) = branches(basis, found, of) {
             sensor.put(StatedTerm::branched(feature, curves));
@@ -146,8 +156,8 @@ fn branches(basis: &Basis, found: &[(Term, f64)], of: fn(Branch) -> Effect) -> O
 
 /// Puts found coefficients (output units and so on) into an accelerometer, which has a static bias and lags only; its scale factor
 /// keeps what it has, times the error that was found.
-pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)]) {
-    sensor.set(Feature::One, curve(basis, found, &[Effect::Static]));
+pub fn put_accel(sensor: &mut AccelSensor, basis: &Basis, found: &[(Term, f64)], old: Option<&AccelSensor>) {
+    sensor.set(Feature::One, bias(basis, found, old.and_then(|old| old.terms.curve(Feature::One))));
     lags(basis, found).for_each(|lag| sensor.put(lag));
     if let Some(new) = scaled(&sensor.scale_factor, basis, found, Holds::Factor) {
         sensor.scale_factor = new;

@@ -1,11 +1,11 @@
 //! What a thermal fit came to: the document, its verdicts, its report.
 
 use isotherm_correction::thermal::Feature;
-use isotherm_protocol::document::{Curve as DocumentCurve, Document, Filter, Sample, Shape};
+use isotherm_protocol::document::{Document, Filter, Sample};
 
 use super::branches::History;
 use super::checks::SMALLEST_RANGE_DEG_C;
-use super::columns::{Basis, Effect, Term};
+use super::columns::{Basis, Term};
 use super::compare;
 use super::fit::Sensor;
 use super::joint::Found;
@@ -34,17 +34,22 @@ pub(super) struct Outcome {
     pub(super) rate_range_deg_c_per_s: [f64; 2],
 }
 
-/// The bias with the level that it had before in the middle of the fitted range, where the runs could not tell that level. Biases: before,
-/// and as found.
-fn level(
-    basis: &Basis,
-    found: &[(Term, f64)],
-    [old, new]: [Option<&DocumentCurve>; 2],
-) -> Option<DocumentCurve> {
-    let old = old.filter(|_| found.iter().all(|(term, _)| *term != Effect::Static.power(0)))?;
-    let at = old.range().map_or(basis.reference_deg_c, |[low, high]| basis.reference_deg_c.clamp(low, high));
-    let value = old.shape().at(at)?;
-    Some(new.map_or_else(|| DocumentCurve::new(Shape::Constant { value }), |new| new.plus(value)))
+/// Puts what was found into a sensor that has none of it; a refused one becomes what it was before.
+fn put<T: Clone>(
+    sensor: Option<&mut T>,
+    old: Option<&T>,
+    (basis, found): (&Basis, &Found),
+    terms: &[(Term, f64, f64)],
+    of_kind: fn(&mut T, &Basis, &[(Term, f64)], Option<&T>),
+) {
+    let Some(sensor) = sensor else { return };
+    match old.filter(|_| found.refused.is_some()) {
+        Some(old) => sensor.clone_from(old),
+        None => {
+            let terms: Vec<(Term, f64)> = terms.iter().map(|(term, value, _)| (*term, *value)).collect();
+            of_kind(sensor, basis, &terms, old);
+        }
+    }
 }
 
 impl Outcome {
@@ -162,33 +167,13 @@ impl Outcome {
     pub(super) fn document(&self, of: impl for<'a> Fn(&'a Found) -> &'a Vec<(Term, f64, f64)>) -> Document {
         let mut document = self.plain();
         for (sensor, basis, found) in &self.found {
-            let terms: Vec<(Term, f64)> = of(found).iter().map(|(term, value, _)| (*term, *value)).collect();
+            let (index, own, terms) = (sensor.index, (basis, found), of(found));
             if sensor.gyro {
-                let Some(gyro) = document.gyro.sensor.get_mut(sensor.index) else { continue };
-                let old = self.base.gyro.sensor.get(sensor.index);
-                if let Some(old) = old.filter(|_| found.refused.is_some()) {
-                    gyro.clone_from(old);
-                    continue;
-                }
-                put_gyro(gyro, basis, &terms);
-                let biases = [old.map(|old| &old.terms), Some(&gyro.terms)].map(|of| of?.curve(Feature::One));
-                if let Some(kept) = level(basis, &terms, biases) {
-                    gyro.set(Feature::One, kept);
-                }
-            } else if let Some(accel) =
-                document.accel.as_mut().and_then(|accel| accel.sensor.get_mut(sensor.index))
-            {
-                let old = accelerometers(&self.base).get(sensor.index);
-                if let Some(old) = old.filter(|_| found.refused.is_some()) {
-                    accel.clone_from(old);
-                    continue;
-                }
-                put_accel(accel, basis, &terms);
-                let biases =
-                    [old.map(|old| &old.terms), Some(&accel.terms)].map(|of| of?.curve(Feature::One));
-                if let Some(kept) = level(basis, &terms, biases) {
-                    accel.set(Feature::One, kept);
-                }
+                let old = self.base.gyro.sensor.get(index);
+                put(document.gyro.sensor.get_mut(index), old, own, terms, put_gyro);
+            } else {
+                let accel = document.accel.as_mut().and_then(|accel| accel.sensor.get_mut(index));
+                put(accel, accelerometers(&self.base).get(index), own, terms, put_accel);
             }
         }
         if self.settings.removes_mean() {
@@ -226,17 +211,15 @@ impl Outcome {
         if lengths(old).iter().zip(lengths(&self.filter)).all(|(a, b)| (a - b).abs() <= 1e-9 * b) {
             return None;
         }
+        let (gyros, accels) = (&self.base.gyro.sensor, accelerometers(&self.base));
         let follows = |sensor: &Sensor| {
-            if sensor.gyro {
-                let gyro = self.base.gyro.sensor.get(sensor.index);
-                gyro.is_some_and(|gyro| {
-                    let following = [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
-                    following.into_iter().any(|feature| gyro.terms.has(feature))
-                })
-            } else {
-                let accel = accelerometers(&self.base).get(sensor.index);
-                accel.is_some_and(|accel| accel.terms.has(Feature::Lag))
-            }
+            [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag].into_iter().any(|feature| {
+                if sensor.gyro {
+                    gyros.get(sensor.index).is_some_and(|gyro| gyro.terms.has(feature))
+                } else {
+                    accels.get(sensor.index).is_some_and(|accel| accel.terms.has(feature))
+                }
+            })
         };
         let refused = self.found.iter().filter(|(.., found)| found.refused.is_some());
         let names: Vec<&str> =

@@ -172,9 +172,8 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
     reasons.extend(faults::clipped(std::slice::from_ref(track), poses));
     if poses.len() < FEWEST_POSES {
         reasons.push(format!(
-            "{} {} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
-            counted(poses.len(), "still pose", "still poses"),
-            if poses.len() == 1 { "was" } else { "were" },
+            "{} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
+            counted(poses.len(), "still pose was", "still poses were"),
             settings.limits.least_s + settings.limits.window_s
         ));
     } else if let Some(words) = flat(poses) {

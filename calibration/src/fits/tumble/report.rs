@@ -59,8 +59,8 @@ pub fn report(
     run: &str,
     [before, after]: [&Left; 2],
 ) -> Report {
-    let mut report =
-        Report::new("Accelerometers and gyros from a tumbled unit", &document.unit).counting("poses, turns");
+    let title = "Accelerometers and gyros from a tumbled unit";
+    let mut report = Report { counted: Some("poses, turns"), ..Report::new(title, &document.unit) };
     let accel = of_accelerometers(tumble, [&before.length, &after.length], settings.gravity);
     let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
     let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);

@@ -65,6 +65,7 @@ TICK_FLAGS: dict[str, int] = {
     "VELOCITY_INVALID": 1 << 11,
     "SERVO_TRANSIENT": 1 << 12,
     "SERVO_UNMEASURED": 1 << 13,
+    "TIME_STEP": 1 << 14,
 }
 
 SENSOR_FLAGS: dict[str, int] = {

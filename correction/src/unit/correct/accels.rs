@@ -83,6 +83,9 @@ impl Corrector {
         };
         // The corrected tick has the gyro tick's time.
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
+        if raw.duration.as_ns().abs_diff(out.duration.as_ns()) > out.duration.as_ns().unsigned_abs() / 4 {
+            out.flags |= TickFlags::VELOCITY_INVALID;
+        }
         let terms = self.accel_terms::<N>(shares);
         let readings = raw.readings.lanes::<N>();
         let output = calibration.accel_output;

@@ -95,6 +95,16 @@ pub enum Coefficient {
 }
 
 impl Coefficient {
+    /// The same in another unit.
+    pub fn times(self, factor: f64) -> Self {
+        match self {
+            Self::Observed { value, interval } => {
+                Self::Observed { value: value * factor, interval: interval.map(|end| end * factor) }
+            }
+            Self::NotObservable { below } => Self::NotObservable { below: below * factor },
+        }
+    }
+
     /// The value, or what it is below.
     pub const fn value_or_limit(&self) -> f64 {
         match *self {

@@ -36,7 +36,7 @@ impl Far {
     pub(super) fn words(&self, called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
         let (first, last) = (*self.ticks.first()?, *self.ticks.last()?);
         let count = self.ticks.len();
-        let measure = columns.measure();
+        let measure = columns.kind.measure();
         let value = short(column.get(first).copied().unwrap_or_default());
         let (at, until) = (columns.since_s(first), columns.since_s(last));
         let wide = if columns.corrected { " on all axes, because the correction couples them" } else { "" };

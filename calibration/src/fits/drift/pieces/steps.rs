@@ -57,7 +57,7 @@ pub(crate) fn step(means: &[f64]) -> Option<Step> {
 pub(super) fn words(called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
     let width = column.len().div_ceil(PARTS).max(FEWEST_TICKS);
     let Step { part, before, behind } = step(&column.chunks_exact(width).map(mean).collect::<Vec<f64>>())?;
-    let measure = columns.measure();
+    let measure = columns.kind.measure();
     Some(format!(
         "warning: {called} steps from {} to {} {measure} at about {:.0} s and stays there: was the unit moved, its power or its range \
          switched, or are these two logs? A step is taken for drift; cut the log there with --start and --duration",

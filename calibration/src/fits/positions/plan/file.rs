@@ -1,22 +1,25 @@
 //! Plans as their files have them.
 
-use isotherm_document::{listed, parse};
+use std::path::Path;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Attitude, Plan, Position, mounting};
 use crate::csv;
+use crate::error::Error;
 use crate::numbers::{norm, unit};
 
-/// Reads the text of a file with a plan: CSV or TOML. What is wrong is told with the name.
-pub(super) fn read(text: &str, name: &str, is_csv: bool) -> Result<Plan, String> {
-    let named = |what| format!("{name}: {what}");
-    let written = if is_csv {
-        of_csv(text).map_err(named)?
-    } else {
-        parse(text, name).map_err(|problems| listed(&problems))?
-    };
-    Written::plan(written).map_err(named)
+/// What goes behind everything that is wrong with a plan.
+const HINT: &str = "; a plan is \"twelve\", \"six\", or a file as docs/calibration/positions.md shows";
+
+/// Reads a file with a plan: CSV or TOML.
+///
+/// # Errors
+/// [`Error::Log`] where it cannot be read, [`Error::Usage`] with what is wrong in it.
+pub(super) fn read(path: &Path) -> Result<Plan, Error> {
+    let written: Written = csv::read(path, ("read the plan", HINT), of_csv)?;
+    written.plan().map_err(|what| Error::Usage(format!("{}: {what}{HINT}", path.display())))
 }
 
 /// A plan as its file has it.
@@ -98,7 +101,6 @@ fn of_csv(text: &str) -> Result<Written, String> {
             up: None,
         })
     };
-    let position = csv::rows(text, &["name", "axis_1_deg", "axis_2_deg"])?.into_iter().map(row);
-    let position = position.collect::<Result<_, String>>()?;
+    let position = csv::rows(text, &["name", "axis_1_deg", "axis_2_deg"], row)?;
     Ok(Written { axis_1: along_1(), axis_2: along_2(), position })
 }

@@ -261,7 +261,9 @@ fn a_document_that_can_be_rolled_back_to_and_was_altered_or_removed_is_told() {
         folder.path().join(shelf).join(format!("{}.toml", Digest::of(text.as_bytes())))
     };
     let [overlay, base] = [file("overlays", "gone"), file("documents", "base")];
-    [&overlay, &base].into_iter().for_each(|file| fs::remove_file(file).unwrap());
+    for file in [&overlay, &base] {
+        fs::remove_file(file).unwrap();
+    }
     let altered = file("documents", "text 1");
     fs::write(&altered, "text 2").unwrap();
     let found = verified(&folder);

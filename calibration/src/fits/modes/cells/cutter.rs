@@ -50,7 +50,7 @@ impl Sums {
 }
 
 /// Cuts one run.
-pub(super) struct Jackknife {
+pub(super) struct Cutter {
     cut: Cut,
     axes: Option<OrientationThermal>,
     begin_s: f64,
@@ -64,7 +64,7 @@ pub(super) struct Jackknife {
     axes_deg_c: f64,
 }
 
-impl Jackknife {
+impl Cutter {
     pub(super) fn new(cut: Cut, bare: &Document, begin_s: f64, stretch: usize) -> Self {
         Self {
             cut,
