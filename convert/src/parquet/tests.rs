@@ -155,6 +155,6 @@ fn streams_have_columns_for_every_shape_of_tick() {
 
     let (columns, rows) = read(&folder.path().join("corrected"));
     assert_eq!(columns[13..17], ["flags", "gyro_0_flags", "gyro_1_flags", "gyro_parity_0_rad_per_s"]);
-    assert_eq!(rows[0][12..16], [Field::Null, Field::UShort(0x3fff), Field::UByte(1), Field::UByte(255)]);
+    assert_eq!(rows[0][12..16], [Field::Null, Field::UShort(0x7fff), Field::UByte(1), Field::UByte(255)]);
     assert_eq!(rows[0][18], Field::Str("abababababababab".to_owned()));
 }
