@@ -290,6 +290,25 @@ fn bad_rows_can_be_passed_over_and_become_gaps() {
 }
 
 #[test]
+fn a_row_without_one_reading_is_a_gap_for_every_sensor_it_has_readings_of() {
+    let text = "version = 1\n[[file]]\ndelimiter = \"comma\"\non_bad_row = \"skip\"\n[file.time]\ncolumn = 1\nunit = \"ms\"\n\
+                tick_ms = 10\n[file.gyro]\noutput = \"mean\"\nmay_be_empty = true\n\
+                sensors = [{ column = 2, unit = \"rad_per_s\" }, { column = 3, unit = \"rad_per_s\" }]\n\
+                [file.accel]\noutput = \"mean\"\nsensors = [{ column = 4, unit = \"m_per_s2\" }]\n";
+    let mapping = Mapping::parse(text, "m.toml").unwrap();
+    // A row with half of its gyros, one without any, which is in order, and one that cannot be read for its accelerometer.
+    let (events, report) =
+        read(&mapping, b"10,1,7,9\n20,2,,9\n30,3,7,9\n40,,,9\n50,5,7,9\n60,,,x\n70,7,7,9\n");
+    assert_eq!(report.skipped_rows, 2);
+    assert_eq!(gyro(&events), [(0, 10, 10, 1.0), (2, 30, 10, 3.0), (3, 50, 20, 5.0), (4, 70, 20, 7.0)]);
+    let accel = events.iter().filter_map(|event| match event {
+        LogEvent::Accel { tick, .. } => Some((tick.sequence, tick.duration.as_ns() / 1_000_000)),
+        _ => None,
+    });
+    assert!(accel.eq([(0, 10), (2, 10), (3, 10), (4, 10), (6, 10)]));
+}
+
+#[test]
 fn a_compressed_log_that_ends_in_the_middle() {
     let rows: String =
         (1..5000).flat_map(|row| [(row * 10).to_string(), format!(",{},7,20\n", row % 97)]).collect();

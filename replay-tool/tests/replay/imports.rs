@@ -486,6 +486,8 @@ fn rows_that_do_not_fit_are_passed_over_and_counted() {
     let text = log("time_ms,gx [dps],gy [dps],gz [dps]\n", |row| {
         if row == 250 {
             "2500,1.0,ERR,0.1".to_owned()
+        } else if row == 300 {
+            "3000,1.0,,0.1".to_owned()
         } else {
             format!("{},1.0,2.0,{:.3}", row * 10, noise(row, 15))
         }
@@ -493,6 +495,9 @@ fn rows_that_do_not_fit_are_passed_over_and_counted() {
     std::fs::write(folder.path().join("holes.csv"), text).unwrap();
     let output = replay(folder.path(), &["import", "holes.csv"]);
     check(&output, 3);
+    // A reading that is missing now and then is no rate of its own.
+    let mapping = std::fs::read_to_string(folder.path().join("holes.mapping.toml")).unwrap();
+    assert!(!mapping.contains("may_be_empty"), "{mapping}");
     assert!(stdout(&output).contains("holes.csv:252:10"), "{}", stdout(&output));
 }
 

@@ -40,16 +40,15 @@ fn put<T: Clone>(
     old: Option<&T>,
     (basis, found): (&Basis, &Found),
     terms: &[(Term, f64, f64)],
-    of_kind: fn(&mut T, &Basis, &[(Term, f64)], Option<&T>),
+    of_kind: impl FnOnce(&mut T, &Basis, &[(Term, f64)], Option<&T>),
 ) {
     let Some(sensor) = sensor else { return };
-    match old.filter(|_| found.refused.is_some()) {
-        Some(old) => sensor.clone_from(old),
-        None => {
-            let terms: Vec<(Term, f64)> = terms.iter().map(|(term, value, _)| (*term, *value)).collect();
-            of_kind(sensor, basis, &terms, old);
-        }
+    if let Some(old) = old.filter(|_| found.refused.is_some()) {
+        sensor.clone_from(old);
+        return;
     }
+    let terms: Vec<(Term, f64)> = terms.iter().map(|(term, value, _)| (*term, *value)).collect();
+    of_kind(sensor, basis, &terms, old);
 }
 
 impl Outcome {
