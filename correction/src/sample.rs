@@ -100,6 +100,12 @@ pub struct GyroTick {
 impl GyroTick {
     /// Whether it begins where another ended, to less than half its own duration.
     pub(crate) fn follows(&self, last_end: Timestamp) -> bool {
+        // Mostly to the nanosecond.
+        self.end_time - self.duration == last_end || self.nearly_follows(last_end)
+    }
+
+    #[cold]
+    fn nearly_follows(&self, last_end: Timestamp) -> bool {
         let (since, own) = (self.end_time.since(last_end).as_ns(), self.duration.as_ns());
         since.abs_diff(own) < self.duration.half().as_ns().unsigned_abs()
     }

@@ -11,6 +11,7 @@ use crate::orientation::SensorMask;
 use crate::sample::{CorrectedTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, TickFlags};
 use crate::thermal::Shares;
 use crate::unit::counters::Counters;
+use crate::units::Span;
 
 /// Terms of the accelerometers at a tick: S and 1/K, and r of their boards.
 pub(super) type AccelTerms<const N: usize> = ([[f64; N]; 2], [[f64; N]; 1]);
@@ -39,6 +40,12 @@ fn sensed<const N: usize>(
         readings = readings.map(|reading| reading / duration_s);
     }
     array::from_fn(|lane| (readings[lane] - bias[lane]) * ratio[lane] * per_scale_factor[lane])
+}
+
+/// Whether a tick of the accelerometers lasts a quarter longer or shorter than the gyros': its increments are not those of that time.
+#[cold]
+fn differ(accel: Span, gyro: Span) -> bool {
+    accel.as_ns().abs_diff(gyro.as_ns()) > gyro.as_ns().unsigned_abs() / 4
 }
 
 impl Corrector {
@@ -83,7 +90,7 @@ impl Corrector {
         };
         // The corrected tick has the gyro tick's time.
         let (time, duration_s) = (out.end_time, raw.duration.as_s());
-        if raw.duration.as_ns().abs_diff(out.duration.as_ns()) > out.duration.as_ns().unsigned_abs() / 4 {
+        if raw.duration != out.duration && differ(raw.duration, out.duration) {
             out.flags |= TickFlags::VELOCITY_INVALID;
         }
         let terms = self.accel_terms::<N>(shares);
