@@ -153,8 +153,7 @@ impl UnitReport {
 
     /// Notes how many instances have the unit, where those that have it are a pair.
     pub(super) fn note_instances(&mut self, reports: &[PairReport]) {
-        let has = |report: &&PairReport| report.units.iter().any(|unit| unit.unit == self.unit);
-        let having: Vec<_> = reports.iter().filter(has).collect();
+        let having: Vec<_> = reports.iter().filter(|report| report.role(&self.unit).is_some()).collect();
         let are_pair = having.chunk_by(|a, b| a.member.group == b.member.group).count() == 1;
         self.instances = are_pair.then_some(having.len() as u64);
     }
