@@ -187,6 +187,16 @@ impl Driver {
         (corrected, diagnostics)
     }
 
+    /// Tokens of the nodes and endpoints that the graph has at this moment.
+    async fn graph(&self) -> Vec<String> {
+        let tokens = self.session.liveliness().get("@ros2_lv/7/**").timeout(LIMIT).await.unwrap();
+        let mut graph = Vec::new();
+        while let Ok(reply) = tokens.recv_async().await {
+            graph.push(reply.into_result().unwrap().key_expr().to_string());
+        }
+        graph
+    }
+
     /// What is heard on a topic; payload and attachment of each.
     async fn subscribe(&self, topic: &str, interface: Interface) -> Heard {
         let (sender, heard) = unbounded_channel();
@@ -416,14 +426,17 @@ async fn a_router_of_theirs_and_a_driver_that_leaves_out_ticks() {
     let bridge = Bridge::start(folder.path(), &["--connect", &locator]);
     let mut driver = Driver::join(&locator).await;
     let (mut corrected, mut diagnostics) = driver.hear().await;
-    let tokens = driver.session.liveliness().get("@ros2_lv/7/**").timeout(LIMIT).await.unwrap();
-    let mut graph = Vec::new();
-    while let Ok(reply) = tokens.recv_async().await {
-        graph.push(reply.into_result().unwrap().key_expr().to_string());
-    }
-    let output = graph.iter().find(|token| token.contains("/MP/") && token.contains("/%imu%data/"));
-    assert!(output.is_some_and(|token| token.ends_with("/1:2:2,:,:,:,,")), "{graph:#?}");
-    assert!(graph.iter().any(|token| token.ends_with("/0/0/NN/%/%/isotherm")), "{graph:#?}");
+    // The router knows a token a moment after it is declared.
+    let deadline = Instant::now() + LIMIT;
+    let output = |token: &String| token.contains("/MP/%/%/isotherm/%imu%data/");
+    let graph = loop {
+        let graph = driver.graph().await;
+        if graph.iter().any(output) && graph.iter().any(|token| token.ends_with("/0/0/NN/%/%/isotherm")) {
+            break graph;
+        }
+        assert!(Instant::now() < deadline, "{graph:#?}");
+    };
+    assert!(graph.iter().any(|token| output(token) && token.ends_with("/1:2:2,:,:,:,,")), "{graph:#?}");
 
     let mut raw = driver.publisher("/imu/data_raw", IMU).await;
     let mut sent = 0;
