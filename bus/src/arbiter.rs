@@ -12,20 +12,25 @@ const MOST_STEPS: i128 = 1 << 20;
 /// The last tick used of a run of the producer.
 #[derive(Debug, Clone, Copy)]
 struct Run {
+    series: u64,
     sequence: u64,
     end_time_ns: i64,
 }
 
 impl Run {
-    /// Whether sequence and time of a tick are on this run's line.
-    fn has(&self, sequence: u64, end_time_ns: i64, duration_ns: u64, ticks: u16) -> bool {
+    /// Whether a tick is of this run's series, and its sequence and time on this run's line.
+    fn has(&self, tick: &CorrectedTick) -> bool {
+        let CorrectedTick { series, sequence, end_time, duration, ticks, .. } = *tick;
+        if series != self.series {
+            return false;
+        }
         let steps = i128::from(sequence) - i128::from(self.sequence);
         if steps.abs() > MOST_STEPS {
             return false;
         }
-        let duration = i128::from(duration_ns / u64::from(ticks.max(1))).min(LONGEST_NS);
+        let duration = i128::from(duration.as_ns().unsigned_abs() / u64::from(ticks.max(1))).min(LONGEST_NS);
         let line = steps * duration;
-        let apart = (i128::from(end_time_ns) - i128::from(self.end_time_ns) - line).abs();
+        let apart = (i128::from(end_time.as_ns()) - i128::from(self.end_time_ns) - line).abs();
         apart <= duration / 2 + line.abs() / 8
     }
 }
@@ -49,14 +54,9 @@ impl FirstWins {
 
     /// Whether a tick is to be used.
     pub fn wins(&mut self, tick: &CorrectedTick) -> bool {
-        self.decide(tick.sequence, tick.end_time.as_ns(), tick.duration.as_ns().unsigned_abs(), tick.ticks)
-    }
-
-    /// The same by its figures: sequence number, end (ns), duration (ns), raw ticks in it.
-    pub fn decide(&mut self, sequence: u64, end_time_ns: i64, duration_ns: u64, ticks: u16) -> bool {
+        let CorrectedTick { series, sequence, end_time, ticks, .. } = *tick;
         let [current, before @ ..] = &self.runs;
-        let is_of =
-            |run: &Option<Run>| run.is_some_and(|run| run.has(sequence, end_time_ns, duration_ns, ticks));
+        let is_of = |run: &Option<Run>| run.is_some_and(|run| run.has(tick));
         let wins = match current {
             Some(run) if is_of(current) => {
                 sequence.saturating_sub(u64::from(ticks.max(1)) - 1) > run.sequence
@@ -69,7 +69,7 @@ impl FirstWins {
         };
         if wins {
             if let Some(current) = self.runs.first_mut() {
-                *current = Some(Run { sequence, end_time_ns });
+                *current = Some(Run { series, sequence, end_time_ns: end_time.as_ns() });
             }
         } else {
             self.dropped += 1;
@@ -86,6 +86,9 @@ impl FirstWins {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_correction::sample::TickFlags;
+    use isotherm_correction::units::{Span, Timestamp};
+
     use super::*;
     use crate::Continuity;
 
@@ -115,14 +118,21 @@ mod tests {
                     );
                     cases += 1;
                 }
-                [sequence, end_time_ns, duration_ns, ticks, missed, restart] => {
-                    let (sequence, ticks) = (sequence.parse().unwrap(), ticks.parse().unwrap());
-                    let (end_ns, duration_ns) = (end_time_ns.parse().unwrap(), duration_ns.parse().unwrap());
-                    let used =
-                        arbiter.as_mut().is_none_or(|it| it.decide(sequence, end_ns, duration_ns, ticks));
+                [series, sequence, end_time_ns, duration_ns, ticks, missed, restart] => {
+                    let tick = CorrectedTick {
+                        series: series.parse().unwrap(),
+                        sequence: sequence.parse().unwrap(),
+                        end_time: Timestamp::from_ns(end_time_ns.parse().unwrap()),
+                        duration: Span::from_ns(duration_ns.parse().unwrap()),
+                        ticks: ticks.parse().unwrap(),
+                        missed: missed.parse().unwrap(),
+                        flags: if *restart == "1" { TickFlags::RESTART } else { TickFlags::empty() },
+                        ..CorrectedTick::default()
+                    };
+                    let used = arbiter.as_mut().is_none_or(|it| it.wins(&tick));
                     verdicts.push(if used { 'u' } else { 'd' });
                     if used {
-                        account.enter(sequence, ticks, missed.parse().unwrap(), *restart == "1");
+                        account.feed(&tick);
                     }
                 }
                 other => panic!("{other:?}"),

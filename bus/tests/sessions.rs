@@ -72,6 +72,7 @@ fn corrected(serial: &str, raw: &GyroBatch) -> CorrectedBatch {
     });
     CorrectedBatch {
         unit: serial.to_owned(),
+        series: 0,
         revision: Revision::default(),
         temperatures: ArrayVec::new(),
         sigmas: Vec::new(),

@@ -13,7 +13,7 @@
 int main(void) {
     static uint8_t frame[ISOTHERM_MAX_FRAME_BYTES];
     const size_t length = fread(frame, 1, sizeof frame, stdin);
-    isotherm_corrected_batch_2 batch;
+    isotherm_corrected_batch_3 batch;
     isotherm_corrected_tick tick;
     const isotherm_result result = isotherm_decode_corrected(frame, length, &batch);
     if (result != ISOTHERM_OK || batch.ticks.count != TICKS) {

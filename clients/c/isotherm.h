@@ -1,7 +1,7 @@
 /*
  * Isotherm's wire messages in C99: one header, no allocation, no I/O, no library but string.h.
  *
- *     isotherm_corrected_batch_2 batch;
+ *     isotherm_corrected_batch_3 batch;
  *     if (isotherm_decode_corrected(frame, length, &batch) == ISOTHERM_OK) {
  *         isotherm_corrected_tick tick;
  *         while (isotherm_next_corrected_tick(&batch.ticks, &tick)) use(tick.delta_angle_rad);
@@ -359,7 +359,7 @@ static inline void isotherm_put_text(isotherm_writer *w, uint32_t most, isotherm
 #define ISOTHERM_TICK_INTERPOLATED (1u << 0)
 /* `missed` ticks precede: bridge them */
 #define ISOTHERM_TICK_GAP (1u << 1)
-/* no accelerometer tick: velocity is zero, bridge it */
+/* no accelerometer tick: velocity is zero, in a step partial: bridge it */
 #define ISOTHERM_TICK_ACCELEROMETER_MISSING (1u << 2)
 /* temperature rates have not settled */
 #define ISOTHERM_TICK_WARM_UP (1u << 3)
@@ -546,6 +546,16 @@ typedef struct {
     isotherm_list ticks;
     isotherm_list sigmas;
 } isotherm_corrected_batch_2;
+
+typedef struct {
+    isotherm_view unit;
+    uint64_t series;
+    isotherm_revision revision;
+    uint32_t temperatures_count;
+    isotherm_applied_temperature temperatures[16];
+    isotherm_list ticks;
+    isotherm_list sigmas;
+} isotherm_corrected_batch_3;
 
 typedef enum {
     ISOTHERM_STATE_STANDBY,
@@ -1236,6 +1246,32 @@ static inline bool isotherm_read_corrected_batch_2(isotherm_cursor *c, isotherm_
     }
     o->ticks.end = c->at;
     if (!isotherm_get_count(c, 1u, 4096u, &o->sigmas.count)) return false;
+    o->sigmas.at = c->at;
+    for (uint32_t i = 0; i < o->sigmas.count; ++i) {
+        isotherm_sigma item;
+        if (!isotherm_read_sigma(c, &item)) return false;
+    }
+    o->sigmas.end = c->at;
+    return true;
+}
+
+static inline bool isotherm_read_corrected_batch_3(isotherm_cursor *c, isotherm_corrected_batch_3 *o) {
+    memset(o, 0, sizeof *o);
+    if (!isotherm_get_text(c, 1048576u, &o->unit)) return false;
+    if (!isotherm_get_u64(c, &o->series)) return false;
+    if (!isotherm_read_revision(c, &o->revision)) return false;
+    if (!isotherm_get_count(c, 0u, 16u, &o->temperatures_count)) return false;
+    for (uint32_t i = 0; i < o->temperatures_count; ++i) {
+        if (!isotherm_read_applied_temperature(c, &o->temperatures[i])) return false;
+    }
+    if (!isotherm_get_count(c, 1u, 4096u, &o->ticks.count)) return false;
+    o->ticks.at = c->at;
+    for (uint32_t i = 0; i < o->ticks.count; ++i) {
+        isotherm_corrected_tick item;
+        if (!isotherm_read_corrected_tick(c, &item)) return false;
+    }
+    o->ticks.end = c->at;
+    if (!isotherm_get_count(c, 0u, 4096u, &o->sigmas.count)) return false;
     o->sigmas.at = c->at;
     for (uint32_t i = 0; i < o->sigmas.count; ++i) {
         isotherm_sigma item;
@@ -2167,6 +2203,16 @@ static inline isotherm_result isotherm_decode_corrected_batch_2(const uint8_t *f
     return ISOTHERM_OK;
 }
 
+/* Version 3 of kind 4; what `o` holds after an error means nothing. */
+static inline isotherm_result isotherm_decode_corrected_batch_3(const uint8_t *frame, size_t length, isotherm_corrected_batch_3 *o) {
+    isotherm_cursor c;
+    const isotherm_result opened = isotherm_open(frame, length, ISOTHERM_KIND_CORRECTED, 3u, &c);
+    if (opened != ISOTHERM_OK) return opened;
+    if (!isotherm_read_corrected_batch_3(&c, o)) return ISOTHERM_BODY;
+    if (c.at != c.end) return ISOTHERM_LEFT_OVER;
+    return ISOTHERM_OK;
+}
+
 /* Version 1 of kind 5; what `o` holds after an error means nothing. */
 static inline isotherm_result isotherm_decode_status_1(const uint8_t *frame, size_t length, isotherm_status_1 *o) {
     isotherm_cursor c;
@@ -2230,18 +2276,22 @@ static inline isotherm_result isotherm_decode_journal_part(const uint8_t *frame,
 }
 /* generated: end of frames */
 
-/* A corrected batch of any version; one without standard errors has no `sigmas`. */
-static inline isotherm_result isotherm_decode_corrected(const uint8_t *frame, size_t length, isotherm_corrected_batch_2 *o) {
-    if (isotherm_version(frame, length) != 1) return isotherm_decode_corrected_batch_2(frame, length, o);
+/* A corrected batch of any version; an older one has series 0, and one without standard errors no `sigmas`. */
+static inline isotherm_result isotherm_decode_corrected(const uint8_t *frame, size_t length, isotherm_corrected_batch_3 *o) {
+    const unsigned version = isotherm_version(frame, length);
+    if (version != 1 && version != 2) return isotherm_decode_corrected_batch_3(frame, length, o);
     isotherm_corrected_batch plain;
-    const isotherm_result result = isotherm_decode_corrected_batch(frame, length, &plain);
+    isotherm_corrected_batch_2 old;
+    const isotherm_result result = version == 2 ? isotherm_decode_corrected_batch_2(frame, length, &old)
+                                                : isotherm_decode_corrected_batch(frame, length, &plain);
     if (result != ISOTHERM_OK) return result;
     memset(o, 0, sizeof *o);
-    o->unit = plain.unit;
-    o->revision = plain.revision;
-    o->temperatures_count = plain.temperatures_count;
-    memcpy(o->temperatures, plain.temperatures, sizeof o->temperatures);
-    o->ticks = plain.ticks;
+    o->unit = version == 2 ? old.unit : plain.unit;
+    o->revision = version == 2 ? old.revision : plain.revision;
+    o->temperatures_count = version == 2 ? old.temperatures_count : plain.temperatures_count;
+    memcpy(o->temperatures, version == 2 ? old.temperatures : plain.temperatures, sizeof o->temperatures);
+    o->ticks = version == 2 ? old.ticks : plain.ticks;
+    if (version == 2) o->sigmas = old.sigmas;
     return ISOTHERM_OK;
 }
 
@@ -2353,7 +2403,7 @@ static inline size_t isotherm_encode_reference(uint8_t *buffer, size_t size, con
 /* Continuity: what of a unit's raw gyro ticks arrived, was announced as missing, or was lost on the way. Begin with all zero. */
 typedef struct {
     uint64_t ticks, announced_missing, lost, duplicated, restarts;
-    uint64_t last;
+    uint64_t series, last;
     bool begun;
 } isotherm_account;
 
@@ -2364,9 +2414,10 @@ static inline uint64_t isotherm_first(const isotherm_corrected_tick *tick) {
     return tick->sequence > before ? tick->sequence - before : 0;
 }
 
-static inline void isotherm_enter(isotherm_account *account, const isotherm_corrected_tick *tick) {
+/* Enters a tick of a batch of this series. */
+static inline void isotherm_enter(isotherm_account *account, uint64_t series, const isotherm_corrected_tick *tick) {
     const uint64_t first = isotherm_first(tick);
-    if (account->begun && (tick->flags & ISOTHERM_TICK_RESTART) != 0) {
+    if (account->begun && (series != account->series || (tick->flags & ISOTHERM_TICK_RESTART) != 0)) {
         ++account->restarts;
     } else if (account->begun) {
         const uint64_t expected = isotherm_add_saturating(isotherm_add_saturating(account->last, 1), tick->missed);
@@ -2375,6 +2426,7 @@ static inline void isotherm_enter(isotherm_account *account, const isotherm_corr
     }
     account->ticks = isotherm_add_saturating(account->ticks, tick->ticks > 1 ? tick->ticks : 1u);
     account->announced_missing = isotherm_add_saturating(account->announced_missing, tick->missed);
+    account->series = series;
     account->last = tick->sequence;
     account->begun = true;
 }
@@ -2384,7 +2436,7 @@ static inline void isotherm_enter(isotherm_account *account, const isotherm_corr
  * Enter into the account what isotherm_wins lets through.
  */
 typedef struct {
-    uint64_t sequence;
+    uint64_t series, sequence;
     int64_t end_time_ns;
     bool known;
 } isotherm_run;
@@ -2397,9 +2449,9 @@ typedef struct {
     uint64_t dropped;
 } isotherm_arbiter;
 
-/* Whether sequence and time of a tick are on the line of a run, at most 2^20 ticks from its last. */
-static inline bool isotherm_is_of(const isotherm_run *run, const isotherm_corrected_tick *tick) {
-    if (!run->known) return false;
+/* Whether a tick is of the series of a run, and its sequence and time on the run's line, at most 2^20 ticks from its last. */
+static inline bool isotherm_is_of(const isotherm_run *run, uint64_t series, const isotherm_corrected_tick *tick) {
+    if (!run->known || series != run->series) return false;
     const bool later = tick->sequence >= run->sequence;
     const uint64_t steps = later ? tick->sequence - run->sequence : run->sequence - tick->sequence;
     const bool after = tick->end_time_ns >= run->end_time_ns;
@@ -2414,15 +2466,15 @@ static inline bool isotherm_is_of(const isotherm_run *run, const isotherm_correc
     return (time > line ? time - line : line - time) <= tolerance;
 }
 
-/* Whether to use a tick. */
-static inline bool isotherm_wins(isotherm_arbiter *arbiter, const isotherm_corrected_tick *tick) {
+/* Whether to use a tick of a batch of this series. */
+static inline bool isotherm_wins(isotherm_arbiter *arbiter, uint64_t series, const isotherm_corrected_tick *tick) {
     isotherm_run *run = &arbiter->current;
     bool wins = true;
-    if (isotherm_is_of(run, tick)) {
+    if (isotherm_is_of(run, series, tick)) {
         wins = isotherm_first(tick) > run->sequence;
     } else {
         for (size_t i = 0; i < ISOTHERM_RUNS_BEFORE; ++i) {
-            if (isotherm_is_of(&arbiter->before[i], tick)) wins = false;
+            if (isotherm_is_of(&arbiter->before[i], series, tick)) wins = false;
         }
         if (wins) {
             for (size_t i = ISOTHERM_RUNS_BEFORE - 1; i > 0; --i) arbiter->before[i] = arbiter->before[i - 1];
@@ -2433,6 +2485,7 @@ static inline bool isotherm_wins(isotherm_arbiter *arbiter, const isotherm_corre
         ++arbiter->dropped;
         return false;
     }
+    run->series = series;
     run->sequence = tick->sequence;
     run->end_time_ns = tick->end_time_ns;
     run->known = true;

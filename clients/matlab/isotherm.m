@@ -6,7 +6,7 @@ function units = isotherm(path)
 %   ticks = isotherm('corrected.parquet') columns by name of: isotherm-replay convert --to parquet; a table in MATLAB
 %
 %   units(k).unit is a serial; units(k).sequence, .end_time_ns, .duration_ns, .ticks, .missed, .mode (1, -1, 0: none), .flags,
-%   .revision have a row for each output, .delta_angle_rad and .delta_velocity_m_per_s three columns, .gyro_flags and .accel_flags
+%   .revision, .series have a row for each output, .delta_angle_rad and .delta_velocity_m_per_s three columns, .gyro_flags and .accel_flags
 %   eight, of which .gyros and .accels count; .angle_sigma_rad and .velocity_sigma_m_per_s have twelve: x, y, z by noise, by
 %   restoration, by calibration, by clamping; NaN where unknown or not asked for. Bits and fields: docs/wire.md. Frames that cannot be read are passed over with a
 %   warning that says how many and why. Recordings compressed with zstd need the program zstd on the path.
@@ -148,12 +148,14 @@ function [unit, out] = decode(frame)
   count = numel(frame);
   if count < 6 || count > 1048576, refuse('a frame of %d bytes', count); end
   if frame(1) ~= 4, refuse('kind %d, not 4', frame(1)); end
-  if frame(2) ~= 1 && frame(2) ~= 2, refuse('version %d is not known here', frame(2)); end
+  if frame(2) < 1 || frame(2) > 3, refuse('version %d is not known here', frame(2)); end
   if number(frame(end - 3:end)) ~= crc32(frame(1:end - 4)), refuse('the checksum does not fit'); end
   body = frame(3:end - 4);
   [length, at] = varint(body, 1, 64);
   at = skip(body, at, length);
   unit = char(body(at - double(length):at - 1));
+  series = uint64(0);
+  if frame(2) == 3, [series, at] = varint(body, at, 64); end
   [revision, at] = varint(body, at, 64);
   at = skip(body, at, 8);
   [channels, at] = varint(body, at, 64);
@@ -174,9 +176,9 @@ function [unit, out] = decode(frame)
   end
   ticks = sum(cellfun(@(part) numel(part.sequence), parts));
   angle = NaN(ticks, 12); velocity = NaN(ticks, 12);
-  if frame(2) == 2
+  if frame(2) > 1
     [runs, at] = varint(body, at, 64);
-    if runs < 1 || runs > 4096, refuse('%d runs of standard errors', runs); end
+    if runs < 3 - double(frame(2)) || runs > 4096, refuse('%d runs of standard errors', runs); end
     for k = 1:double(runs)
       [from, at] = varint(body, at, 16);
       numbers = at;
@@ -193,6 +195,7 @@ function [unit, out] = decode(frame)
   end
   out.angle_sigma_rad = angle; out.velocity_sigma_m_per_s = velocity;
   out.revision = repmat(revision, numel(out.sequence), 1);
+  out.series = repmat(series, numel(out.sequence), 1);
 end
 
 function at = skip(body, at, count)

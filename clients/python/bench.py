@@ -147,7 +147,8 @@ def main() -> None:
         nonlocal arbiter
         if frame is made[0]:
             arbiter = isotherm.FirstWins()
-        account.enter(arbiter.choose(decoder.decode(frame).ticks))
+        batch = decoder.decode(frame)
+        account.enter(arbiter.choose(batch.ticks, batch.series), batch.series)
 
     figures = {
         "ticks_per_s": round(ticks_per_s(decoder.decode, made, seconds)),

@@ -7,7 +7,7 @@ export const tickFlags = {
   INTERPOLATED: 1,
   /** `missed` ticks precede: bridge them */
   GAP: 2,
-  /** no accelerometer tick: velocity is zero, bridge it */
+  /** no accelerometer tick: velocity is zero, in a step partial: bridge it */
   ACCELEROMETER_MISSING: 4,
   /** temperature rates have not settled */
   WARM_UP: 8,
@@ -155,6 +155,17 @@ export interface CorrectedBatch2 {
   temperatures: Array<AppliedTemperature>;
   ticks: Array<CorrectedTick>;
   /** each from its tick up to the next one's */
+  sigmas: Array<Sigma>;
+}
+
+export interface CorrectedBatch3 {
+  unit: string;
+  /** of the gyro batches that it is made of */
+  series: number;
+  revision: Revision;
+  temperatures: Array<AppliedTemperature>;
+  ticks: Array<CorrectedTick>;
+  /** or none */
   sigmas: Array<Sigma>;
 }
 

@@ -91,8 +91,9 @@ impl NavigationStep {
 pub struct StepSum {
     /// Plain sums and flags so far; `None` between steps.
     open: Option<CorrectedTick>,
-    /// Counter of the revision that makes the open step, which a tick's form leaves out.
+    /// Counter of the revision that makes the open step and its series, which a tick's form leaves out.
     revision: u64,
+    series: u64,
     /// β of the open step (rad).
     coning: [f64; 3],
     /// σ of the open step (m/s).
@@ -167,7 +168,7 @@ impl StepSum {
             open.ticks >= step.ticks
         } else {
             self.open = Some(tick.clone());
-            self.revision = tick.revision;
+            (self.revision, self.series) = (tick.revision, tick.series);
             tick.ticks.max(1) >= step.ticks
         };
         if full {
@@ -193,7 +194,7 @@ impl StepSum {
         let Some(mut sum) = self.open.take() else {
             return;
         };
-        sum.revision = self.revision;
+        (sum.revision, sum.series) = (self.revision, self.series);
         sum.sigma = self.errors.take();
         if step.coning_sculling && !sum.flags.contains(TickFlags::UNCALIBRATED) {
             let rotated = rotation(sum.delta_angle, sum.delta_velocity);

@@ -238,6 +238,9 @@ pub struct CorrectedTick {
     /// Counter of the calibration revision that made this tick; 0 while uncalibrated. A batch says it once for all its ticks.
     #[serde(skip)]
     pub revision: u64,
+    /// Series of the raw gyro tick; a batch says it once for all its ticks.
+    #[serde(skip)]
+    pub series: u64,
     /// Standard errors of the increments, where the calibration asks for them. A batch says them for runs of ticks.
     #[serde(skip)]
     pub sigma: Option<Box<Sigma>>,

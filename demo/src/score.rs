@@ -182,6 +182,7 @@ mod tests {
         let tick = |&sequence| CorrectedTick { sequence, delta_angle: [1.5; 3], ..CorrectedTick::default() };
         CorrectedBatch {
             unit: "A".into(),
+            series: 0,
             revision: Revision::default(),
             temperatures: std::iter::empty().collect(),
             sigmas: Vec::new(),

@@ -181,6 +181,7 @@ impl CorrectedCsv {
                 let Some(last) = same.last() else { continue };
                 let batch = CorrectedBatch {
                     unit: unit.to_string(),
+                    series: 0,
                     revision: Revision {
                         counter: last.tick.revision,
                         digest: last.digest.unwrap_or_default(),

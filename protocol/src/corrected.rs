@@ -40,6 +40,9 @@ pub struct AppliedTemperature {
 pub struct CorrectedBatch {
     /// Serial of the unit.
     pub unit: String,
+    /// The producer's run that the ticks are of; 0 where it numbers none. Each of them has it once they have been decoded.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub series: u64,
     /// The calibration that made the ticks; each of them has its counter once they have been decoded.
     pub revision: Revision,
     /// Temperatures in use at the last tick of the batch.
@@ -53,7 +56,12 @@ pub struct CorrectedBatch {
     pub sigmas: Vec<SigmaRun>,
 }
 
-/// A batch without standard errors, as version 1 has it.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde hands it over")]
+fn is_zero(series: &u64) -> bool {
+    *series == 0
+}
+
+/// A batch without series and standard errors, as version 1 has it.
 #[derive(Deserialize)]
 struct Plain {
     unit: String,
@@ -63,9 +71,14 @@ struct Plain {
     ticks: Vec<CorrectedTick>,
 }
 
-impl From<Plain> for CorrectedBatch {
-    fn from(Plain { unit, revision, temperatures, ticks }: Plain) -> Self {
-        Self { unit, revision, temperatures, ticks, sigmas: Vec::new() }
+/// What version 2 has behind it.
+#[derive(Deserialize)]
+struct Sigmas(#[serde(deserialize_with = "bounded::<_, _, MAX_TICKS>")] Vec<SigmaRun>);
+
+impl Plain {
+    fn with(self, Sigmas(sigmas): Sigmas) -> CorrectedBatch {
+        let Self { unit, revision, temperatures, ticks } = self;
+        CorrectedBatch { unit, series: 0, revision, temperatures, ticks, sigmas }
     }
 }
 
@@ -85,44 +98,54 @@ impl Message for CorrectedBatch {
     }
 
     fn version(&self) -> u8 {
-        version(&self.sigmas)
+        version(self.series, &self.sigmas)
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
         let temperatures = self.temperatures.iter();
         let temperatures = temperatures
             .map(|applied| (&applied.channel, [applied.temperature_deg_c, applied.rate_deg_c_per_s]));
-        let (unit, revision, ticks) = (self.unit.as_str(), self.revision, self.ticks.len());
-        Head { unit, revision, temperatures, ticks }.append(frame);
-        self.ticks.iter().for_each(|tick| append_tick(frame, tick));
-        sigma::append(frame, &self.sigmas);
+        let Self { ref unit, series, revision, ref ticks, ref sigmas, .. } = *self;
+        Head { unit, series, revision, temperatures, ticks: ticks.len() }.append(frame);
+        ticks.iter().for_each(|tick| append_tick(frame, tick));
+        sigma::append(frame, series, sigmas);
         Ok(())
     }
 
     fn read_body(version: u8, body: &[u8]) -> Result<Self, CodecError> {
-        let mut batch: Self =
-            if version == WITHOUT_SIGMA { whole::<Plain>(body)?.into() } else { whole(body)? };
-        if version != WITHOUT_SIGMA && batch.sigmas.is_empty() {
+        let mut batch: Self = match version {
+            PLAIN => whole::<Plain>(body)?.with(Sigmas(Vec::new())),
+            WITH_SIGMAS => whole::<(Plain, Sigmas)>(body).map(|(plain, sigmas)| plain.with(sigmas))?,
+            _ => whole(body)?,
+        };
+        if version == WITH_SIGMAS && batch.sigmas.is_empty() {
             return Err(CodecError::Malformed);
         }
         spread(&batch.sigmas, &mut batch.ticks);
-        batch.ticks.iter_mut().for_each(|tick| tick.revision = batch.revision.counter);
+        let (revision, series) = (batch.revision.counter, batch.series);
+        batch.ticks.iter_mut().for_each(|tick| (tick.revision, tick.series) = (revision, series));
         batch.check()?;
         Ok(batch)
     }
 }
 
-/// Version of a batch that has no standard errors.
-const WITHOUT_SIGMA: u8 = 1;
+/// Version of a batch that has neither series nor standard errors, and of one that has standard errors.
+const PLAIN: u8 = 1;
+const WITH_SIGMAS: u8 = 2;
 
-/// Version of a batch with these standard errors.
-pub(crate) fn version(sigmas: &[SigmaRun]) -> u8 {
-    if sigmas.is_empty() { WITHOUT_SIGMA } else { CORRECTED.current }
+/// Version of a batch of a series with these standard errors: the oldest that can say them.
+pub(crate) fn version(series: u64, sigmas: &[SigmaRun]) -> u8 {
+    match (series, sigmas) {
+        (0, []) => PLAIN,
+        (0, _) => WITH_SIGMAS,
+        _ => CORRECTED.current,
+    }
 }
 
 /// What stands before the ticks of a batch.
 pub(crate) struct Head<'a, T> {
     pub(crate) unit: &'a str,
+    pub(crate) series: u64,
     pub(crate) revision: Revision,
     /// Channel, smoothed temperature (°C), its rate (°C/s).
     pub(crate) temperatures: T,
@@ -132,9 +155,12 @@ pub(crate) struct Head<'a, T> {
 impl<'a, T: Iterator<Item = (&'a ChannelName, [f64; 2])> + Clone> Head<'a, T> {
     /// Appends it to a frame.
     pub(crate) fn append(self, frame: &mut Vec<u8>) {
-        let Self { unit, revision, temperatures, ticks } = self;
+        let Self { unit, series, revision, temperatures, ticks } = self;
         append_text(frame, unit);
         append(frame, |to| {
+            if series != 0 {
+                to.u64(series);
+            }
             to.u64(revision.counter);
             to.bytes(revision.digest);
             to.length(temperatures.clone().count());
@@ -153,13 +179,13 @@ pub(crate) const MAX_TICK: usize =
 // It is written in one part.
 const _: () = assert!(MAX_TICK <= 255);
 
-/// Whether two ticks are the same to the bit, standard errors included and their revision's counter left out; numbers that are none are what their bits are.
+/// Whether two ticks are the same to the bit, standard errors included, their revision's counter and their series left out; numbers that are none are what their bits are.
 #[must_use]
 pub fn are_same(one: &CorrectedTick, other: &CorrectedTick) -> bool {
     let bytes = |tick: &CorrectedTick| {
         let mut bytes = Vec::with_capacity(MAX_TICK);
         append_tick(&mut bytes, tick);
-        sigma::append(&mut bytes, &SigmaRun::of([tick]));
+        sigma::append(&mut bytes, 0, &SigmaRun::of([tick]));
         bytes
     };
     bytes(one) == bytes(other)
@@ -221,6 +247,7 @@ mod tests {
                 gyro_parity: numbers[6..].iter().copied().take(gyro_parity).collect(),
                 accel_parity: numbers[11..].iter().copied().take(accel_parity).collect(),
                 revision: 0,
+                series: 0,
                 sigma: None,
             }
         }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::operation::{Command, HealthReading, Refusal, State};
-use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading, TickFlags};
+use isotherm_correction::sample::{AccelTick, CorrectedTick, GyroTick, TemperatureReading};
 use isotherm_correction::unit::{At, Change, Event, Unit, UnitSettings};
 use isotherm_correction::units::Span;
 use serde::{Deserialize, Serialize};
@@ -90,8 +90,6 @@ pub struct UnitStream {
     last: Option<LastTick>,
     /// Series of the last raw gyro tick.
     incoming_series: u64,
-    /// Series of the last corrected tick; `None` before the first.
-    series: Option<u64>,
     /// End of the last pre-launch calibration (ns on the producer's clock).
     pre_launch_ended_ns: Option<i64>,
 }
@@ -109,7 +107,6 @@ impl UnitStream {
             bad_frames: 0,
             last: None,
             incoming_series: 0,
-            series: None,
             pre_launch_ended_ns: None,
         }
     }
@@ -239,16 +236,12 @@ impl UnitStream {
             self.incoming_series = ticks.last().map_or(self.incoming_series, |tick| tick.series);
         }
         let state = self.unit.state();
-        let Self { unit, outgoing, revisions, series, incoming_series, .. } = self;
+        let Self { unit, outgoing, revisions, .. } = self;
         unit.handle(event, &mut |tick: &CorrectedTick| {
-            // Only a restart changes the series.
-            if tick.flags.contains(TickFlags::RESTART) || series.is_none() {
-                *series = Some(*incoming_series);
-            }
             if revisions.is_new(tick.revision) {
                 revisions.released(tick.revision, |revision| InForce {
                     revision,
-                    series: series.unwrap_or_default(),
+                    series: tick.series,
                     sequence: tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1))),
                     end_time_ns: tick.end_time.as_ns(),
                 });
@@ -293,7 +286,7 @@ impl UnitStream {
         ticks
     }
 
-    /// Makes the next frame of corrected ticks, all of one revision, in the place of `frame`, whose capacity the stream keeps
+    /// Makes the next frame of corrected ticks, all of one revision and series, in the place of `frame`, whose capacity the stream keeps
     /// for the one after it; how many ticks are in it, `None` where there is none.
     #[inline]
     pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> Option<usize> {
@@ -302,13 +295,12 @@ impl UnitStream {
             return None;
         }
         let Self { id, unit, revisions, outgoing, .. } = self;
-        let (last, ticks) =
-            outgoing.next_frame(frame, unit.temperature_changes(), |head, counter, ticks| {
-                let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
-                let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
-                let revision = revisions.revision(counter);
-                Head { unit: id.as_str(), revision, temperatures, ticks }.append(head);
-            })?;
+        let (last, ticks) = outgoing.next_frame(frame, unit.temperature_changes(), |head, last, ticks| {
+            let temperatures = unit.temperatures().take(raw::MAX_CHANNELS);
+            let temperatures = temperatures.map(|(name, state)| (name, [state.temperature, state.rate]));
+            let (unit, revision) = (id.as_str(), revisions.revision(last.revision));
+            Head { unit, series: last.series, revision, temperatures, ticks }.append(head);
+        })?;
         self.note_taken(last);
         Some(ticks)
     }
@@ -327,8 +319,7 @@ impl UnitStream {
     }
 
     /// Remembers the last tick taken, and drops revisions of which nothing can be waiting any more.
-    fn note_taken(&mut self, Last { end_time_ns, sequence, revision }: Last) {
-        let series = self.series.unwrap_or_default();
+    fn note_taken(&mut self, Last { end_time_ns, sequence, revision, series }: Last) {
         self.last = Some(LastTick { end_time_ns, sequence, series });
         self.revisions.taken(revision);
     }

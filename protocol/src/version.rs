@@ -31,8 +31,9 @@ pub const RAW_GYRO: Versions = Versions { min: 1, current: 1 };
 pub const RAW_ACCEL: Versions = Versions { min: 1, current: 1 };
 /// Of the raw temperature batch.
 pub const RAW_TEMPERATURE: Versions = Versions { min: 1, current: 1 };
-/// Of the corrected batch. 2: with standard errors; a batch without them is still written as 1.
-pub const CORRECTED: Versions = Versions { min: 1, current: 2 };
+/// Of the corrected batch. 2: with standard errors; a batch without them is still written as 1. 3: with the series, and with
+/// standard errors or none; a batch of series 0 is still written as 1 or 2.
+pub const CORRECTED: Versions = Versions { min: 1, current: 3 };
 /// Of the unit's status. 2: states, sensors, swaps, drift, self-test, pre-launch calibration, latencies.
 pub const STATUS: Versions = Versions { min: 1, current: 2 };
 /// Of the raw health batch.

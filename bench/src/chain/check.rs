@@ -227,6 +227,7 @@ mod tests {
         let ticks: Vec<CorrectedTick> = offline(0, &sent).unwrap().into_values().take(2).collect();
         let batch = |ticks| CorrectedBatch {
             unit: "BENCH-00000".to_owned(),
+            series: 0,
             revision: Revision::default(),
             temperatures: ArrayVec::default(),
             ticks,

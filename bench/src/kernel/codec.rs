@@ -89,6 +89,7 @@ impl Encode {
         let corrected: Vec<_> = unit::zeeman()?.corrected().into_iter().take(TICKS).collect();
         let batches = corrected.chunks(size).map(|ticks| CorrectedBatch {
             unit: "ZLG-0001".to_owned(),
+            series: ticks.first().map_or(0, |tick| tick.series),
             revision: Revision { counter: 1, digest: [7; 8] },
             temperatures: ArrayVec::new(),
             ticks: ticks.to_vec(),

@@ -105,6 +105,7 @@ mod tests {
         let tick = CorrectedTick { sequence: 300, ticks: 1, ..CorrectedTick::default() };
         let batch = CorrectedBatch {
             unit: unit_name(42).unwrap().to_string(),
+            series: 0,
             revision: Revision { counter: 1000, digest: [9; 8] },
             temperatures: ArrayVec::new(),
             ticks: vec![tick.clone(), tick],

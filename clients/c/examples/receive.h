@@ -12,7 +12,7 @@ typedef struct {
 
 /* Takes one frame: says what it holds, or why it is refused; the stream goes on. */
 static void receive(receiver *r, const uint8_t *frame, size_t length) {
-    isotherm_corrected_batch_2 batch;
+    isotherm_corrected_batch_3 batch;
     const isotherm_result result = isotherm_decode_corrected(frame, length, &batch);
     if (result != ISOTHERM_OK) {
         ++r->refused;
@@ -21,8 +21,8 @@ static void receive(receiver *r, const uint8_t *frame, size_t length) {
     }
     isotherm_corrected_tick tick;
     while (isotherm_next_corrected_tick(&batch.ticks, &tick)) {
-        if (!isotherm_wins(&r->arbiter, &tick)) continue;
-        isotherm_enter(&r->account, &tick);
+        if (!isotherm_wins(&r->arbiter, batch.series, &tick)) continue;
+        isotherm_enter(&r->account, batch.series, &tick);
         if ((tick.flags & ISOTHERM_TICK_ANGLE_INVALID) != 0) continue;
         printf("%" PRIu64 " %g %g %g rad\n", tick.sequence, (double)tick.delta_angle_rad[0], (double)tick.delta_angle_rad[1],
             (double)tick.delta_angle_rad[2]);

@@ -26,6 +26,7 @@ int main(void) {
         isotherm_corrected_tick tick;
         char what[16];
         unsigned restart = 0;
+        uint64_t series = 0;
         memset(&tick, 0, sizeof tick);
         if (line[0] == '=') {
             char next[64] = "";
@@ -36,12 +37,12 @@ int main(void) {
             memset(&account, 0, sizeof account);
             memset(&arbiter, 0, sizeof arbiter);
             count = 0;
-        } else if (sscanf(line, "%" SCNu64 " %" SCNd64 " %" SCNu64 " %" SCNu16 " %" SCNu64 " %u", &tick.sequence,
-                       &tick.end_time_ns, &tick.duration_ns, &tick.ticks, &tick.missed, &restart)
-            == 6) {
+        } else if (sscanf(line, "%" SCNu64 " %" SCNu64 " %" SCNd64 " %" SCNu64 " %" SCNu16 " %" SCNu64 " %u", &series,
+                       &tick.sequence, &tick.end_time_ns, &tick.duration_ns, &tick.ticks, &tick.missed, &restart)
+            == 7) {
             tick.flags = restart != 0 ? (uint16_t)ISOTHERM_TICK_RESTART : 0;
-            const bool used = !first_wins || isotherm_wins(&arbiter, &tick);
-            if (used) isotherm_enter(&account, &tick);
+            const bool used = !first_wins || isotherm_wins(&arbiter, series, &tick);
+            if (used) isotherm_enter(&account, series, &tick);
             if (count + 1 < sizeof verdicts) verdicts[count++] = used ? 'u' : 'd';
         }
     }

@@ -88,12 +88,12 @@ static bool decode(unsigned kind, const uint8_t *frame, size_t length) {
         return true;
     }
     case ISOTHERM_KIND_CORRECTED: {
-        isotherm_corrected_batch_2 batch;
+        isotherm_corrected_batch_3 batch;
         isotherm_corrected_tick tick;
         if (isotherm_decode_corrected(frame, length, &batch) != ISOTHERM_OK) return false;
         take(batch.unit);
         while (isotherm_next_corrected_tick(&batch.ticks, &tick)) {
-            if (isotherm_wins(&arbiter, &tick)) isotherm_enter(&account, &tick);
+            if (isotherm_wins(&arbiter, batch.series, &tick)) isotherm_enter(&account, batch.series, &tick);
         }
         isotherm_sigma sigma;
         while (isotherm_next_sigma(&batch.sigmas, &sigma)) {

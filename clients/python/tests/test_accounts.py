@@ -34,15 +34,16 @@ class Cases(unittest.TestCase):
                 _, verdicts, *expected = line.split()
                 with self.subTest(name):
                     account, arbiter, got = isotherm.Account(), isotherm.FirstWins(), ""
-                    for row in rows:
-                        used = arbiter.choose(row) if first_wins else row
-                        account.enter(used)
+                    for series, row in rows:
+                        used = arbiter.choose(row, series) if first_wins else row
+                        account.enter(used, series)
                         got += "u" if len(used) else "d"
                     self.assertEqual(got, verdicts)
                     self.assertEqual(figures(account), [int(figure) for figure in expected])
                 judged += 1
             elif line and not line.startswith("#"):
-                rows.append(tick(*map(int, line.split())))
+                series, *figures_of_tick = map(int, line.split())
+                rows.append((series, tick(*figures_of_tick)))
         self.assertGreater(judged, 10)
 
 

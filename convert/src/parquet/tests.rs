@@ -106,11 +106,13 @@ fn streams_have_columns_for_every_shape_of_tick() {
         gyro_parity: [0.25].into_iter().collect(),
         accel_parity: [].into_iter().collect(),
         revision: 4,
+        series: 0,
         sigma: None,
     };
     let revision = Revision { counter: 4, digest: [0xab; 8] };
     let corrected = CorrectedBatch {
         unit: "A-1".to_owned(),
+        series: 0,
         revision,
         temperatures: [].into_iter().collect(),
         sigmas: Vec::new(),

@@ -266,6 +266,7 @@ impl Corrector {
     ) {
         let &Paired { gyro: raw, before: Break { missed, restart }, .. } = tick;
         out.sequence = raw.sequence;
+        out.series = raw.series;
         out.end_time = raw.end_time;
         out.duration = raw.duration;
         out.ticks = 1;
@@ -356,6 +357,7 @@ pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> Correc
     };
     CorrectedTick {
         sequence: tick.sequence,
+        series: tick.series,
         end_time: tick.end_time,
         duration: tick.duration,
         ticks: 1,

@@ -65,6 +65,7 @@ fn corrected(sequences: &[u64], missed: u64, counter: u64) -> Message {
     };
     let batch = CorrectedBatch {
         unit: unit().to_string(),
+        series: 0,
         revision: Revision { counter, digest: [7; 8] },
         temperatures: std::iter::empty().collect(),
         sigmas: Vec::new(),

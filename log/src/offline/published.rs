@@ -112,6 +112,7 @@ mod tests {
         for first in (0..TICKS).step_by(100) {
             let batch = CorrectedBatch {
                 unit: "A-1".to_owned(),
+                series: 0,
                 revision: Revision { counter: 1, digest: [7; 8] },
                 temperatures: std::iter::empty().collect(),
                 sigmas: Vec::new(),

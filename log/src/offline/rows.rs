@@ -221,6 +221,7 @@ mod tests {
             gyro_parity: [1e-9, -2.5].into_iter().collect(),
             accel_parity: [].into_iter().collect(),
             revision: 3,
+            series: 0,
             sigma: Some(Box::new(Sigma { angle: CAUSES, velocity: Causes::default() })),
         };
         let mut row = Vec::new();

@@ -36,6 +36,7 @@ fn recording(
         };
         let batch = CorrectedBatch {
             unit: unit.to_string(),
+            series: 0,
             revision: Revision { counter: 1 + u64::from(first >= change), digest: [0xab; 8] },
             temperatures: std::iter::empty().collect(),
             sigmas: Vec::new(),
@@ -134,6 +135,7 @@ fn ten_million_ticks_make_a_bounded_page() {
         };
         let batch = CorrectedBatch {
             unit: unit.to_string(),
+            series: 0,
             revision: Revision::default(),
             temperatures: std::iter::empty().collect(),
             sigmas: Vec::new(),

@@ -116,9 +116,9 @@ pub(crate) fn spread(runs: &[SigmaRun], ticks: &mut [CorrectedTick]) {
     }
 }
 
-/// Appends the section of a frame that has them; nothing without.
-pub(crate) fn append(frame: &mut Vec<u8>, runs: &[SigmaRun]) {
-    if runs.is_empty() {
+/// Appends the section of a frame that has them; nothing without, where no series says that the section is there.
+pub(crate) fn append(frame: &mut Vec<u8>, series: u64, runs: &[SigmaRun]) {
+    if series == 0 && runs.is_empty() {
         return;
     }
     part(frame, |to| to.length(runs.len()));

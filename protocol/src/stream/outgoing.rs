@@ -31,8 +31,8 @@ pub struct Outgoing {
     ticks: Vec<CorrectedTick>,
 }
 
-/// What a memory has of them: each tick and its revision.
-type Waiting = Vec<(CorrectedTick, u64, Option<Sigma>)>;
+/// What a memory has of them: each tick, its revision and its series.
+type Waiting = Vec<(CorrectedTick, [u64; 2], Option<Sigma>)>;
 
 // Full frames are never too long for their reader: the parts of a head have fewer bytes than a tick.
 const _: () = assert!((MAX_TICKS + MAX_CHANNELS + 4) * MAX_TICK + MAX_RUNS * MAX_RUN < MAX_FRAME);
@@ -59,8 +59,9 @@ struct Frame {
 struct HeadKey {
     /// Version of the batch.
     version: u8,
-    /// Counter of the revision.
+    /// Counter of the revision, and the series.
     revision: u64,
+    series: u64,
     /// State of the temperatures.
     temperatures: u64,
     ticks: usize,
@@ -72,6 +73,7 @@ pub(super) struct Last {
     pub(super) end_time_ns: i64,
     pub(super) sequence: u64,
     pub(super) revision: u64,
+    pub(super) series: u64,
 }
 
 impl Outgoing {
@@ -110,7 +112,8 @@ impl Outgoing {
 
     fn write(&mut self, tick: &CorrectedTick) {
         let Frame { count, last, .. } = &self.open;
-        if *count == MAX_TICKS || (*count > 0 && last.revision != tick.revision) {
+        let is_another = (last.revision, last.series) != (tick.revision, tick.series);
+        if *count == MAX_TICKS || (*count > 0 && is_another) {
             self.full.push_back(std::mem::take(&mut self.open));
         }
         if self.open.count == 0 {
@@ -138,15 +141,15 @@ impl Outgoing {
         }
     }
 
-    /// Makes the next frame, all of one revision, in the place of `into`, whose capacity is kept for the one after it; its
-    /// last tick, and how many there are. `write_head` appends the head of a frame of so many ticks of a revision;
+    /// Makes the next frame, all of one revision and series, in the place of `into`, whose capacity is kept for the one after it;
+    /// its last tick, and how many there are. `write_head` appends the head of a frame with this last tick and so many of them;
     /// `temperatures` says in which state they are.
     #[inline(never)]
     pub(super) fn next_frame(
         &mut self,
         into: &mut Vec<u8>,
         temperatures: u64,
-        write_head: impl FnOnce(&mut Vec<u8>, u64, usize),
+        write_head: impl FnOnce(&mut Vec<u8>, Last, usize),
     ) -> Option<(Last, usize)> {
         if !self.ticks.is_empty() {
             let mut ticks = std::mem::take(&mut self.ticks);
@@ -157,19 +160,20 @@ impl Outgoing {
         if frame.count == 0 {
             return None;
         }
-        let version = version(&frame.sigmas);
-        let key = HeadKey { version, revision: frame.last.revision, temperatures, ticks: frame.count };
+        let Last { revision, series, .. } = frame.last;
+        let version = version(series, &frame.sigmas);
+        let key = HeadKey { version, revision, series, temperatures, ticks: frame.count };
         if self.head_of != Some(key) {
             self.head_of = Some(key);
             self.heads += 1;
             self.head.clear();
             begin::<CorrectedBatch>(&mut self.head, version);
-            write_head(&mut self.head, frame.last.revision, frame.count);
+            write_head(&mut self.head, frame.last, frame.count);
         }
         if frame.head != self.heads {
             frame.bytes.splice(..frame.room, self.head.iter().copied());
         }
-        append_sigmas(&mut frame.bytes, &frame.sigmas);
+        append_sigmas(&mut frame.bytes, series, &frame.sigmas);
         seal(&mut frame.bytes);
         self.length = frame.bytes.len();
         std::mem::swap(into, &mut frame.bytes);
@@ -219,7 +223,7 @@ impl Frame {
         let ticks = (0..self.count).map_while(|_| {
             let (tick, behind) = postcard::take_from_bytes::<CorrectedTick>(rest).ok()?;
             rest = behind;
-            Some(CorrectedTick { revision: self.last.revision, ..tick })
+            Some(CorrectedTick { revision: self.last.revision, series: self.last.series, ..tick })
         });
         let mut ticks: Vec<_> = ticks.collect();
         spread(&self.sigmas, &mut ticks);
@@ -229,23 +233,26 @@ impl Frame {
 
 impl Last {
     fn of(tick: &CorrectedTick) -> Self {
-        Self { end_time_ns: tick.end_time.as_ns(), sequence: tick.sequence, revision: tick.revision }
+        let CorrectedTick { end_time, sequence, revision, series, .. } = *tick;
+        Self { end_time_ns: end_time.as_ns(), sequence, revision, series }
     }
 }
 
 impl From<Outgoing> for Waiting {
     fn from(outgoing: Outgoing) -> Self {
         let ticks = outgoing.frames().flat_map(Frame::ticks).chain(outgoing.ticks.iter().cloned());
-        let plain = |tick: &CorrectedTick| CorrectedTick { revision: 0, sigma: None, ..tick.clone() };
-        ticks.map(|tick| (plain(&tick), tick.revision, tick.sigma.as_deref().copied())).collect()
+        ticks
+            .map(|tick| ([tick.revision, tick.series], tick.sigma.as_deref().copied(), tick))
+            .map(|(of, sigma, tick)| (tick, of, sigma))
+            .collect()
     }
 }
 
 impl From<Waiting> for Outgoing {
     fn from(waiting: Waiting) -> Self {
         let mut outgoing = Self::default();
-        for (tick, revision, sigma) in waiting {
-            outgoing.push(&CorrectedTick { revision, sigma: sigma.map(Box::new), ..tick });
+        for (tick, [revision, series], sigma) in waiting {
+            outgoing.push(&CorrectedTick { revision, series, sigma: sigma.map(Box::new), ..tick });
         }
         outgoing
     }

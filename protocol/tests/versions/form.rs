@@ -127,6 +127,16 @@ pub(super) struct CorrectedBatch2 {
     pub(super) sigmas: Vec<Sigma>,
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct CorrectedBatch3 {
+    pub(super) unit: String,
+    pub(super) series: u64,
+    pub(super) revision: Revision,
+    pub(super) temperatures: ArrayVec<AppliedTemperature, MAX_CHANNELS>,
+    pub(super) ticks: Vec<CorrectedTick>,
+    pub(super) sigmas: Vec<Sigma>,
+}
+
 impl Readings {
     pub(super) fn len(&self) -> usize {
         self.values().len()
@@ -239,10 +249,12 @@ impl Form for CorrectedBatch {
             gyro_parity: tick.gyro_parity_rad_per_s.clone(),
             accel_parity: tick.accel_parity_m_per_s2.clone(),
             revision: self.revision.counter,
+            series: 0,
             sigma: None,
         };
         corrected::CorrectedBatch {
             unit: self.unit.clone(),
+            series: 0,
             revision: self.revision,
             temperatures: self.temperatures.clone(),
             ticks: self.ticks.iter().map(tick).collect(),
@@ -282,5 +294,21 @@ impl Form for CorrectedBatch2 {
 
     fn is_written(&self) -> bool {
         self.ticks.iter().all(|tick| fits(tick.duration_ns))
+    }
+}
+
+impl Form for CorrectedBatch3 {
+    type Message = corrected::CorrectedBatch;
+
+    fn message(&self) -> Self::Message {
+        let Self { unit, series, revision, temperatures, ticks, sigmas } = self.clone();
+        let mut batch = CorrectedBatch2 { unit, revision, temperatures, ticks, sigmas }.message();
+        batch.series = series;
+        batch.ticks.iter_mut().for_each(|tick| tick.series = series);
+        batch
+    }
+
+    fn is_written(&self) -> bool {
+        self.series != 0 && self.ticks.iter().all(|tick| fits(tick.duration_ns))
     }
 }

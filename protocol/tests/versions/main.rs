@@ -9,6 +9,7 @@ mod v1;
 mod v2;
 mod v3;
 mod v4;
+mod v5;
 
 use isotherm_protocol::codec::{self, CodecError, Kind};
 use isotherm_protocol::journal::JournalPart;
@@ -18,11 +19,11 @@ use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::{self, Status};
 use serde::Serialize;
 
-use form::{AccelBatch, CorrectedBatch, CorrectedBatch2, Form, GyroBatch, TemperatureBatch};
+use form::{AccelBatch, CorrectedBatch, CorrectedBatch2, CorrectedBatch3, Form, GyroBatch, TemperatureBatch};
 
 /// Name and frame of every vector, in hexadecimal, in the order of the page.
 fn frames() -> impl Iterator<Item = (&'static str, &'static str)> {
-    v1::FRAMES.iter().chain(v2::FRAMES).chain(v3::FRAMES).chain(v4::FRAMES).copied()
+    v1::FRAMES.iter().chain(v2::FRAMES).chain(v3::FRAMES).chain(v4::FRAMES).chain(v5::FRAMES).copied()
 }
 
 /// Bytes written in hexadecimal; spaces and line ends between them, and comments behind `#`, mean nothing.
@@ -53,6 +54,7 @@ fn decode_as(kind: u8, frame: &[u8]) -> Result<serde_json::Value, CodecError> {
         2 => form::<AccelBatch>(frame),
         3 => form::<TemperatureBatch>(frame),
         4 if frame.get(1) == Some(&2) => form::<CorrectedBatch2>(frame),
+        4 if frame.get(1) == Some(&3) => form::<CorrectedBatch3>(frame),
         4 => form::<CorrectedBatch>(frame),
         5 if frame.get(1) == Some(&1) => {
             let old = json::<status::v1::Status>(frame);

@@ -43,6 +43,7 @@ fn tick(index: u8) -> CorrectedTick {
         gyro_parity: [].into_iter().collect(),
         accel_parity: [].into_iter().collect(),
         revision: 3,
+        series: 0,
         sigma: Some(Box::new(Sigma { angle, velocity })),
     }
 }
@@ -57,6 +58,7 @@ fn corrected_with_standard_errors() {
     };
     let batch = CorrectedBatch {
         unit: "ZLG-0042".to_owned(),
+        series: 0,
         revision: Revision { counter: 3, digest: [0x01, 0x23, 0x45, 0x67, 0x89, 0xab, 0xcd, 0xef] },
         temperatures: [body].into_iter().collect(),
         sigmas: SigmaRun::of(&ticks),

@@ -25,13 +25,8 @@ async fn a_clock_that_steps_reaches_no_tick() {
     for clock_s in [0, 86_400, -86_400, 3, -3, 0] {
         disturb.set(Trouble { clock_s, ..Trouble::default() });
         line.play(Duration::from_millis(300)).await;
-        let begin = Instant::now();
-        line.swap(0.4 + f64::from(i32::try_from(clock_s % 7).unwrap()) / 100.0, AHEAD).await;
-        assert!(
-            begin.elapsed() < Duration::from_secs(5),
-            "a swap waits for the clock: {:?}",
-            begin.elapsed()
-        );
+        let swap = line.swap(0.4 + f64::from(i32::try_from(clock_s % 7).unwrap()) / 100.0, AHEAD);
+        tokio::time::timeout(LIMIT, swap).await.expect("a swap does not wait for the clock");
         line.play(Duration::from_millis(700)).await;
         let books = line.settled().await;
         say(&format!("clock {clock_s:+} s"), books);

@@ -45,25 +45,28 @@ class Account:
     restarts: int = 0
     #: Sequence number of the last output.
     last_sequence: int | None = None
+    #: Series of the last output.
+    last_series: int = 0
 
-    def enter(self, ticks: Array) -> None:
-        """Enters outputs in their order of arrival; of type `TICK`."""
+    def enter(self, ticks: Array, series: int = 0) -> None:
+        """Enters outputs of one series in their order of arrival; of type `TICK`."""
         if len(ticks) == 0:
             return
         if len(ticks) == 1:
             # Arrays cost more than they save.
-            self._enter(ticks[0])
+            self._enter(ticks[0], series)
             return
-        if self.last_sequence is not None and _first(ticks[0]) == self.last_sequence + 1 and _follows(ticks):
+        next_one = self.last_sequence is not None and _first(ticks[0]) == self.last_sequence + 1
+        if next_one and series == self.last_series and _follows(ticks):
             self.ticks += int(ticks["ticks"].sum(dtype=np.uint64))
             self.last_sequence = int(ticks["sequence"][-1])
             return
         for tick in ticks:
-            self._enter(tick)
+            self._enter(tick, series)
 
-    def _enter(self, tick: Any) -> None:
+    def _enter(self, tick: Any, series: int) -> None:
         missed, first = int(tick["missed"]), _first(tick)
-        if self.last_sequence is not None and int(tick["flags"]) & _RESTART:
+        if self.last_sequence is not None and (series != self.last_series or int(tick["flags"]) & _RESTART):
             self.restarts += 1
         elif self.last_sequence is not None:
             expected = min(_MOST, self.last_sequence + 1 + missed)
@@ -71,18 +74,21 @@ class Account:
             self.duplicated += max(0, expected - first)
         self.ticks += max(1, int(tick["ticks"]))
         self.announced_missing += missed
-        self.last_sequence = int(tick["sequence"])
+        self.last_sequence, self.last_series = int(tick["sequence"]), series
 
 
 @dataclass
 class _Run:
     """The last tick used of a run of the producer."""
 
+    series: int
     sequence: int
     end_time_ns: int
 
-    def has(self, tick: Any) -> bool:
-        """Whether sequence and time of a tick are on this run's line."""
+    def has(self, tick: Any, series: int) -> bool:
+        """Whether a tick is of this run's series, and its sequence and time on this run's line."""
+        if series != self.series:
+            return False
         steps = int(tick["sequence"]) - self.sequence
         duration = min(int(tick["duration_ns"]) // max(1, int(tick["ticks"])), _LONGEST_NS)
         if abs(steps) > _MOST_STEPS:
@@ -104,25 +110,25 @@ class FirstWins:
         #: Outputs dropped because they, or a part of them, had been used.
         self.dropped = 0
 
-    def choose(self, ticks: Array) -> Array:
-        """The outputs to use, of those that arrive now."""
+    def choose(self, ticks: Array, series: int = 0) -> Array:
+        """The outputs to use, of those of one series that arrive now."""
         if len(ticks) == 1:
-            return ticks if self._wins(ticks[0]) else ticks[:0]
-        stale = self._stale(ticks)
+            return ticks if self._wins(ticks[0], series) else ticks[:0]
+        stale = self._stale(ticks, series)
         self.dropped += stale
         ticks = ticks[stale:]
         if len(ticks) == 0:
             return ticks
-        if self._goes_on(ticks):
-            self._current = _Run(int(ticks["sequence"][-1]), int(ticks["end_time_ns"][-1]))
+        if self._goes_on(ticks, series):
+            self._current = _Run(series, int(ticks["sequence"][-1]), int(ticks["end_time_ns"][-1]))
             return ticks
-        wins = np.fromiter((self._wins(tick) for tick in ticks), bool, len(ticks))
+        wins = np.fromiter((self._wins(tick, series) for tick in ticks), bool, len(ticks))
         return ticks if wins.all() else ticks[wins]
 
-    def _stale(self, ticks: Array) -> int:
+    def _stale(self, ticks: Array, series: int) -> int:
         """How many ticks at the front have been used: what `_wins` finds of each, for all at once."""
         run = self._current
-        if run is None or len(ticks) == 0 or _first(ticks[0]) > run.sequence or not run.has(ticks[0]):
+        if run is None or len(ticks) == 0 or _first(ticks[0]) > run.sequence or not run.has(ticks[0], series):
             return 0
         sequence, end = ticks["sequence"], ticks["end_time_ns"]
         if max(int(sequence.max()), run.sequence, int(end.max()), -int(end.min()), abs(run.end_time_ns)) >= 1 << 62:
@@ -136,10 +142,12 @@ class FirstWins:
         used = near & (apart <= duration // 2 + np.abs(line) // 8) & (steps - (number - 1) <= 0)
         return len(ticks) if used.all() else int(used.argmin())
 
-    def _goes_on(self, ticks: Array) -> bool:
+    def _goes_on(self, ticks: Array, series: int) -> bool:
         """Whether every tick plainly follows what was used: what `_wins` finds of each, for all at once."""
         current = self._current
-        if current is None or _first(ticks[0]) != current.sequence + 1 or not current.has(ticks[0]) or not _follows(ticks):
+        if current is None or _first(ticks[0]) != current.sequence + 1:
+            return False
+        if not current.has(ticks[0], series) or not _follows(ticks):
             return False
         number = ticks["ticks"].astype(np.int64)[1:]
         duration = np.minimum(ticks["duration_ns"][1:], np.uint64(number.max(initial=1) * _LONGEST_NS)).astype(np.int64) // number
@@ -147,16 +155,16 @@ class FirstWins:
         apart = np.abs(ticks["end_time_ns"][1:] - ticks["end_time_ns"][:-1] - line)
         return bool(((duration <= _LONGEST_NS) & (apart <= duration // 2 + line // 8)).all())
 
-    def _wins(self, tick: Any) -> bool:
+    def _wins(self, tick: Any, series: int) -> bool:
         current = self._current
-        if current is not None and current.has(tick):
+        if current is not None and current.has(tick, series):
             if _first(tick) <= current.sequence:
                 self.dropped += 1
                 return False
-        elif any(run.has(tick) for run in self._before):
+        elif any(run.has(tick, series) for run in self._before):
             self.dropped += 1
             return False
         elif current is not None:
             self._before = [current, *self._before][:_RUNS_BEFORE]
-        self._current = _Run(int(tick["sequence"]), int(tick["end_time_ns"]))
+        self._current = _Run(series, int(tick["sequence"]), int(tick["end_time_ns"]))
         return True

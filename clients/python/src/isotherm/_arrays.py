@@ -65,6 +65,8 @@ class CorrectedBatch:
     temperatures: dict[str, tuple[float, float]]
     #: Outputs in order, of type `TICK`.
     ticks: Array = field(repr=False)
+    #: The producer's run that they are of; 0 where it numbers none.
+    series: int = 0
 
     @property
     def angular_rate_rad_per_s(self) -> Array:
@@ -195,8 +197,10 @@ class CorrectedDecoder:
         sigmas: list[dict[str, Any]] = []
         head: dict[str, Any] = {}
         at = 0
-        *fields, (_, (_, _, least, most)) = layout.STRUCTS["corrected_batch"]
-        for name, form in fields:
+        fields = dict(layout.STRUCTS[message])
+        _, _, least, most = fields.pop("ticks")
+        behind = fields.pop("sigmas", None)
+        for name, form in fields.items():
             head[name], at = codec(form)[0](body, at)
         count, at = read_count(body, at, least, most)
         parts = []
@@ -205,8 +209,8 @@ class CorrectedDecoder:
             parts.append(part)
             count -= len(part)
             at += len(part) * length
-        if message == "corrected_batch_2":
-            sigmas, at = codec(dict(layout.STRUCTS[message])["sigmas"])[0](body, at)
+        if behind is not None:
+            sigmas, at = codec(behind)[0](body, at)
         if at != len(body):
             raise Refused(f"{len(body) - at} bytes are left over after the body")
         ticks = parts[0] if len(parts) == 1 else np.concatenate(parts)
@@ -219,7 +223,9 @@ class CorrectedDecoder:
             for applied in head["temperatures"]
         }
         revision = head["revision"]
-        return CorrectedBatch(head["unit"], revision["counter"], revision["digest"], temperatures, ticks)
+        return CorrectedBatch(
+            head["unit"], revision["counter"], revision["digest"], temperatures, ticks, head.get("series", 0)
+        )
 
     def _part(self, body: bytes, at: int, count: int) -> tuple[Array, int]:
         """Ticks of one form, and the length of each."""

@@ -97,7 +97,7 @@ class _Collector:
             batch = self._decoder.decode(frame)
             parts.setdefault((stream, unit), []).append(batch.ticks)
             parts.setdefault(("revision", unit), []).append(np.full(len(batch.ticks), batch.revision, np.uint64))
-            self.recording.accounts.setdefault(unit, Account()).enter(batch.ticks)
+            self.recording.accounts.setdefault(unit, Account()).enter(batch.ticks, batch.series)
         elif stream == "raw/gyro":
             parts.setdefault((stream, unit), []).append(_gyro(decode(frame, layout.RAW_GYRO)))
         elif stream == "raw/accel":

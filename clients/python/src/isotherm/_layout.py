@@ -42,7 +42,7 @@ KINDS: dict[int, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     1: ("imu/{unit}/raw/gyro", ("gyro_batch",), ("alike",)),
     2: ("imu/{unit}/raw/accel", ("accelerometer_batch",), ("alike",)),
     3: ("imu/{unit}/raw/temp", ("temperature_batch",), ("per_channel",)),
-    4: ("imu/{unit}/corrected", ("corrected_batch", "corrected_batch_2",), ()),
+    4: ("imu/{unit}/corrected", ("corrected_batch", "corrected_batch_2", "corrected_batch_3",), ()),
     5: ("imu/{unit}/status", ("status_1", "status",), ()),
     6: ("imu/{unit}/raw/health", ("health_batch",), ()),
     7: ("isotherm/{instance}/status", ("service_status",), ()),
@@ -144,6 +144,14 @@ STRUCTS: dict[str, tuple[tuple[str, Any], ...]] = {
         ("temperatures", ("list", ("named", "applied_temperature"), 0, 16)),
         ("ticks", ("list", ("named", "corrected_tick"), 1, 4096)),
         ("sigmas", ("list", ("named", "sigma"), 1, 4096)),
+    ),
+    "corrected_batch_3": (
+        ("unit", ("string", 1048576)),
+        ("series", "u64"),
+        ("revision", ("named", "revision")),
+        ("temperatures", ("list", ("named", "applied_temperature"), 0, 16)),
+        ("ticks", ("list", ("named", "corrected_tick"), 1, 4096)),
+        ("sigmas", ("list", ("named", "sigma"), 0, 4096)),
     ),
     "sigma": (
         ("from_tick", "u16"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from typing import Any, Callable, Generic, Iterator, TypeVar
 
 import zenoh
@@ -142,12 +143,12 @@ class CorrectedStream(Stream[CorrectedBatch]):
         if not key.endswith(f"imu/{batch.unit}/corrected"):
             raise Refused(f"it is of unit {batch.unit!r}")
         if self._first_wins:
-            ticks = self._arbiters.setdefault(batch.unit, FirstWins()).choose(batch.ticks)
+            ticks = self._arbiters.setdefault(batch.unit, FirstWins()).choose(batch.ticks, batch.series)
             if len(ticks) == 0:
                 return None
             if len(ticks) < len(batch.ticks):
-                batch = CorrectedBatch(batch.unit, batch.revision, batch.digest, batch.temperatures, ticks)
-        self.accounts.setdefault(batch.unit, Account()).enter(batch.ticks)
+                batch = replace(batch, ticks=ticks)
+        self.accounts.setdefault(batch.unit, Account()).enter(batch.ticks, batch.series)
         return batch
 
 

@@ -12,10 +12,10 @@ const SETTLED: Duration = Duration::from_millis(500);
 const LONGEST_WAIT: Duration = Duration::from_secs(3);
 
 /// A tick by the end of its time and its number: enough to tell it from those of other runs of the producer.
-type Id = (i64, u64);
+type Id = (i64, u64, u64);
 
 fn id(tick: &CorrectedTick) -> Id {
-    (tick.end_time.as_ns(), tick.sequence)
+    (tick.end_time.as_ns(), tick.sequence, tick.series)
 }
 
 /// A frame that was computed here.
@@ -192,9 +192,9 @@ impl Kept {
                 settled.difference.get_or_insert_with(|| (tick.sequence, words()));
             }
         }
-        let newest = self.frames.back().and_then(|frame| frame.ids.last()).map(|(end, _)| *end);
+        let newest = self.frames.back().and_then(|frame| frame.ids.last()).map(|(end, ..)| *end);
         let since = self.since;
-        self.heard.retain(|(end, _), heard| {
+        self.heard.retain(|(end, ..), heard| {
             let old = age(heard.at) >= LONGEST_WAIT;
             let passed = newest.is_some_and(|newest| newest > *end)
                 && since.is_some_and(|since| heard.at > since + SETTLED);
@@ -274,6 +274,7 @@ mod tests {
         };
         CorrectedBatch {
             unit: "ZLG-0001".to_owned(),
+            series: 0,
             revision: Revision { counter: 1, digest: [7; 8] },
             temperatures: [].into_iter().collect(),
             ticks: vec![tick],
