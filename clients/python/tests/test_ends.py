@@ -1,10 +1,13 @@
-"""What becomes of ticks that cannot be sent; against a service that only listens."""
+"""What becomes of ticks, callbacks and processes when something ends badly; against a service that only listens."""
 
 from __future__ import annotations
 
 import json
 import socket
+import subprocess
+import sys
 import threading
+import time
 import unittest
 
 import isotherm
@@ -13,6 +16,15 @@ from common import LIMIT_S
 
 UNIT = "PY-0002"
 PERIOD_NS = 5_000_000
+#: Closes nothing: a process with streams, a callback and a batch that is not full.
+PROCESS = f"""
+import isotherm
+bus = isotherm.connect("ENDPOINT")
+streams = [bus.corrected(), bus.corrected(callback=print), bus.status_stream()]
+producer = bus.producer("{UNIT}", batch_ticks=64, max_in_flight=512)
+for k in range(100):
+    producer.gyro((k + 1) * {PERIOD_NS}, {PERIOD_NS}, [1, 2, 3])
+"""
 
 
 class Listener:
@@ -81,6 +93,14 @@ class Ends(unittest.TestCase):
             producer.close()
         self.assertRegex(logs.output[0], r"closed, not sent: gyro ticks 522…529 \(.*gyro ticks 10…521 were sent and none came back")
         self.assertEqual(self.service.numbers(512), list(range(10, 522)))
+
+    def test_a_process_that_closes_nothing_ends_and_sends_what_it_was_given(self) -> None:
+        start = time.monotonic()
+        process = [sys.executable, "-c", PROCESS.replace("ENDPOINT", self.service.endpoint)]
+        done = subprocess.run(process, capture_output=True, text=True, timeout=LIMIT_S)
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
+        self.assertLess(time.monotonic() - start, LIMIT_S / 2)
+        self.assertEqual(self.service.numbers(100), list(range(100)))
 
 
 if __name__ == "__main__":

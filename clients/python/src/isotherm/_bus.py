@@ -16,6 +16,7 @@ from ._match import wait_until_matched
 from ._producer import Producer
 from ._rules import Message, Refused
 from ._stream import CorrectedStream, StatusStream
+from ._threads import close_at_exit, for_each
 from ._wire import decode, encode
 
 #: Where a service listens by default.
@@ -76,16 +77,18 @@ def connect(
 
 
 class Bus:
-    """A session. Closing it ends its streams and producers."""
+    """A session. Closing it ends its streams and producers; the end of the process closes what is open, within `EXIT_S`."""
 
     def __init__(self, session: zenoh.Session, timeout_s: float = 10.0, name: str | None = None) -> None:
         #: The Zenoh session, for anything else.
         self.session = session
         self.timeout_s = timeout_s
         self._named = "" if name is None else f"/{name}"
-        self._streams: list[CorrectedStream | StatusStream] = []
+        self._parts: list[CorrectedStream | StatusStream | Producer] = []
         # A service that stops asks whether all has arrived; ending its query without a reply says so.
-        self._receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
+        receipts = session.declare_queryable(f"isotherm/{session.zid()}/receipt")
+        for_each(receipts, lambda query: query.drop(), "receipts")
+        close_at_exit(self)
 
     def __enter__(self) -> Bus:
         return self
@@ -94,9 +97,9 @@ class Bus:
         self.close()
 
     def close(self) -> None:
-        """Ends all streams and the session."""
-        for stream in self._streams:
-            stream.close()
+        """Ends the producers, all streams and the session."""
+        for part in sorted(self._parts, key=lambda part: not isinstance(part, Producer)):
+            part.close()
         self.session.close()
 
     def corrected(
@@ -116,14 +119,14 @@ class Bus:
         `TimeoutError`.
         """
         stream = CorrectedStream(self.session, f"imu/{unit}/corrected", first_wins, callback, most_waiting, timeout_s)
-        self._streams.append(stream)
+        self._keep(stream)
         self._wait_for_service()
         return stream
 
     def status_stream(self, unit: str = "*", *, timeout_s: float | None = None) -> StatusStream:
         """Status messages as they are published: on every change and once a second."""
         stream = StatusStream(self.session, f"imu/{unit}/status", timeout_s)
-        self._streams.append(stream)
+        self._keep(stream)
         return stream
 
     def producer(
@@ -135,7 +138,9 @@ class Bus:
         series: int | None = None,
     ) -> Producer:
         """Publishes the raw ticks of a unit; see `Producer`."""
-        return Producer(self.session, unit, batch_ticks, max_in_flight, series, self.timeout_s)
+        producer = Producer(self.session, unit, batch_ticks, max_in_flight, series, self.timeout_s)
+        self._keep(producer)
+        return producer
 
     def reference(self, unit: str, start_ns: int, end_ns: int, rate_rad_per_s: list[float], sigma_rad_per_s: float) -> None:
         """Publishes the true mean rate of a unit over a span, for its drift estimator."""
@@ -223,6 +228,9 @@ class Bus:
         """Waits until every subscriber that gives receipts has taken what this session has published. Raises `BusError`."""
         limit = self.timeout_s if timeout_s is None else timeout_s
         wait_for_receipts(self.session, limit)
+
+    def _keep(self, part: CorrectedStream | StatusStream | Producer) -> None:
+        self._parts = [*(other for other in self._parts if not other.closed), part]
 
     def _ask(self, selector: str, payload: str | None = None, priority: zenoh.Priority | None = None) -> list[bytes]:
         """Every answer to a query; `BusError` for one that is an error."""

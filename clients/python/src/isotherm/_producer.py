@@ -16,6 +16,7 @@ from . import _layout as layout
 from ._arrays import CorrectedBatch, CorrectedDecoder
 from ._match import wait_until_matched
 from ._rules import Message, Refused
+from ._threads import for_each
 from ._wire import encode
 
 _MODES: dict[Any, Any] = {None: None, 0: None, 1: "Plus", -1: "Minus", "Plus": "Plus", "Minus": "Minus"}
@@ -72,7 +73,8 @@ class Producer:
         self._decoder = CorrectedDecoder()
         self._subscriber = None
         if max_in_flight is not None:
-            self._subscriber = session.declare_subscriber(f"imu/{unit}/corrected", self._came_back)
+            self._subscriber = session.declare_subscriber(f"imu/{unit}/corrected")
+            for_each(self._subscriber, self._came_back, f"imu/{unit}/corrected back")
         self._publishers = {stream: self._declare(stream) for stream in _KINDS}
 
     def _declare(self, stream: str) -> zenoh.Publisher:

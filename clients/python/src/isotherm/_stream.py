@@ -13,6 +13,7 @@ from . import _layout as layout
 from ._account import Account, FirstWins
 from ._arrays import CorrectedBatch, CorrectedDecoder
 from ._rules import Message, Refused
+from ._threads import for_each, start
 from ._wire import decode
 
 M = TypeVar("M")
@@ -29,14 +30,15 @@ class Stream(Iterator[M], Generic[M]):
         self._most_waiting = most_waiting
         self._waiting: deque[tuple[str, bytes]] = deque()
         self._changed = threading.Condition()
-        self._closed = False
+        self.closed = False
         #: Frames that could not be read.
         self.refused = 0
         #: Why the last of them could not, in words.
         self.last_refusal: str | None = None
         #: Messages dropped since more than `most_waiting` waited.
         self.messages_dropped = 0
-        self._subscriber = session.declare_subscriber(key, self._receive)
+        self._subscriber = session.declare_subscriber(key)
+        self._receiver = for_each(self._subscriber, self._receive, f"{key} in")
 
     def _receive(self, sample: zenoh.Sample) -> None:
         message = (str(sample.key_expr), sample.payload.to_bytes())
@@ -56,17 +58,18 @@ class Stream(Iterator[M], Generic[M]):
     def close(self) -> None:
         """Ends the subscription; what waits can still be taken."""
         with self._changed:
-            if self._closed:
+            if self.closed:
                 return
-            self._closed = True
+            self.closed = True
             self._changed.notify_all()
         self._subscriber.undeclare()
+        self._receiver.join()
 
     def __next__(self) -> M:
         message = self.take(self._timeout_s)
         if message is not None:
             return message
-        if self._closed:
+        if self.closed:
             raise StopIteration
         raise TimeoutError(f"{self._key}: no message for {self._timeout_s} s; is the unit sending? (isotherm status)")
 
@@ -77,7 +80,7 @@ class Stream(Iterator[M], Generic[M]):
             with self._changed:
                 while not self._waiting:
                     left = None if deadline is None else deadline - time.monotonic()
-                    if self._closed or (left is not None and left <= 0):
+                    if self.closed or (left is not None and left <= 0):
                         return None
                     self._changed.wait(left)
                 key, frame = self._waiting.popleft()
@@ -116,8 +119,7 @@ class CorrectedStream(Stream[CorrectedBatch]):
         super().__init__(session, key, most_waiting, timeout_s)
         self._thread: threading.Thread | None = None
         if callback is not None:
-            self._thread = threading.Thread(target=self._call, args=(callback,), name=f"isotherm {key}", daemon=True)
-            self._thread.start()
+            self._thread = start(lambda: self._call(callback), key)
 
     def _call(self, callback: Callable[[CorrectedBatch], Any]) -> None:
         try:
