@@ -9,10 +9,11 @@ import sys
 import threading
 import time
 import unittest
+from typing import Any
 
 import isotherm
 import zenoh
-from common import LIMIT_S
+from common import LIMIT_S, frozen
 
 UNIT = "PY-0002"
 PERIOD_NS = 5_000_000
@@ -93,6 +94,27 @@ class Ends(unittest.TestCase):
             producer.close()
         self.assertRegex(logs.output[0], r"closed, not sent: gyro ticks 522…529 \(.*gyro ticks 10…521 were sent and none came back")
         self.assertEqual(self.service.numbers(512), list(range(10, 522)))
+
+    def test_a_callback_that_raises_is_reported_and_the_stream_goes_on(self) -> None:
+        done = threading.Event()
+        seen: list[str] = []
+
+        def take(batch: isotherm.CorrectedBatch) -> Any:
+            seen.append(batch.unit)
+            if len(seen) == 3:
+                done.set()
+            raise KeyError(len(seen))
+
+        bus = self.bus(LIMIT_S)
+        stream = bus.corrected(callback=take, first_wins=False)
+        with self.assertLogs("isotherm", "ERROR") as logs:
+            for _ in range(3):
+                self.service.session.put("imu/ZLG-0042/corrected", frozen("corrected"))
+            self.assertTrue(done.wait(LIMIT_S))
+            stream.close()
+        self.assertEqual((stream.errors, repr(stream.error)), (3, "KeyError(3)"))
+        self.assertEqual(len(logs.output), 3)
+        self.assertIn("Traceback", logs.output[0])
 
     def test_a_process_that_closes_nothing_ends_and_sends_what_it_was_given(self) -> None:
         start = time.monotonic()

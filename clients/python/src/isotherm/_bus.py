@@ -111,7 +111,8 @@ class Bus:
         most_waiting: int | None = None,
         timeout_s: float | None = None,
     ) -> CorrectedStream:
-        """Corrected batches of a unit, or of all: iterate over it, or give a `callback`, which is called on a thread of its own.
+        """Corrected batches of a unit, or of all: iterate over it, or give a `callback`, which is called on a thread of its own. What it
+        raises is logged with its traceback (logger `isotherm`), counted in `errors`, and the stream goes on.
 
         From the return on nothing is missed: it waits until the service has answered (`BusError` otherwise). Of two services of a
         unit, `first_wins` uses each tick once. At most `most_waiting` messages wait (default: as many as fit memory); then the oldest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections import deque
@@ -17,6 +18,7 @@ from ._threads import for_each, start
 from ._wire import decode
 
 M = TypeVar("M")
+_LOG = logging.getLogger("isotherm")
 
 
 class Stream(Iterator[M], Generic[M]):
@@ -114,20 +116,22 @@ class CorrectedStream(Stream[CorrectedBatch]):
         self._first_wins = first_wins
         self._arbiters: dict[str, FirstWins] = {}
         self._decoders: dict[str, CorrectedDecoder] = {}
-        #: The error that ended the callback's thread; None while it is running.
-        self.error: BaseException | None = None
+        #: What the callback raised last, and how often it has raised.
+        self.error: Exception | None = None
+        self.errors = 0
         super().__init__(session, key, most_waiting, timeout_s)
         self._thread: threading.Thread | None = None
         if callback is not None:
             self._thread = start(lambda: self._call(callback), key)
 
     def _call(self, callback: Callable[[CorrectedBatch], Any]) -> None:
-        try:
-            while (batch := self.take()) is not None:
+        while (batch := self.take()) is not None:
+            try:
                 callback(batch)
-        except BaseException as error:
-            self.error = error
-            raise
+            except Exception as error:
+                self.error = error
+                self.errors += 1
+                _LOG.exception("%s: the callback has raised; the stream goes on", self._key)
 
     def close(self) -> None:
         super().close()
