@@ -28,13 +28,17 @@ for k in range(100):
 """
 
 
+def free() -> str:
+    """An endpoint: in Python a session does not say which port the system has chosen."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+
+
 class Listener:
     """Takes raw ticks, and answers for the status."""
 
-    def __init__(self) -> None:
-        # In Python a session does not say which port the system has chosen.
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    def __init__(self, endpoint: str) -> None:
+        self.endpoint = endpoint
         config = zenoh.Config()
         config.insert_json5("listen/endpoints", json.dumps([self.endpoint]))
         config.insert_json5("scouting/multicast/enabled", "false")
@@ -65,7 +69,7 @@ def give(producer: isotherm.Producer, *numbers: int) -> None:
 
 class Ends(unittest.TestCase):
     def setUp(self) -> None:
-        self.service = Listener()
+        self.service = Listener(free())
         self.addCleanup(self.service.session.close)
 
     def bus(self, timeout_s: float) -> isotherm.Bus:
@@ -123,6 +127,25 @@ class Ends(unittest.TestCase):
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
         self.assertLess(time.monotonic() - start, LIMIT_S / 2)
         self.assertEqual(self.service.numbers(100), list(range(100)))
+
+    def test_a_service_that_comes_late_or_again_is_found_and_one_of_several_is_enough(self) -> None:
+        for others in [(), ("127.0.0.1:1",)]:
+            endpoint = free()
+            opened: list[isotherm.Bus] = []
+            connect = threading.Thread(target=lambda: opened.append(isotherm.connect(endpoint, *others, timeout_s=LIMIT_S)))
+            connect.start()
+            service = Listener(endpoint)
+            connect.join(LIMIT_S)
+            with opened[0] as bus:
+                stream = bus.corrected(first_wins=False)
+                for _ in range(2):
+                    while stream.take(0.02) is None:
+                        service.session.put("imu/ZLG-0042/corrected", frozen("corrected"))
+                    service.session.close()
+                    while stream.take(0.02) is not None:
+                        pass
+                    service = Listener(endpoint)
+            service.session.close()
 
 
 if __name__ == "__main__":

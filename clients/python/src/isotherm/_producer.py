@@ -83,7 +83,7 @@ class Producer:
             key, congestion_control=zenoh.CongestionControl.BLOCK, priority=zenoh.Priority.REAL_TIME
         )
         if not wait_until_matched(publisher, self._timeout_s):
-            raise TimeoutError(f"{key}: nobody subscribes within {self._timeout_s:g} s; is a service connected here?")
+            raise TimeoutError(f"{key}: nobody subscribes within {self._timeout_s:g} s; is one connected here that takes the unit? (isotherm status)")
         return publisher
 
     def __enter__(self) -> Producer:
