@@ -222,6 +222,11 @@ impl Pair {
         if Duration::from_micros(still_us) > self.takeover + self.takeover / 2 { still_us } else { 0 }
     }
 
+    /// The watch begins to look: until now the process was starting.
+    fn begin(&self, now: Instant) {
+        self.beat.store(self.since_start_us(now), Ordering::Release);
+    }
+
     /// The watch looks; whether it has stood still before. It holds for other threads until the units are [`Self::told`].
     fn look(&self, now: Instant) -> Option<bool> {
         let still = self.has_stood_still(now);

@@ -12,9 +12,6 @@ use crate::bench::LIMIT;
 use crate::process::Service;
 use crate::proxy::{Fault, Proxy, Switch};
 
-/// What is appended to an endpoint, so that a service that was restarted is found again at once.
-const AGAIN: &str = "#retry_period_init_ms=50;retry_period_max_ms=100";
-
 /// Names of the two.
 pub const NAMES: [&str; 2] = ["first", "second"];
 
@@ -70,7 +67,7 @@ impl Pair {
         let file = self.folder.join(format!("service-{index}.toml"));
         let zenoh = self.folder.join(format!("peer-{index}.json5"));
         // The second connects to the first.
-        let connect = if index == 1 { format!("'{other}{AGAIN}'") } else { String::new() };
+        let connect = if index == 1 { format!("'{other}'") } else { String::new() };
         let other = if index == 1 { String::new() } else { format!("\nother = \"{other}\"") };
         let config = format!(
             "{{mode: 'peer', listen: {{endpoints: ['{own}']}}, connect: {{endpoints: [{connect}], timeout_ms: -1, \
@@ -126,7 +123,7 @@ impl Pair {
     /// # Panics
     /// Where it cannot be opened.
     pub async fn session_with(&self, lease: Option<Duration>) -> Session {
-        let connect = self.endpoints().map(|endpoint| format!("{endpoint}{AGAIN}")).into();
+        let connect = self.endpoints().into();
         let session =
             open(&SessionOptions { connect, lease, ..SessionOptions::default() }).await.expect("a session");
         let deadline = Instant::now() + LIMIT;

@@ -24,6 +24,9 @@ int main(int argc, char **argv) {
     z_config_default(&config);
     zc_config_insert_json5(z_loan_mut(config), "mode", "\"client\"");
     zc_config_insert_json5(z_loan_mut(config), "connect/endpoints", endpoints);
+    /* Waits for a service that is not there yet, and soon finds one that was restarted. */
+    zc_config_insert_json5(z_loan_mut(config), "connect/timeout_ms", "-1");
+    zc_config_insert_json5(z_loan_mut(config), "connect/retry", "{period_init_ms: 100, period_max_ms: 500}");
     z_owned_session_t session;
     if (z_open(&session, z_move(config), NULL) < 0) {
         fprintf(stderr, "%s: no router or service there\n", argv[2]);

@@ -4,6 +4,7 @@
  *     cc -std=c11 -DISOTHERM_ZENOH zenoh_pico.c -lzenohpico -o zenoh_pico
  *     ./zenoh_pico ZLG-0001 tcp/127.0.0.1:7447
  *
+ * It connects once, and again by itself where the connection is lost: start it anew until a service is there.
  * zenoh-pico fragments and joins: set Z_FRAG_MAX_SIZE above the longest batch (some 110 bytes per tick). Without ISOTHERM_ZENOH it
  * reads a file of `isotherm-replay correct --format wire` from stdin instead.
  */

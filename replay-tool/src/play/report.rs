@@ -129,7 +129,7 @@ pub struct UnitReport {
     pub returned: Returned,
     /// Runs sent: series, or what began anew in one.
     pub runs: Option<u64>,
-    /// Times that the unit's corrected stream began anew; of each instance more than the runs behind the first only where somebody
+    /// Times that the unit's corrected stream began anew; of each instance more than once a run only where somebody
     /// else plays the unit.
     pub restarts: Option<u64>,
     /// Instances of one pair that have the unit, each of which may publish a tick; looked for where ticks or restarts are too many.
@@ -170,7 +170,8 @@ impl UnitReport {
     #[must_use]
     pub fn is_mixed(&self) -> bool {
         let instances = self.instances.unwrap_or(1);
-        let own = self.runs.map_or(0, |runs| runs.saturating_sub(1)) * instances;
+        // Each says of each run that it began anew, of the first one where the unit was played before; the very first is not counted.
+        let own = (self.runs.unwrap_or(0) * instances).saturating_sub(1);
         self.restarts.is_some_and(|restarts| restarts > own)
             || (instances < 2 && self.returned.ticks_duplicated.is_some_and(|ticks| ticks > 0))
     }
@@ -283,8 +284,8 @@ mod tests {
             (&one, 1, 0, false),
             (&one, 1, 5, true),
             (&one, 2, 0, true),
-            (&pair, 2, 500, false),
-            (&pair, 3, 500, true),
+            (&pair, 3, 500, false),
+            (&pair, 4, 500, true),
             (&strangers, 1, 500, true),
         ] {
             let returned = Returned { ticks_duplicated: Some(duplicated), ..Returned::default() };

@@ -114,6 +114,7 @@ struct Work {
 impl Work {
     fn run(mut self, events: &Receiver<Event>) {
         let mut next = Instant::now();
+        self.pair.begin(next);
         loop {
             match events.recv_timeout(next.saturating_duration_since(Instant::now())) {
                 Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => break,

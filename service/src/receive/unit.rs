@@ -166,7 +166,11 @@ impl UnitActor {
             self.hear_again(frame, arrival);
         }
         self.note_frame(input, frame, arrival);
+        let repeat = (is_gyro && self.arrivals.is_repeat(frame)).then(|| self.contradicting());
         let received = self.stream.receive(input, frame);
+        if let Some(before) = repeat {
+            self.arrivals.note_repeat(self.contradicting() - before);
+        }
         let series = (is_gyro && received.is_ok()).then(|| self.stream.incoming_series());
         self.arrivals.note(input, series, arrival);
         if input == Input::Raw(RawStream::Temperature) {
@@ -183,6 +187,12 @@ impl UnitActor {
         }
         self.look();
         self.status_due
+    }
+
+    /// Gyro ticks of the stream that contradict others.
+    fn contradicting(&self) -> u64 {
+        let counters = self.stream.unit().counters();
+        counters.gyro_late + counters.gyro_implausible + counters.gyro_duplicates
     }
 
     /// Looks for what has changed with the last event.

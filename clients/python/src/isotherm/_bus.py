@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import pathlib
+import time
 from types import TracebackType
 from typing import Any, Callable
 
@@ -16,10 +18,16 @@ from ._match import wait_until_matched
 from ._producer import Producer
 from ._rules import Message, Refused
 from ._stream import CorrectedStream, StatusStream
+from ._threads import close_at_exit, for_each
 from ._wire import decode, encode
 
 #: Where a service listens by default.
 ENDPOINT = "tcp/127.0.0.1:7447"
+#: How long a service may take to answer where the connection was waited for without end (s).
+_ANSWER_S = 10.0
+# How long one trial of a connection takes: meanwhile Ctrl-C is not heard. How long the others of several may take after the first.
+_TRIAL_S = 1.0
+_OTHERS_S = 0.5
 _ESCAPED = {character: f"%{ord(character):02X}" for character in ";=%?#&|"}
 
 
@@ -39,53 +47,81 @@ def connect(
     *endpoints: str,
     namespace: str | None = None,
     config: zenoh.Config | None = None,
-    timeout_s: float = 10.0,
+    timeout_s: float | None = 10.0,
     name: str | None = None,
 ) -> Bus:
     """Opens a session with the service or router at an endpoint (default: the environment's ISOTHERM_CONNECT, else `ENDPOINT`), or with
     each of several; `host:port` is TCP. Use it in a `with` statement.
 
+    Tries again until one answers; raises `BusError` if none does within `timeout_s` (None: waits for ever). A connection that is lost, or
+    one of several that is not there yet, is tried again for as long as the session is open; streams and producers then go on.
     Nothing is searched for on the network. `config` replaces the configuration altogether. `name` is the common name of your
-    certificate, where access control asks for one: swaps and commands are given under it. Raises `BusError` if nobody is there within
-    `timeout_s`.
+    certificate, where access control asks for one: swaps and commands are given under it.
     """
     stated = endpoints or tuple(filter(None, map(str.strip, os.environ.get("ISOTHERM_CONNECT", "").split(",")))) or (ENDPOINT,)
     endpoints = tuple(endpoint if "/" in endpoint else f"tcp/{endpoint}" for endpoint in stated)
-    if config is None:
-        config = zenoh.Config()
-        options: dict[str, Any] = {
-            # A client has one connection.
-            "mode": "client" if len(endpoints) == 1 else "peer",
-            "listen/endpoints": [] if len(endpoints) == 1 else ["tcp/127.0.0.1:0"],
-            "connect/endpoints": list(endpoints),
-            "connect/timeout_ms": int(timeout_s * 1000),
-            "connect/exit_on_failure": True,
-            "scouting/multicast/enabled": False,
-            "scouting/gossip/enabled": False,
-            "transport/link/tx/queue/batching/time_limit": 0,
-        }
-        if namespace is not None:
-            options["namespace"] = namespace
-        for key, value in options.items():
-            config.insert_json5(key, json.dumps(value))
-    try:
-        return Bus(zenoh.open(config), timeout_s, name)
-    except zenoh.ZError as error:
-        words = " or ".join(endpoints)
-        raise BusError(f"{words}: no service or router answers within {timeout_s:g} s; is it running there? ({error})") from None
+    deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+    while True:
+        error = ""
+        try:
+            session = zenoh.open(config or _config(endpoints, namespace, min(deadline - time.monotonic(), _TRIAL_S)))
+            if config is not None or _is_connected(session, len(endpoints), deadline):
+                return Bus(session, _ANSWER_S if timeout_s is None else timeout_s, name)
+            session.close()
+        except zenoh.ZError as raised:
+            error = f" ({raised})"
+        if config is not None or time.monotonic() >= deadline:
+            words = " or ".join(endpoints) if config is None else "the configuration's endpoints"
+            limit = "" if timeout_s is None else f" within {timeout_s:g} s"
+            raise BusError(f"{words}: no service or router answers{limit}; is it running there?{error}")
+
+
+def _config(endpoints: tuple[str, ...], namespace: str | None, timeout_s: float) -> zenoh.Config:
+    """Of a client, which has one connection, or of a peer with several, of which one is enough."""
+    config = zenoh.Config()
+    is_client = len(endpoints) == 1
+    options: dict[str, Any] = {
+        "mode": "client" if is_client else "peer",
+        "listen/endpoints": [] if is_client else ["tcp/127.0.0.1:0"],
+        "connect/endpoints": list(endpoints),
+        "connect/timeout_ms": max(1, int(timeout_s * 1000)) if is_client else -1,
+        "connect/exit_on_failure": is_client,
+        # Zenoh's own 1 s to 4 s would be the pause after a restart of the service.
+        "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2.0},
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/link/tx/queue/batching/time_limit": 0,
+    }
+    if namespace is not None:
+        options["namespace"] = namespace
+    for key, value in options.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def _is_connected(session: zenoh.Session, most: int, deadline: float) -> bool:
+    """Waits for one connection, then for the others a moment; Zenoh tells nobody of them."""
+    others = min(deadline, time.monotonic() + _OTHERS_S)
+    while True:
+        count = len(session.info.peers_zid()) + len(session.info.routers_zid())
+        if count >= most or time.monotonic() >= (others if count > 0 else deadline):
+            return count > 0
+        time.sleep(0.005)
 
 
 class Bus:
-    """A session. Closing it ends its streams and producers."""
+    """A session. Closing it ends its streams and producers; the end of the process closes what is open, within `EXIT_S`."""
 
     def __init__(self, session: zenoh.Session, timeout_s: float = 10.0, name: str | None = None) -> None:
         #: The Zenoh session, for anything else.
         self.session = session
         self.timeout_s = timeout_s
         self._named = "" if name is None else f"/{name}"
-        self._streams: list[CorrectedStream | StatusStream] = []
+        self._parts: list[CorrectedStream | StatusStream | Producer] = []
         # A service that stops asks whether all has arrived; ending its query without a reply says so.
-        self._receipt = session.declare_queryable(f"isotherm/{session.zid()}/receipt", lambda query: query.drop())
+        receipts = session.declare_queryable(f"isotherm/{session.zid()}/receipt")
+        for_each(receipts, lambda query: query.drop(), "receipts")
+        close_at_exit(self)
 
     def __enter__(self) -> Bus:
         return self
@@ -94,9 +130,9 @@ class Bus:
         self.close()
 
     def close(self) -> None:
-        """Ends all streams and the session."""
-        for stream in self._streams:
-            stream.close()
+        """Ends the producers, all streams and the session."""
+        for part in sorted(self._parts, key=lambda part: not isinstance(part, Producer)):
+            part.close()
         self.session.close()
 
     def corrected(
@@ -108,7 +144,8 @@ class Bus:
         most_waiting: int | None = None,
         timeout_s: float | None = None,
     ) -> CorrectedStream:
-        """Corrected batches of a unit, or of all: iterate over it, or give a `callback`, which is called on a thread of its own.
+        """Corrected batches of a unit, or of all: iterate over it, or give a `callback`, which is called on a thread of its own. What it
+        raises is logged with its traceback (logger `isotherm`), counted in `errors`, and the stream goes on.
 
         From the return on nothing is missed: it waits until the service has answered (`BusError` otherwise). Of two services of a
         unit, `first_wins` uses each tick once. At most `most_waiting` messages wait (default: as many as fit memory); then the oldest
@@ -116,14 +153,14 @@ class Bus:
         `TimeoutError`.
         """
         stream = CorrectedStream(self.session, f"imu/{unit}/corrected", first_wins, callback, most_waiting, timeout_s)
-        self._streams.append(stream)
+        self._keep(stream)
         self._wait_for_service()
         return stream
 
     def status_stream(self, unit: str = "*", *, timeout_s: float | None = None) -> StatusStream:
         """Status messages as they are published: on every change and once a second."""
         stream = StatusStream(self.session, f"imu/{unit}/status", timeout_s)
-        self._streams.append(stream)
+        self._keep(stream)
         return stream
 
     def producer(
@@ -135,7 +172,9 @@ class Bus:
         series: int | None = None,
     ) -> Producer:
         """Publishes the raw ticks of a unit; see `Producer`."""
-        return Producer(self.session, unit, batch_ticks, max_in_flight, series, self.timeout_s)
+        producer = Producer(self.session, unit, batch_ticks, max_in_flight, series, self.timeout_s)
+        self._keep(producer)
+        return producer
 
     def reference(self, unit: str, start_ns: int, end_ns: int, rate_rad_per_s: list[float], sigma_rad_per_s: float) -> None:
         """Publishes the true mean rate of a unit over a span, for its drift estimator."""
@@ -223,6 +262,9 @@ class Bus:
         """Waits until every subscriber that gives receipts has taken what this session has published. Raises `BusError`."""
         limit = self.timeout_s if timeout_s is None else timeout_s
         wait_for_receipts(self.session, limit)
+
+    def _keep(self, part: CorrectedStream | StatusStream | Producer) -> None:
+        self._parts = [*(other for other in self._parts if not other.closed), part]
 
     def _ask(self, selector: str, payload: str | None = None, priority: zenoh.Priority | None = None) -> list[bytes]:
         """Every answer to a query; `BusError` for one that is an error."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
+from collections import deque
 from types import TracebackType
 from typing import Any, Mapping, Sequence
 
@@ -14,19 +16,27 @@ from . import _layout as layout
 from ._arrays import CorrectedBatch, CorrectedDecoder
 from ._match import wait_until_matched
 from ._rules import Message, Refused
+from ._threads import for_each
 from ._wire import encode
 
 _MODES: dict[Any, Any] = {None: None, 0: None, 1: "Plus", -1: "Minus", "Plus": "Plus", "Minus": "Minus"}
 _LEAST_IN_FLIGHT = 256
+# In the order of publication.
+_KINDS = {"temp": layout.RAW_TEMPERATURE, "accel": layout.RAW_ACCEL, "gyro": layout.RAW_GYRO}
+#: How long `close` waits for ticks to come back (s).
+CLOSE_S = 1.0
+_LOG = logging.getLogger("isotherm")
 
 
 class Producer:
-    """Publishes the raw ticks of one unit; use it in a `with` statement, which flushes at its end.
+    """Publishes the raw ticks of one unit; use it in a `with` statement, which flushes and closes at its end.
 
     Hand over what happened in the order of time: at equal times temperatures, then accelerometer, then gyro ticks. A gyro batch goes
     out when it has `batch_ticks` (1…4096); what was handed over before goes out first. Congestion blocks: nothing is dropped. With
-    `max_in_flight`, `gyro` waits while more ticks than that have not come back corrected (at least two batches and 256; `TimeoutError`
-    if nothing comes back). `series` is the number of this run (default: the time now): sequence and clock may start anywhere.
+    `max_in_flight`, `gyro` waits while more ticks than that have not come back corrected (at least two batches and 256). If nothing
+    comes back, `TimeoutError` names the ticks that were sent; these are not waited for any more. A tick is taken whatever is raised:
+    what could not be sent goes with the next batch. Only a batch that cannot be encoded is given up (`Refused` names it).
+    `series` is the number of this run (default: the time now): sequence and clock may start anywhere.
     Readings that are whole numbers (`int`, integer arrays) are counts, others means. Times are ns on one monotonic clock of the unit.
     """
 
@@ -49,13 +59,13 @@ class Producer:
         self.series = time.time_ns() if series is None else series
         #: Gyro ticks published.
         self.sent = 0
+        self.closed = False
         self._session = session
         self._batch_ticks = batch_ticks
         self._max_in_flight = max_in_flight
         self._timeout_s = timeout_s
-        self._pending: dict[str, list[Message]] = {"gyro": [], "accel": []}
-        self._temperatures: list[tuple[int, dict[str, float]]] = []
-        self._first = {"gyro": 0, "accel": 0}
+        # Batches that have not been sent.
+        self._waiting: dict[str, deque[Message]] = {stream: deque() for stream in _KINDS}
         self._next = {"gyro": 0, "accel": 0}
         self._back = threading.Condition()
         self._first_sent: int | None = None
@@ -63,8 +73,9 @@ class Producer:
         self._decoder = CorrectedDecoder()
         self._subscriber = None
         if max_in_flight is not None:
-            self._subscriber = session.declare_subscriber(f"imu/{unit}/corrected", self._came_back)
-        self._publishers = {name: self._declare(name) for name in ("temp", "accel", "gyro")}
+            self._subscriber = session.declare_subscriber(f"imu/{unit}/corrected")
+            for_each(self._subscriber, self._came_back, f"imu/{unit}/corrected back")
+        self._publishers = {stream: self._declare(stream) for stream in _KINDS}
 
     def _declare(self, stream: str) -> zenoh.Publisher:
         key = f"imu/{self.unit}/raw/{stream}"
@@ -72,19 +83,30 @@ class Producer:
             key, congestion_control=zenoh.CongestionControl.BLOCK, priority=zenoh.Priority.REAL_TIME
         )
         if not wait_until_matched(publisher, self._timeout_s):
-            raise TimeoutError(f"{key}: nobody subscribes within {self._timeout_s:g} s; is a service connected here?")
+            raise TimeoutError(f"{key}: nobody subscribes within {self._timeout_s:g} s; is one connected here that takes the unit? (isotherm status)")
         return publisher
 
     def __enter__(self) -> Producer:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if kind is None:
-            self.flush()
-        self.close()
+        try:
+            if kind is None:
+                self.flush()
+        finally:
+            self.close()
 
     def close(self) -> None:
-        """Ends the publication; what was not flushed is not sent."""
+        """Flushes and ends the publication. Raises nothing: what cannot be sent within `CLOSE_S` is logged (`isotherm`)."""
+        if self.closed:
+            return
+        self.closed = True
+        self._timeout_s = min(self._timeout_s, CLOSE_S)
+        try:
+            self.flush()
+        except Exception as error:
+            lost = ", ".join(_named(stream, batch) for stream, waiting in self._waiting.items() for batch in waiting)
+            _LOG.error("%s: closed, not sent: %s (%s)", self.unit, lost or "nothing else", error)
         for publisher in self._publishers.values():
             publisher.undeclare()
         if self._subscriber is not None:
@@ -115,17 +137,21 @@ class Producer:
             "meander": _MODES[meander],
             "half_periods": [{"positive": int(first), "negative": int(second)} for first, second in half_periods],
         }
-        self._add("gyro", tick, sequence, self._batch_ticks)
+        self._take("gyro", tick, sequence, self._batch_ticks)
 
     def accel(self, end_time_ns: int, duration_ns: int, readings: Sequence[float], *, sequence: int | None = None) -> None:
         """Takes an accelerometer tick; its numbers are independent of the gyros'."""
         tick = {"end_time_ns": int(end_time_ns), "duration_ns": int(duration_ns), "readings": _readings(readings)}
-        self._add("accel", tick, sequence, layout.TICKS)
+        self._take("accel", tick, sequence, layout.TICKS)
 
     def temperatures(self, time_ns: int, readings: Mapping[str, float]) -> None:
         """Takes temperature readings of a time, by channel, in the document's unit of measure."""
-        self._temperatures.append((int(time_ns), {name: float(value) for name, value in readings.items()}))
-        if len(self._temperatures) >= layout.TICKS:
+        waiting, channels = self._waiting["temp"], list(readings)
+        if not waiting or waiting[-1]["channels"] != channels or len(waiting[-1]["ticks"]) >= layout.TICKS:
+            waiting.append({"channels": channels, "ticks": []})
+        ticks = waiting[-1]["ticks"]
+        ticks.append({"time_ns": int(time_ns), "raw": [float(value) for value in readings.values()]})
+        if len(ticks) >= layout.TICKS:
             self.flush()
 
     def health(self, time_ns: int, readings: Mapping[str, float]) -> None:
@@ -137,29 +163,28 @@ class Producer:
 
     def flush(self) -> None:
         """Publishes everything that was handed over, full batch or not."""
-        while self._temperatures:
-            channels = list(self._temperatures[0][1])
-            count = next(
-                (index for index, (_, row) in enumerate(self._temperatures) if list(row) != channels), len(self._temperatures)
-            )
-            rows, self._temperatures = self._temperatures[:count], self._temperatures[count:]
-            readings = [{"time_ns": time_ns, "raw": list(row.values())} for time_ns, row in rows]
-            self._publishers["temp"].put(encode({"channels": channels, "ticks": readings}, layout.RAW_TEMPERATURE))
-        ticks, self._pending["accel"] = self._pending["accel"], []
-        if ticks:
-            self._publishers["accel"].put(encode({"first_sequence": self._first["accel"], "ticks": ticks}, layout.RAW_ACCEL))
-        ticks, self._pending["gyro"] = self._pending["gyro"], []
-        if ticks:
-            first = self._first["gyro"]
-            frame = encode({"first_sequence": first, "series": self.series, "ticks": ticks}, layout.RAW_GYRO)
+        for stream, waiting in self._waiting.items():
+            while waiting:
+                try:
+                    self._send(stream, waiting[0])
+                except Refused as error:
+                    raise Refused(f"imu/{self.unit}/raw/{stream}: not sent: {_named(stream, waiting.popleft())}: {error}") from None
+                waiting.popleft()
+
+    def _send(self, stream: str, batch: Message) -> None:
+        frame = encode(batch, _KINDS[stream])
+        if stream == "gyro":
+            first, count = batch["first_sequence"], len(batch["ticks"])
             if self._max_in_flight is not None:
-                self._wait_below(self._max_in_flight + 1 - len(ticks))
+                self._wait_below(self._max_in_flight + 1 - count)
             with self._back:
                 if self._first_sent is None:
                     self._first_sent, self._last_back = first, first - 1
-                self._last_sent = first + len(ticks) - 1
-            self._publishers["gyro"].put(frame)
-            self.sent += len(ticks)
+                self._last_sent = first + count - 1
+            self._publishers[stream].put(frame)
+            self.sent += count
+        else:
+            self._publishers[stream].put(frame)
 
     def drain(self) -> None:
         """Flushes, and waits until every tick has come back; only with `max_in_flight`.
@@ -176,17 +201,21 @@ class Producer:
         """Gyro ticks published that have not come back; 0 without `max_in_flight`."""
         return 0 if self._max_in_flight is None else self._last_sent - self._last_back
 
-    def _add(self, stream: str, tick: Message, sequence: int | None, most: int) -> None:
+    def _take(self, stream: str, tick: Message, sequence: int | None, most: int) -> None:
         number = self._next[stream] if sequence is None else int(sequence)
-        pending = self._pending[stream]
+        waiting = self._waiting[stream]
         # The numbers in a batch are consecutive and its readings alike.
-        if pending and (number != self._next[stream] or _shape(pending[0]) != _shape(tick)):
-            self.flush()
-        if not self._pending[stream]:
-            self._first[stream] = number
-        self._pending[stream].append(tick)
-        self._next[stream] = number + 1
-        if len(self._pending[stream]) >= most:
+        goes_on = bool(waiting) and number == self._next[stream] and _shape(waiting[-1]["ticks"][0]) == _shape(tick)
+        try:
+            if waiting and not goes_on:
+                self.flush()
+        finally:
+            if not goes_on or len(waiting[-1]["ticks"]) >= most:
+                waiting.append({"first_sequence": number, "series": self.series, "ticks": []})
+            ticks = waiting[-1]["ticks"]
+            ticks.append(tick)
+            self._next[stream] = number + 1
+        if len(ticks) >= most:
             self.flush()
 
     def _came_back(self, sample: zenoh.Sample) -> None:
@@ -207,10 +236,13 @@ class Producer:
         with self._back:
             while self._last_sent - self._last_back >= limit:
                 if not self._back.wait(self._timeout_s):
-                    waiting = self._last_sent - self._last_back
+                    sent = f"{self._last_back + 1}…{self._last_sent}"
+                    # Where a service was restarted these will never come.
+                    self._last_back = self._last_sent
+                    waiting = sum(len(batch["ticks"]) for batch in self._waiting["gyro"])
                     raise TimeoutError(
-                        f"imu/{self.unit}/corrected: {waiting} ticks under way and nothing came back for {self._timeout_s:g} s; "
-                        "is the unit in a running state, with a calibration? (isotherm status)"
+                        f"imu/{self.unit}/corrected: gyro ticks {sent} were sent and none came back for {self._timeout_s:g} s; "
+                        f"{waiting} more wait to be sent; is the unit running? (isotherm status)"
                     )
 
 
@@ -224,3 +256,11 @@ def _readings(readings: Sequence[float]) -> dict[str, list[Any]]:
 def _shape(tick: Message) -> tuple[str, int]:
     ((variant, readings),) = tick["readings"].items()
     return variant, len(readings)
+
+
+def _named(stream: str, batch: Message) -> str:
+    """Which ticks a batch has."""
+    ticks = batch["ticks"]
+    if stream == "temp":
+        return f"temperatures of {ticks[0]['time_ns']}…{ticks[-1]['time_ns']} ns"
+    return f"{stream} ticks {batch['first_sequence']}…{batch['first_sequence'] + len(ticks) - 1}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections import deque
@@ -14,9 +15,11 @@ from . import _layout as layout
 from ._account import Account, FirstWins
 from ._arrays import CorrectedBatch, CorrectedDecoder
 from ._rules import Message, Refused
+from ._threads import for_each, start
 from ._wire import decode
 
 M = TypeVar("M")
+_LOG = logging.getLogger("isotherm")
 
 
 class Stream(Iterator[M], Generic[M]):
@@ -30,14 +33,15 @@ class Stream(Iterator[M], Generic[M]):
         self._most_waiting = most_waiting
         self._waiting: deque[tuple[str, bytes]] = deque()
         self._changed = threading.Condition()
-        self._closed = False
+        self.closed = False
         #: Frames that could not be read.
         self.refused = 0
         #: Why the last of them could not, in words.
         self.last_refusal: str | None = None
         #: Messages dropped since more than `most_waiting` waited.
         self.messages_dropped = 0
-        self._subscriber = session.declare_subscriber(key, self._receive)
+        self._subscriber = session.declare_subscriber(key)
+        self._receiver = for_each(self._subscriber, self._receive, f"{key} in")
 
     def _receive(self, sample: zenoh.Sample) -> None:
         message = (str(sample.key_expr), sample.payload.to_bytes())
@@ -57,17 +61,18 @@ class Stream(Iterator[M], Generic[M]):
     def close(self) -> None:
         """Ends the subscription; what waits can still be taken."""
         with self._changed:
-            if self._closed:
+            if self.closed:
                 return
-            self._closed = True
+            self.closed = True
             self._changed.notify_all()
         self._subscriber.undeclare()
+        self._receiver.join()
 
     def __next__(self) -> M:
         message = self.take(self._timeout_s)
         if message is not None:
             return message
-        if self._closed:
+        if self.closed:
             raise StopIteration
         raise TimeoutError(f"{self._key}: no message for {self._timeout_s} s; is the unit sending? (isotherm status)")
 
@@ -78,7 +83,7 @@ class Stream(Iterator[M], Generic[M]):
             with self._changed:
                 while not self._waiting:
                     left = None if deadline is None else deadline - time.monotonic()
-                    if self._closed or (left is not None and left <= 0):
+                    if self.closed or (left is not None and left <= 0):
                         return None
                     self._changed.wait(left)
                 key, frame = self._waiting.popleft()
@@ -112,21 +117,22 @@ class CorrectedStream(Stream[CorrectedBatch]):
         self._first_wins = first_wins
         self._arbiters: dict[str, FirstWins] = {}
         self._decoders: dict[str, CorrectedDecoder] = {}
-        #: The error that ended the callback's thread; None while it is running.
-        self.error: BaseException | None = None
+        #: What the callback raised last, and how often it has raised.
+        self.error: Exception | None = None
+        self.errors = 0
         super().__init__(session, key, most_waiting, timeout_s)
         self._thread: threading.Thread | None = None
         if callback is not None:
-            self._thread = threading.Thread(target=self._call, args=(callback,), name=f"isotherm {key}", daemon=True)
-            self._thread.start()
+            self._thread = start(lambda: self._call(callback), key)
 
     def _call(self, callback: Callable[[CorrectedBatch], Any]) -> None:
-        try:
-            while (batch := self.take()) is not None:
+        while (batch := self.take()) is not None:
+            try:
                 callback(batch)
-        except BaseException as error:
-            self.error = error
-            raise
+            except Exception as error:
+                self.error = error
+                self.errors += 1
+                _LOG.exception("%s: the callback has raised; the stream goes on", self._key)
 
     def close(self) -> None:
         super().close()

@@ -2,6 +2,7 @@
 //!
 //! Here alone a clock decides anything, and only about a stream's tail.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use isotherm_protocol::key::{Input, RawStream};
@@ -28,6 +29,8 @@ const FEWEST: u64 = 20;
 const ONE_IN: u64 = 5;
 /// Counters of ticks that a second producer's become.
 const CONTRADICTING: [&str; 3] = ["gyro_late", "gyro_implausible", "gyro_duplicates"];
+/// Gyro frames of which a repeat is the network's doing.
+const REPEATED: usize = 8;
 
 /// Limits of a stream that may have stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +62,9 @@ pub(super) struct Arrivals {
     returns: u32,
     /// Ticks that contradict others, at the last look.
     contradicting: u64,
+    /// Length and checksum of the gyro frames that were heard last, and ticks since the last look that were in repeats of them.
+    frames: VecDeque<(usize, [u8; 4])>,
+    repeated: u64,
 }
 
 impl Arrivals {
@@ -74,7 +80,26 @@ impl Arrivals {
             previous: None,
             returns: 0,
             contradicting: 0,
+            frames: VecDeque::with_capacity(REPEATED),
+            repeated: 0,
         }
+    }
+
+    /// Whether a gyro frame is one of the last once more, to the bit.
+    pub(super) fn is_repeat(&mut self, frame: &[u8]) -> bool {
+        let Some(checksum) = frame.last_chunk() else { return false };
+        let mark = (frame.len(), *checksum);
+        let is_repeat = self.frames.contains(&mark);
+        if !is_repeat {
+            self.frames.truncate(REPEATED - 1);
+            self.frames.push_front(mark);
+        }
+        is_repeat
+    }
+
+    /// So many ticks contradicted others since they came in a repeat.
+    pub(super) fn note_repeat(&mut self, ticks: u64) {
+        self.repeated += ticks;
     }
 
     /// A message has come; `series` is the producer's run that gyro ticks are of, where they could be read.
@@ -139,7 +164,7 @@ impl Arrivals {
     /// Whether two producers are at work, in words; `ticks` came since the last look, and so many contradicted others so far.
     fn two_producers(&mut self, ticks: u64, contradicting: u64) -> Option<String> {
         let before = std::mem::replace(&mut self.contradicting, contradicting);
-        let contradicting = contradicting.saturating_sub(before);
+        let contradicting = contradicting.saturating_sub(before + std::mem::take(&mut self.repeated));
         if std::mem::take(&mut self.returns) >= RETURNS {
             let (one, other) = (self.previous.map_or(0, |(series, _)| series), self.series.unwrap_or(0));
             return Some(format!(

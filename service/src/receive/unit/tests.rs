@@ -2,7 +2,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use isotherm_correction::calibration::Calibration;
-use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::sample::{AccelTick, GyroTick, LasingMode, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::{decode, encode};
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
@@ -245,4 +245,29 @@ fn a_revision_that_was_given_already_is_passed_over() {
     assert_eq!(actor.change(change), None);
     assert!(!actor.take_status_due());
     assert_eq!(actor.present().revision, 4);
+}
+
+#[test]
+fn a_frame_that_comes_twice_is_a_duplicate_and_other_ticks_of_the_same_numbers_are_a_second_producer() {
+    let frame = |sequence, mode| {
+        let [_, (stream, frame)] = frames(sequence);
+        let mut batch: GyroBatch = decode(&frame).unwrap();
+        batch.ticks[0].mode = mode;
+        (stream, encode(&batch).unwrap())
+    };
+    for (mode, is_alarm) in [(None, false), (Some(LasingMode::Plus), true)] {
+        let mut actor = actor(Sink::default().outlet());
+        for sequence in 0..100 {
+            // Late by three frames.
+            for (sequence, mode) in [(Some(sequence), None), (u64::checked_sub(sequence, 3), mode)] {
+                let Some((stream, frame)) = sequence.map(|sequence| frame(sequence, mode)) else { continue };
+                actor.receive(stream, &frame, Instant::now());
+            }
+        }
+        actor.measure_rates(Instant::now());
+        let status = actor.status("test");
+        let counted = status.counters.iter().find(|counter| counter.name == "gyro_duplicates");
+        assert_eq!(counted.map(|counter| counter.value), Some(97));
+        assert_eq!(status.faults.iter().any(|fault| fault.kind == "two_producers"), is_alarm, "{mode:?}");
+    }
 }
