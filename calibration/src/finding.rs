@@ -4,6 +4,7 @@
 mod accel;
 #[cfg(test)]
 mod tests;
+mod thermal;
 
 use std::fmt::{self, Display, Formatter};
 
@@ -15,6 +16,7 @@ use crate::report::{counted, fixed, short};
 use crate::runs::swapped::Looks;
 
 pub use accel::AccelKind;
+pub use thermal::ThermalKind;
 
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;

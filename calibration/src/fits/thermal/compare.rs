@@ -11,8 +11,9 @@ use super::stand::Stand;
 use crate::axes::output_name;
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
-use crate::numbers::{real, scatter_of_steps};
-use crate::report::{Curve, Rest, or_dash, short};
+use crate::finding::ThermalKind;
+use crate::numbers::{Size, real, scatter_of_steps};
+use crate::report::{Curve, Rest, is_worse, or_dash, short};
 use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
 
@@ -50,6 +51,8 @@ struct Stage<'a> {
 pub(super) struct Compared {
     rms: [Option<[f64; HEAD.len()]>; AXES],
     levels: [[f64; 2]; AXES],
+    /// What the document before and the new one leave of each axis, window by window.
+    left: [[Vec<f64>; 2]; AXES],
 }
 
 /// Which of the rivals.
@@ -80,18 +83,20 @@ impl Compared {
         let levels =
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
         let mut sums: [[Sum; HEAD.len()]; AXES] = Default::default();
+        let mut left: [[Vec<f64>; 2]; AXES] = Default::default();
         for stage in judging {
             let tables = stage.tables(&loaded, &mut watch)?;
             let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
             for axis in (0..AXES).filter(|axis| stage.counts(*axis)) {
-                add(&mut sums[axis], &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
+                let into = (&mut sums[axis], &mut left[axis]);
+                add(into, &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
             }
         }
         let rms = sums.map(|axis| {
             let known = axis.iter().all(|(_, count)| *count > 0.0);
             known.then(|| axis.map(|(square, count)| (square / count).sqrt()))
         });
-        Ok(Self { rms, levels: levels.map(|axis| [axis[0], axis[3]]) })
+        Ok(Self { rms, levels: levels.map(|axis| [axis[0], axis[3]]), left })
     }
 
     /// Levels before and after, for a run that is another part of a log of the fit.
@@ -111,18 +116,12 @@ impl Compared {
         }
     }
 
-    /// Warns of axes of which the document before leaves less than the new one.
-    pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
-        self.rms.iter().enumerate().filter_map(|(axis, rms)| {
-            let [.., new, before] = (*rms)?;
-            let (of, (new_words, before_words)) = (output_name(axis < 3, axis % 3), (short(new), short(before)));
-            (before < new && before_words != new_words).then(|| {
-                let unit = if axis < 3 { "°/h" } else { "m/s²" };
-                format!(
-                    "{of}: on the judging runs this document leaves {new_words} {unit}, the one before it {before_words}: \
-                     keep that one"
-                )
-            })
+    /// That the document before leaves less of an axis than the new one, by more than noise.
+    pub(super) fn before_is_better(&self, axis: usize) -> Option<ThermalKind> {
+        let [before, new] = self.left.get(axis)?;
+        is_worse(before, new).then(|| ThermalKind::BeforeIsBetter {
+            left: [before, new].map(|left| Size::of(left).rms),
+            measure: if axis < 3 { "°/h" } else { "m/s²" },
         })
     }
 
@@ -214,7 +213,7 @@ impl Stage<'_> {
 
 /// Adds the squares of what is left of an axis in windows that all have.
 fn add(
-    sums: &mut [Sum; HEAD.len()],
+    (sums, left): (&mut [Sum; HEAD.len()], &mut [Vec<f64>; 2]),
     tables: &[Table],
     (axis, truth): (usize, Option<f64>),
     levels: [f64; DOCUMENTS],
@@ -238,6 +237,9 @@ fn add(
             *square += (columns[document][row] - off).powi(2);
             *number += 1.0;
         }
+    }
+    for (left, document) in left.iter_mut().zip([4, 3]) {
+        left.extend(good.iter().map(|&row| columns[document][row] - off(document)));
     }
 }
 

@@ -6,7 +6,7 @@ use isotherm_protocol::document::{Document, Filter, Sample};
 use super::branches::History;
 use super::checks::SMALLEST_RANGE_DEG_C;
 use super::columns::{Basis, Term};
-use super::compare;
+use super::compare::{self, Compared};
 use super::fit::Sensor;
 use super::joint::Found;
 use super::model::{put_accel, put_gyro};
@@ -131,12 +131,11 @@ impl Outcome {
                 return Err(Error::Refused([vec![nothing.to_owned()], troubles].concat()));
             }
             // Every time round there is a sensor less.
-            if !self.take_out(&verdicts) {
+            if !self.take_out(&verdicts, &compared) {
                 break (document, curves, verdicts, troubles, compared);
             }
         };
         let table = compared.table(&self, &curves);
-        self.warnings.extend(compared.warnings());
         self.say(&mut verdicts);
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
@@ -187,20 +186,27 @@ impl Outcome {
         document
     }
 
-    /// Takes the terms of sensors out whose axis became worse; whether there was one.
-    fn take_out(&mut self, verdicts: &[Verdict]) -> bool {
-        let mut worse = false;
-        for verdict in verdicts {
-            let mine = self.found.iter_mut().find(|(sensor, _, found)| {
-                axis_name(sensor).as_ref() == Some(&verdict.of) && found.refused.is_none()
-            });
-            let Some((_, _, found)) = mine.filter(|_| !verdict.accepted) else { continue };
-            let sample = if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
-            found.refused = Some(format!("{sample} its {}", verdict.reason));
+    /// Takes the terms of sensors out whose axis became worse, by the verdicts or than it is with the document before; whether there was
+    /// one.
+    fn take_out(&mut self, verdicts: &[Verdict], compared: &Compared) -> bool {
+        let why = |sensor: &Sensor| {
+            let axis = axis_name(sensor)?;
+            let worse =
+                verdicts.iter().find(|verdict| verdict.of == axis && !verdict.accepted).map(|verdict| {
+                    let sample =
+                        if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
+                    format!("{sample} its {}", verdict.reason)
+                });
+            let than_before = || compared.before_is_better(axis_of(sensor)?).map(|kind| kind.to_string());
+            worse.or_else(|| than_before().filter(|_| self.had_terms(sensor)))
+        };
+        let standing = self.found.iter().map(|(sensor, _, found)| found.refused.is_none().then_some(sensor));
+        let reasons: Vec<Option<String>> = standing.map(|sensor| why(sensor?)).collect();
+        for ((.., found), why) in self.found.iter_mut().zip(&reasons).filter(|(_, why)| why.is_some()) {
+            found.refused.clone_from(why);
             found.terms.clear();
-            worse = true;
         }
-        worse
+        reasons.iter().any(Option::is_some)
     }
 
     /// That a refused sensor keeps terms which were made with another filter: a document has one for all its sensors.
