@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::report::short;
+use crate::report::{fixed, short};
 
 /// What was found of a thermal fit.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -15,4 +15,11 @@ pub enum ThermalKind {
         short(.left[0]), short(.left[1])
     )]
     BeforeIsBetter { left: [f64; 2], measure: &'static str },
+    /// A judging run says nothing of some axes: its temperature is not known, or hardly moves.
+    #[error(
+        "{run}: {} not judged on it: {}, {needed} °C are needed for judging; use a run through the chamber with its thermometers",
+        .axes.join(", "),
+        .range_deg_c.map_or("it has no temperature readings".to_owned(), |range| format!("the temperature moves by {} °C", fixed(range, 1)))
+    )]
+    NotJudged { run: String, axes: Vec<String>, range_deg_c: Option<f64>, needed: f64 },
 }

@@ -32,6 +32,11 @@ pub const SMALLEST_RANGE_DEG_C: f64 = 5.0;
 /// Share of readings that may be no number, or of time that may be missing, before a warning.
 const SMALL_SHARE: f64 = 0.001;
 
+/// Whether temperatures (°C) move enough to fit or to judge.
+pub fn moves_enough(deg_c: &[f64]) -> bool {
+    Size::of(deg_c).peak_to_peak >= SMALLEST_RANGE_DEG_C
+}
+
 /// What was found: nothing can be done without the first, the second is to be looked at.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {

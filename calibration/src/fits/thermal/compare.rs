@@ -5,6 +5,7 @@ use isotherm_log::offline::Loaded;
 use isotherm_pages::Table as Rows;
 use isotherm_protocol::document::{Document, Sample};
 
+use super::checks::moves_enough;
 use super::columns::Term;
 use super::outcome::{Outcome, axis_of};
 use super::stand::Stand;
@@ -13,6 +14,7 @@ use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::finding::ThermalKind;
 use crate::numbers::{Size, real, scatter_of_steps};
+use crate::report::curve::channel_of;
 use crate::report::{Curve, Rest, is_worse, or_dash, short};
 use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
@@ -68,7 +70,8 @@ impl Compared {
         judging: &[Stage<'_>],
         mut watch: impl Watch,
     ) -> Result<Self, Error> {
-        let loaded: Vec<Loaded> = documents.into_iter().map(Written::compiled).collect::<Result<_, _>>()?;
+        let loaded: Vec<Loaded> =
+            documents.iter().copied().map(Written::compiled).collect::<Result<_, _>>()?;
         let mut levels = [[(0.0, 0.0); DOCUMENTS]; AXES];
         for stage in fitted {
             let tables = stage.tables(&loaded, &mut watch)?;
@@ -87,7 +90,8 @@ impl Compared {
         for stage in judging {
             let tables = stage.tables(&loaded, &mut watch)?;
             let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
-            for axis in (0..AXES).filter(|axis| stage.counts(*axis)) {
+            let judges = |axis: &usize| stage.counts(*axis) && moves(&tables, documents[0], *axis);
+            for axis in (0..AXES).filter(judges) {
                 let into = (&mut sums[axis], &mut left[axis]);
                 add(into, &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
             }
@@ -241,6 +245,13 @@ fn add(
     for (left, document) in left.iter_mut().zip([4, 3]) {
         left.extend(good.iter().map(|&row| columns[document][row] - off(document)));
     }
+}
+
+/// Whether the temperature that an axis follows moves enough for a judgement.
+fn moves(tables: &[Table], document: &Document, axis: usize) -> bool {
+    let channel = channel_of(document, axis < 3, axis % 3);
+    let column = channel.and_then(|channel| tables.first()?.temperature_deg_c.get(&channel));
+    column.is_some_and(|deg_c| moves_enough(deg_c))
 }
 
 fn column(table: &Table, axis: usize) -> &[f64] {

@@ -4,7 +4,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Document, Filter, Sample};
 
 use super::branches::History;
-use super::checks::SMALLEST_RANGE_DEG_C;
+use super::checks::{SMALLEST_RANGE_DEG_C, moves_enough};
 use super::columns::{Basis, Term};
 use super::compare::{self, Compared};
 use super::fit::Sensor;
@@ -15,7 +15,8 @@ use super::stand::Stand;
 use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
-use crate::numbers::Size;
+use crate::finding::ThermalKind;
+use crate::numbers::{Size, once_each};
 use crate::report::{Curve, FLAT, Judged, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
@@ -121,9 +122,9 @@ impl Outcome {
                 let counts = if stand.turning.is_none() { "" } else { "gyro" };
                 Ok((rest, Rows::valid(stand.window_s(window_s)), counts))
             };
-            let Judged { curves, mut troubles } =
+            let Judged { mut curves, mut troubles } =
                 judge((runs, judges), [&before, &written], of_run, &mut watch)?;
-            troubles.extend(constant(&curves));
+            troubles.extend(unjudged(&mut curves));
             let verdicts = Curve::verdicts(&curves);
             if verdicts.is_empty() {
                 let nothing = "no window of any axis is complete: the log has gaps, or all its ticks are flagged; \
@@ -136,7 +137,7 @@ impl Outcome {
             }
         };
         let table = compared.table(&self, &curves);
-        self.say(&mut verdicts);
+        self.say(&mut verdicts, !judges.is_empty());
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
         }
@@ -255,7 +256,7 @@ impl Outcome {
     }
 
     /// Gives the verdicts their reasons.
-    fn say(&self, verdicts: &mut [Verdict]) {
+    fn say(&self, verdicts: &mut [Verdict], judged: bool) {
         for verdict in verdicts {
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
             let Some((sensor, _, found)) = mine else { continue };
@@ -273,29 +274,27 @@ impl Outcome {
                     (true, false) => format!("{FLAT}; constant bias"),
                     (false, _) => found.words.clone(),
                 };
-                *verdict = verdict.clone().remark(words);
+                let unjudged = if judged && verdict.out_of_sample.is_none() { "; not judged" } else { "" };
+                *verdict = verdict.clone().remark(words + unjudged);
             }
         }
     }
 }
 
-/// Judging runs over which a temperature hardly moves.
-fn constant(curves: &[Curve]) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
-    for curve in curves.iter().filter(|curve| curve.sample == Sample::Out) {
-        let range = Size::of(&curve.temperature_deg_c).peak_to_peak;
-        if !curve.temperature_deg_c.is_empty() && range < SMALLEST_RANGE_DEG_C {
-            let run = &curve.run;
-            let of = format!(
-                "{run}: its temperature moves by {range:.1} °C, at least {SMALLEST_RANGE_DEG_C} °C are needed for \
-                 judging: use a run through the chamber"
-            );
-            if words.iter().all(|other| !other.starts_with(&format!("{run}: "))) {
-                words.push(of);
-            }
-        }
-    }
-    words
+/// Leaves out the curves of judging runs over which their temperature is not known or hardly moves; says so.
+fn unjudged(curves: &mut Vec<Curve>) -> Vec<String> {
+    let idle = |curve: &Curve| curve.sample == Sample::Out && !moves_enough(&curve.temperature_deg_c);
+    let runs = once_each(curves.iter().filter(|curve| idle(curve)).map(|curve| curve.run.clone()));
+    let words = |run: String| {
+        let mine = || curves.iter().filter(|curve| idle(curve) && curve.run == run);
+        let ranges = mine().map(|curve| Size::of(&curve.temperature_deg_c)).filter(|size| size.count > 0);
+        let range_deg_c = ranges.map(|size| size.peak_to_peak).reduce(f64::max);
+        let axes = mine().map(|curve| curve.of.clone()).collect();
+        ThermalKind::NotJudged { run, axes, range_deg_c, needed: SMALLEST_RANGE_DEG_C }.to_string()
+    };
+    let told = runs.into_iter().map(words).collect();
+    curves.retain(|curve| !idle(curve));
+    told
 }
 
 /// The case axis that a sensor of a unit with three stands for, gyros first.

@@ -426,6 +426,37 @@ fn gaps_are_told() {
     );
 }
 
+/// A judging run beside one that is fitted.
+fn judged(judge: Run) -> Result<Fitted, Error> {
+    fit(None, (&[run(0..5400, usual)], &[judge]), &Settings::default(), ())
+}
+
+/// A second of another run of the same unit.
+fn other(s: u32) -> Second {
+    let mut second = usual(s);
+    second.rates.iter_mut().for_each(|rate| *rate += 1e-6 * (f64::from(s * 31 % 17) / 17.0 - 0.5));
+    second
+}
+
+#[test]
+fn a_run_without_a_moving_temperature_does_not_judge() {
+    let made = judged(run(0..5400, other)).unwrap();
+    assert!(made.report.verdicts.iter().all(|verdict| verdict.out_of_sample.is_some()));
+    let mut deaf = events(0..5400, other);
+    deaf.retain(|event| !matches!(event, LogEvent::Temperature(_)));
+    let mut told = String::new();
+    for judge in [run_of(deaf), run(0..700, other)] {
+        let report = judged(judge).unwrap().report;
+        for verdict in &report.verdicts {
+            let said = verdict.accepted && verdict.reason.ends_with("; not judged");
+            assert!(verdict.out_of_sample.is_none() && said, "{}", verdict.words());
+        }
+        let about = report.warnings.iter().filter(|words| words.contains("not judged"));
+        told += &about.map(|words| format!("{words}\n")).collect::<String>();
+    }
+    insta::assert_snapshot!(told);
+}
+
 /// The seconds of a list only, without accelerometers.
 fn run_at(seconds: &[u32]) -> Run {
     let events = events(seconds.iter().copied(), usual).into_iter();
