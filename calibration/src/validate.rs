@@ -16,7 +16,7 @@ use crate::axes::AXES;
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::thermal::Stand;
-use crate::fits::thermal::checks::judging;
+use crate::fits::thermal::checks::{frozen, judging};
 use crate::numbers::{Size, is_white, norm, real};
 use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
@@ -71,7 +71,9 @@ pub fn validate(
             )));
         }
         let series = run.series(&mut watch)?;
-        readings.push((judging(&run.name, &series, &Stand::default()), series.gyros.length_s()));
+        let mut faults = judging(&run.name, &series, &Stand::default());
+        faults.extend(frozen(&run.name, &series, document));
+        readings.push((faults, series.gyros.length_s()));
     }
     let longest_s = readings.iter().map(|(_, length_s)| *length_s).fold(0.0, f64::max);
     let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));

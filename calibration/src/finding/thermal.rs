@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::report::{fixed, short};
+use crate::report::{fixed, short, six};
 
 /// What was found of a thermal fit.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -22,4 +22,11 @@ pub enum ThermalKind {
         .range_deg_c.map_or("it has no temperature readings".to_owned(), |range| format!("the temperature moves by {} °C", fixed(range, 1)))
     )]
     NotJudged { run: String, axes: Vec<String>, range_deg_c: Option<f64>, needed: f64 },
+    /// A thermometer reads the same for the larger part of a run: its raw reading, and from when to when (s).
+    #[error(
+        "temperature channel {channel:?} reads exactly {} from {:.0} s to {:.0} s, most of the log: the thermometer is frozen, or the \
+         mapping names the wrong column; cut the log with --start and --duration",
+        six(*.value), .window_s[0], .window_s[1]
+    )]
+    Frozen { channel: String, value: f64, window_s: [f64; 2] },
 }

@@ -1,5 +1,7 @@
 //! What must hold of a run before anything is fitted to it; every refusal says what to do.
 
+use std::collections::BTreeSet;
+
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::Document;
@@ -7,6 +9,8 @@ use isotherm_protocol::document::Document;
 use super::samples::Samples;
 use super::stand::Stand;
 use crate::axes::sensor_name;
+use crate::document::accelerometers;
+use crate::finding::ThermalKind;
 use crate::fits::drift::pieces::checks::moves;
 use crate::numbers::{Size, dot, ends, median, median_if_any, norm, real, seconds};
 use crate::report::{Rest, counted, short};
@@ -29,6 +33,9 @@ const BESIDE: usize = 3;
 const FEWEST: usize = 100;
 /// Smallest range of temperature that is worth a fit (°C).
 pub const SMALLEST_RANGE_DEG_C: f64 = 5.0;
+/// Share of a run over which a thermometer may read the same, and readings that say nothing of it.
+const LARGEST_FROZEN: f64 = 0.5;
+const FEWEST_FROZEN: usize = 10;
 /// Share of readings that may be no number, or of time that may be missing, before a warning.
 const SMALL_SHARE: f64 = 0.001;
 
@@ -194,6 +201,32 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
             high - low
         ));
     }
+}
+
+/// Thermometers that sensors of a document follow and that read the same for the larger part of a run.
+pub fn frozen(name: &str, series: &Series, document: &Document) -> Vec<String> {
+    let gyros = document.gyro.sensor.iter().map(|sensor| sensor.channel.as_deref());
+    let accels = accelerometers(document)
+        .iter()
+        .flat_map(|own| [own.channel.as_deref(), own.board_channel.as_deref()]);
+    let followed: BTreeSet<&str> = gyros.chain(accels).flatten().collect();
+    let words = |channel: &str| {
+        let readings = series.temperatures.get(channel)?;
+        let mut from = 0;
+        let runs = readings.raw.chunk_by(|a, b| (a - b).abs() <= 0.0).map(|run| {
+            from += run.len();
+            [from - run.len(), from - 1]
+        });
+        let since_s = readings.since_s();
+        let [from, to] = runs.max_by_key(|[from, to]| to - from)?;
+        let [begin_s, end_s] = [since_s[from], since_s[to]];
+        let still = to - from >= FEWEST_FROZEN && end_s - begin_s > LARGEST_FROZEN * since_s.last()?;
+        still.then(|| {
+            let (channel, value) = (channel.to_owned(), readings.raw[from]);
+            format!("{name}: {}", ThermalKind::Frozen { channel, value, window_s: [begin_s, end_s] })
+        })
+    };
+    followed.into_iter().filter_map(words).collect()
 }
 
 /// Whether a run on a rate table turns as it was stated, all the time; why not, and what to do.

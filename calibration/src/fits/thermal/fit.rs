@@ -99,7 +99,9 @@ pub fn fit(
     let mut rests = Vec::new();
     for ((is_fitted, (run, stand)), series) in all().zip(&series) {
         let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
-        let (of_rest, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        let (of_rest, mut found) =
+            stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        found.refusals.extend(checks::frozen(&run.name, series, &plain));
         if is_fitted {
             rests.extend(of_rest);
             refusals.extend(found.refusals);

@@ -457,6 +457,21 @@ fn a_run_without_a_moving_temperature_does_not_judge() {
     insta::assert_snapshot!(told);
 }
 
+#[test]
+fn a_frozen_thermometer_is_told() {
+    let frozen = |from: u32| run(0..5400, move |s| Second { deg_c: usual(s.min(from)).deg_c, ..other(s) });
+    let refused = [2000, 0].map(|from| tried(frozen(from), Method::Joint).unwrap_err().to_string());
+    let mut told = refused.join("\n");
+    // One that judges is told of.
+    let report = judged(frozen(2000)).unwrap().report;
+    let about = report.warnings.iter().filter(|words| words.contains("frozen"));
+    told += &about.map(|words| format!("\n{words}")).collect::<String>();
+    insta::assert_snapshot!(told);
+    // Steps of half a degree are none.
+    let coarse = |s: u32| Second { deg_c: (2.0 * usual(s).deg_c).round() / 2.0, ..usual(s) };
+    assert!(tried(run(0..5400, coarse), Method::Joint).unwrap().report.accepted());
+}
+
 /// The seconds of a list only, without accelerometers.
 fn run_at(seconds: &[u32]) -> Run {
     let events = events(seconds.iter().copied(), usual).into_iter();
