@@ -16,7 +16,7 @@ use crate::axes::AXES;
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::thermal::Stand;
-use crate::fits::thermal::checks::{frozen, judging};
+use crate::fits::thermal::checks::{far, frozen, judging};
 use crate::numbers::{Size, is_white, norm, real};
 use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
@@ -71,14 +71,18 @@ pub fn validate(
             )));
         }
         let series = run.series(&mut watch)?;
-        let mut faults = judging(&run.name, &series, &Stand::default());
+        let at_rest = Stand::default();
+        let mut faults = judging(&run.name, &series, &at_rest);
         faults.extend(frozen(&run.name, &series, document));
-        readings.push((faults, series.gyros.length_s()));
+        let (found, left_out) =
+            far(&run.name, &series, (document, &at_rest), wanted.window_s.unwrap_or(WINDOW_S));
+        faults.extend([found.refusals, found.warnings].concat());
+        readings.push((faults, series.gyros.length_s(), left_out));
     }
-    let longest_s = readings.iter().map(|(_, length_s)| *length_s).fold(0.0, f64::max);
+    let longest_s = readings.iter().map(|(_, length_s, _)| *length_s).fold(0.0, f64::max);
     let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));
-    for (log, (faults, _)) in logs.iter().zip(readings) {
-        let run = &log.run;
+    for (log, (faults, _, left_out)) in logs.iter().zip(readings) {
+        let run = &log.run.without(left_out);
         let documents = [written.loaded.clone(), bare.clone()];
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
         let tables = Table::together_seen(run, &documents, Rows::valid(window_s), &mut watch, seen)?;

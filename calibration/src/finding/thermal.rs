@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::report::{fixed, short, six};
+use crate::report::{counted, fixed, short, six};
 
 /// What was found of a thermal fit.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -22,6 +22,22 @@ pub enum ThermalKind {
         .range_deg_c.map_or("it has no temperature readings".to_owned(), |range| format!("the temperature moves by {} °C", fixed(range, 1)))
     )]
     NotJudged { run: String, axes: Vec<String>, range_deg_c: Option<f64>, needed: f64 },
+    /// Readings of a run at rest are far from all others: how many, the first (in this unit, at this time in s), in how many windows, and
+    /// whether they can be left out.
+    #[error(
+        "{} far from all others, the first {} {measure} at {at_s:.2} s: {}",
+        counted(*.count, "reading is", "readings are"), short(*.value),
+        if *.single {
+            format!("left out with {}; find their cause", counted(*.windows, "window", "windows"))
+        } else {
+            format!(
+                "in {} they would change the fit: did the unit turn, or was it knocked? Cut the log to the part at rest with \
+                 --start and --duration",
+                counted(*.windows, "window", "windows")
+            )
+        }
+    )]
+    Far { count: usize, value: f64, measure: &'static str, at_s: f64, windows: usize, single: bool },
     /// A thermometer reads the same for the larger part of a run: its raw reading, and from when to when (s).
     #[error(
         "temperature channel {channel:?} reads exactly {} from {:.0} s to {:.0} s, most of the log: the thermometer is frozen, or the \

@@ -1,7 +1,7 @@
 //! Columns cut at their gaps, and what cannot be analysed at all.
 
 pub mod checks;
-mod far;
+pub mod far;
 pub(crate) mod steps;
 
 use super::columns::Columns;

@@ -12,8 +12,10 @@ use crate::axes::sensor_name;
 use crate::document::accelerometers;
 use crate::finding::ThermalKind;
 use crate::fits::drift::pieces::checks::moves;
+use crate::fits::drift::pieces::far::SINGLE;
 use crate::numbers::{Size, dot, ends, median, median_if_any, norm, real, seconds};
-use crate::report::{Rest, counted, short};
+use crate::report::{Rest, counted, output_unit, short};
+use crate::runs::Reading;
 use crate::runs::faults::{self, Fault};
 use crate::runs::series::{Series, Ticks};
 use crate::runs::swapped::{Looks, Shown};
@@ -33,6 +35,8 @@ const BESIDE: usize = 3;
 const FEWEST: usize = 100;
 /// Smallest range of temperature that is worth a fit (°C).
 pub const SMALLEST_RANGE_DEG_C: f64 = 5.0;
+/// Share of the windows that may have readings far from all others.
+const MOST_FAR: f64 = 0.1;
 /// Share of a run over which a thermometer may read the same, and readings that say nothing of it.
 const LARGEST_FROZEN: f64 = 0.5;
 const FEWEST_FROZEN: usize = 10;
@@ -201,6 +205,44 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
             high - low
         ));
     }
+}
+
+/// Readings of a unit at rest that are far from all others, to be left out with their windows; refused where they are many, or follow
+/// each other. Counts of mode switches are for the correction to pass over.
+pub fn far(
+    name: &str,
+    series: &Series,
+    (document, stand): (&Document, &Stand),
+    window_s: f64,
+) -> (Findings, BTreeSet<Reading>) {
+    let (mut found, mut all) = (Findings::default(), BTreeSet::new());
+    let kinds = [(true, "gyro", &series.gyros), (false, "accelerometer", &series.accels)];
+    for (gyro, kind, ticks) in kinds.into_iter().filter(|_| stand.turning.is_none()) {
+        let first = ticks.end_ns.first().copied().unwrap_or_default();
+        let since_s = |tick: usize| seconds(ticks.end_ns[tick].saturating_sub(first));
+        let (measure, scale) = match (ticks.output, gyro) {
+            (Some(OutputKind::Mean), true) => ("°/s", 1_f64.to_degrees()),
+            (Some(OutputKind::Mean), false) => (output_unit(document), 1.0),
+            _ => ("counts", 1.0),
+        };
+        for (index, readings) in ticks.readings.iter().enumerate() {
+            let far = faults::far(readings);
+            let Some(at) = far.first().copied().filter(|_| !gyro || document.mode_reversal.is_none()) else {
+                continue;
+            };
+            let mut windows: Vec<f64> =
+                far.iter().map(|tick| libm::floor(since_s(*tick) / window_s)).collect();
+            windows.dedup();
+            let few = real(windows.len()) * window_s <= (MOST_FAR * ticks.length_s()).max(window_s);
+            let single = few && far.chunk_by(|a, b| a + 1 == *b).all(|row| row.len() <= SINGLE);
+            let (count, value, at_s) = (far.len(), scale * readings[at], since_s(at));
+            let words = ThermalKind::Far { count, value, measure, at_s, windows: windows.len(), single };
+            let to = if single { &mut found.warnings } else { &mut found.refusals };
+            to.push(format!("{name}: {kind} {}: {words}", sensor_name(index, ticks.readings.len())));
+            all.extend(far.into_iter().filter(|_| single).map(|tick| (ticks.end_ns[tick], gyro, index)));
+        }
+    }
+    (found, all)
 }
 
 /// Thermometers that sensors of a document follow and that read the same for the larger part of a run.

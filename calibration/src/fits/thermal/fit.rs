@@ -97,11 +97,18 @@ pub fn fit(
         &Settings { fit_window_s: settings.fit_window_s.max(libm::ceil(step_s)), ..settings.clone() };
     let mut samples = Vec::new();
     let mut rests = Vec::new();
+    let mut sound = Vec::new();
     for ((is_fitted, (run, stand)), series) in all().zip(&series) {
-        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
+        let window_s = stand.window_s(settings.fit_window_s);
+        let (of_readings, far) = checks::far(&run.name, series, (&plain, stand), window_s);
+        let run = &run.without(far);
+        sound.push(run.clone());
+        let of_run = Samples::of(run, series, &plain, window_s, &mut watch)?;
         let (of_rest, mut found) =
             stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
         found.refusals.extend(checks::frozen(&run.name, series, &plain));
+        found.refusals.extend(of_readings.refusals);
+        found.warnings.extend(of_readings.warnings);
         if is_fitted {
             rests.extend(of_rest);
             refusals.extend(found.refusals);
@@ -136,7 +143,7 @@ pub fn fit(
         sensors_of(&mut outcome, columns, &all, (known, longest_s), &samples)?;
         outcome.history(name, &known.history);
     }
-    outcome.finish((runs, judges), |run, stand| rest(run, &base, stand, ()), watch)
+    outcome.finish(sound.split_at(runs.len()), |run, stand| rest(run, &base, stand, ()), watch)
 }
 
 /// Whether a run feels what it must in its stated attitude, and what it would put out without error where it does.

@@ -472,6 +472,28 @@ fn a_frozen_thermometer_is_told() {
     assert!(tried(run(0..5400, coarse), Method::Joint).unwrap().report.accepted());
 }
 
+#[test]
+fn readings_far_from_all_others_are_left_out_or_refused() {
+    let spiked = |every: u32| {
+        run(0..5400, move |s| {
+            let mut second = usual(s);
+            if s % every == 77 {
+                second.rates[1] = 99_f64.to_radians();
+            }
+            second
+        })
+    };
+    let (clean, some) =
+        (tried(run(0..5400, usual), Method::Joint).unwrap(), tried(spiked(1000), Method::Joint).unwrap());
+    let figures = |made: &Fitted| made.report.verdicts.iter().map(|v| v.in_sample[1].rms).collect::<Vec<_>>();
+    for (a, b) in figures(&clean).into_iter().zip(figures(&some)) {
+        assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
+    }
+    let mut told = some.report.warnings.join("\n") + "\n";
+    told += &tried(spiked(80), Method::Joint).unwrap_err().to_string();
+    insta::assert_snapshot!(told);
+}
+
 /// The seconds of a list only, without accelerometers.
 fn run_at(seconds: &[u32]) -> Run {
     let events = events(seconds.iter().copied(), usual).into_iter();
