@@ -22,6 +22,9 @@ pub enum ThermalKind {
         .range_deg_c.map_or("it has no temperature readings".to_owned(), |range| format!("the temperature moves by {} °C", fixed(range, 1)))
     )]
     NotJudged { run: String, axes: Vec<String>, range_deg_c: Option<f64>, needed: f64 },
+    /// Two logs have the same readings, whatever their files are called.
+    #[error("{log}: its readings are those of {other}: {}", if *.judges { "the judge must be another run" } else { "each log counts once" })]
+    SameReadings { log: String, other: String, judges: bool },
     /// Readings of a run at rest are far from all others: how many, the first (in this unit, at this time in s), in how many windows, and
     /// whether they can be left out.
     #[error(

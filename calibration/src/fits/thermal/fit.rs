@@ -17,7 +17,9 @@ use super::stand::Stand;
 use super::target::{rest, target};
 use crate::document::{Fitted, accelerometers};
 use crate::error::Error;
+use crate::finding::ThermalKind;
 use crate::report::{Rest, six};
+use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
 use crate::runs::{Run, Watch};
 
@@ -51,7 +53,7 @@ pub fn fit(
 ) -> Result<Fitted, Error> {
     let mut warnings = Vec::new();
     let (mut refusals, mut dead) = (Vec::new(), Vec::new());
-    let mut series = Vec::new();
+    let mut series: Vec<Series> = Vec::new();
     let stands: Vec<Stand> = (0..runs.len() + judges.len()).map(|run| settings.stand(run)).collect();
     let all =
         || runs.iter().chain(judges).zip(&stands).enumerate().map(|(index, of)| (index < runs.len(), of));
@@ -65,6 +67,7 @@ pub fn fit(
         } else {
             warnings.extend(checks::judging(&run.name, &of_run, stand));
         }
+        refusals.extend(twins((run, &of_run), series.iter().zip(runs.iter().chain(judges)), !is_fitted));
         series.push(of_run);
     }
     let first = series.first().ok_or_else(|| Error::refused("there is no run to fit to"))?;
@@ -144,6 +147,19 @@ pub fn fit(
         outcome.history(name, &known.history);
     }
     outcome.finish(sound.split_at(runs.len()), |run, stand| rest(run, &base, stand, ()), watch)
+}
+
+/// The logs that have the same readings as a run.
+fn twins<'a>(
+    (run, series): (&Run, &Series),
+    known: impl Iterator<Item = (&'a Series, &'a Run)>,
+    judges: bool,
+) -> Vec<String> {
+    let same = known.filter(|(other, _)| series.gyros.overlap(&other.gyros));
+    let words = |(_, other): (&Series, &Run)| {
+        ThermalKind::SameReadings { log: run.name.clone(), other: other.name.clone(), judges }.to_string()
+    };
+    same.map(words).collect()
 }
 
 /// Whether a run feels what it must in its stated attitude, and what it would put out without error where it does.

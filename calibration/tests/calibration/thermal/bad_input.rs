@@ -494,6 +494,14 @@ fn readings_far_from_all_others_are_left_out_or_refused() {
     insta::assert_snapshot!(told);
 }
 
+#[test]
+fn a_judge_with_the_readings_of_the_fit_is_refused() {
+    let Err(Error::Refused(reasons)) = judged(run(0..5400, usual)) else { panic!("refused") };
+    insta::assert_snapshot!(reasons.join("\n"));
+    // A part of it, too.
+    assert!(matches!(judged(run(2400..5400, usual)), Err(Error::Refused(_))));
+}
+
 /// The seconds of a list only, without accelerometers.
 fn run_at(seconds: &[u32]) -> Run {
     let events = events(seconds.iter().copied(), usual).into_iter();
