@@ -273,7 +273,7 @@ fn not_level(at_beginning: bool, force: Option<[f64; 3]>, troubles: &[String]) -
     let all = ["", "", ", or --remove-mean instead of --latitude"];
     let [when, of, moment] = if at_beginning { beginning } else { all };
     let force = force.map_or_else(
-        || "the document or the log has no accelerometers".to_owned(),
+        || "the document (--calibration) or the log has no valid accelerometer readings".to_owned(),
         |force| {
             let parts = force.map(|part| fixed(part, 3)).join(", ");
             format!("the mean force {of}is ({parts}) m/s²; it must be within 2 % of one g, x not vertical")
