@@ -23,6 +23,7 @@ use std::sync::Arc;
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::GyroTick;
 use isotherm_correction::unit::MAX_TICK_DURATION;
+use isotherm_log::mapping::SensorUnit;
 use isotherm_log::message::Topic;
 use isotherm_log::offline::Offline;
 use isotherm_log::part::{LogFiles, Part};
@@ -167,6 +168,12 @@ impl Run {
             Source::Files { files: LogFiles::Recordings(paths) | LogFiles::Text { paths, .. }, .. } => paths,
             Source::Events(_) => &[],
         }
+    }
+
+    /// What the mapping of a text log says that its accelerometers read; recordings do not say.
+    pub fn accelerometer_unit(&self) -> Option<&'static str> {
+        let Source::Files { files: LogFiles::Text { mapping, .. }, .. } = &self.source else { return None };
+        mapping.files.iter().find_map(|file| Some(file.accel.as_ref()?.sensors.first()?.unit.sent()))
     }
 
     /// The files and folders that it was given as, which documents name; its files where nothing else is known.
