@@ -270,7 +270,7 @@ impl From<Kind> for Finding {
 
 fn not_level(at_beginning: bool, force: Option<[f64; 3]>, troubles: &[String]) -> String {
     let beginning = [" at its beginning", "of its first second ", " of that moment"];
-    let all = ["", "", ", or --remove-mean instead of --latitude"];
+    let all = ["", "", ", or leave --latitude out"];
     let [when, of, moment] = if at_beginning { beginning } else { all };
     let force = force.map_or_else(
         || "the document (--calibration) or the log has no valid accelerometer readings".to_owned(),

@@ -14,7 +14,7 @@ const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
 /// Place, attitude and turning: each option once for all logs, or once for each.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct StandArgs {
-    /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros
+    /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros (default: the mean of each run is)
     #[arg(long, value_name = "DEG", requires = "heading", allow_negative_numbers = true)]
     latitude: Option<f64>,
     /// Heading of the case's x axis from north towards east (°); once for all logs, or for each log in order, then for those of --judge
@@ -35,9 +35,6 @@ pub(in crate::cli) struct StandArgs {
     /// Rate of the table throughout a log (°/s), 0 at rest; likewise
     #[arg(long, value_name = "DEG_PER_S", allow_negative_numbers = true, requires = "axis")]
     rate: Vec<f64>,
-    /// Remove the mean of each run (default without --latitude)
-    #[arg(long, conflicts_with = "latitude")]
-    remove_mean: bool,
 }
 
 impl StandArgs {
