@@ -40,6 +40,8 @@ const WINDOW_S: f64 = 10.0;
 const SAME: f64 = 1e-9;
 /// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
 const DEAD: f64 = 1e-3;
+/// Share of a window that must be there: of a unit at rest its mean lacks nothing by a tick in a hundred.
+const ALMOST_WHOLE: f64 = 0.99;
 /// Share of windows that should be whole.
 const WHOLE: f64 = 0.9;
 /// Largest range of a mean rate of a unit that counts as being at rest (°/h): 5 °/s.
@@ -84,8 +86,9 @@ pub fn validate(
     for (log, (faults, _, left_out)) in logs.iter().zip(readings) {
         let run = &log.run.without(left_out);
         let documents = [written.loaded.clone(), bare.clone()];
+        let rows = Rows { whole: Some(ALMOST_WHOLE), ..Rows::valid(window_s) };
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
-        let tables = Table::together_seen(run, &documents, Rows::valid(window_s), &mut watch, seen)?;
+        let tables = Table::together_seen(run, &documents, rows, &mut watch, seen)?;
         let mut tables = tables.into_iter();
         let mut next = || tables.next().unwrap_or_default();
         let (after, nominal) = (next(), next());

@@ -40,6 +40,8 @@ const MOST_FAR: f64 = 0.1;
 /// Share of a run over which a thermometer may read the same, and readings that say nothing of it.
 const LARGEST_FROZEN: f64 = 0.5;
 const FEWEST_FROZEN: usize = 10;
+/// Distance of ticks, over the usual one, from which on one is missing.
+const MISSING_TICK: f64 = 1.75;
 /// Share of readings that may be no number, or of time that may be missing, before a warning.
 const SMALL_SHARE: f64 = 0.001;
 
@@ -139,7 +141,7 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let first = ticks.end_ns.first().copied().unwrap_or_default();
     for pair in ticks.end_ns.windows(2) {
         let (gap, since) = (seconds(pair[1].saturating_sub(pair[0])), seconds(pair[0].saturating_sub(first)));
-        if gap > 3.0 * step {
+        if gap > MISSING_TICK * step {
             count += 1;
             missing += gap - step;
             if gap > longest {
