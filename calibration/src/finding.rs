@@ -4,6 +4,7 @@
 mod accel;
 #[cfg(test)]
 mod tests;
+mod thermal;
 
 use std::fmt::{self, Display, Formatter};
 
@@ -15,6 +16,7 @@ use crate::report::{counted, fixed, short};
 use crate::runs::swapped::Looks;
 
 pub use accel::AccelKind;
+pub use thermal::ThermalKind;
 
 /// Plateaus that are listed at most, and the share of the fastest one below which one is not worth telling.
 const MOST: usize = 12;
@@ -268,10 +270,10 @@ impl From<Kind> for Finding {
 
 fn not_level(at_beginning: bool, force: Option<[f64; 3]>, troubles: &[String]) -> String {
     let beginning = [" at its beginning", "of its first second ", " of that moment"];
-    let all = ["", "", ", or --remove-mean instead of --latitude"];
+    let all = ["", "", ", or leave --latitude out"];
     let [when, of, moment] = if at_beginning { beginning } else { all };
     let force = force.map_or_else(
-        || "the document or the log has no accelerometers".to_owned(),
+        || "the document (--calibration) or the log has no valid accelerometer readings".to_owned(),
         |force| {
             let parts = force.map(|part| fixed(part, 3)).join(", ");
             format!("the mean force {of}is ({parts}) m/s²; it must be within 2 % of one g, x not vertical")

@@ -23,6 +23,7 @@ use std::sync::Arc;
 use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::GyroTick;
 use isotherm_correction::unit::MAX_TICK_DURATION;
+use isotherm_log::mapping::SensorUnit;
 use isotherm_log::message::Topic;
 use isotherm_log::offline::Offline;
 use isotherm_log::part::{LogFiles, Part};
@@ -48,6 +49,8 @@ pub struct Run {
     pub unit: UnitId,
     /// The gyros whose readings are taken, by number; all without them.
     gyros: Option<[usize; 3]>,
+    /// Readings that a correction does not see.
+    left_out: BTreeSet<Reading>,
     source: Source,
     /// What was given for its files.
     given: Vec<PathBuf>,
@@ -60,6 +63,9 @@ enum Source {
     Files { files: LogFiles, part: Part },
     Events(Arc<[LogEvent]>),
 }
+
+/// A reading of a run: end of its tick (ns), whether it is a gyro's, number of the sensor.
+pub type Reading = (i64, bool, usize);
 
 /// A piece of what a run has, as a correction is fed with it: ticks one by one, for behind a whole frame the unit, and its temperatures,
 /// would stand at the frame's end.
@@ -98,7 +104,15 @@ impl Run {
     }
 
     fn of(name: String, unit: UnitId, source: Source) -> Self {
-        Self { name, unit, gyros: None, source, given: Vec::new(), cut: Cut::default() }
+        Self {
+            name,
+            unit,
+            gyros: None,
+            left_out: BTreeSet::new(),
+            source,
+            given: Vec::new(),
+            cut: Cut::default(),
+        }
     }
 
     /// The same, where folders were given that have its files.
@@ -109,6 +123,26 @@ impl Run {
     /// The same with three of its gyros only, for corrections with a document of these three.
     pub fn of_gyros(&self, gyros: [usize; 3]) -> Self {
         Self { gyros: Some(gyros), ..self.clone() }
+    }
+
+    /// The same without some readings.
+    pub fn without(&self, left_out: BTreeSet<Reading>) -> Self {
+        Self { left_out, ..self.clone() }
+    }
+
+    /// An event in which the readings that are left out are no numbers.
+    fn kept<'a>(&self, event: &'a LogEvent) -> Cow<'a, LogEvent> {
+        let mut kept = Cow::Borrowed(event);
+        let (end_ns, gyro) = (event.time().as_ns(), matches!(event, LogEvent::Gyro { .. }));
+        for (.., sensor) in self.left_out.range((end_ns, gyro, 0)..=(end_ns, gyro, usize::MAX)) {
+            let reading = match kept.to_mut() {
+                LogEvent::Gyro { tick, .. } => tick.readings.get_mut(*sensor),
+                LogEvent::Accel { tick, .. } => tick.readings.get_mut(*sensor),
+                LogEvent::Temperature(_) => None,
+            };
+            reading.into_iter().for_each(|reading| *reading = f64::NAN);
+        }
+        kept
     }
 
     /// An event with the readings of the gyros that are taken. A tick that lacks one of them is left as it is: a correction refuses it.
@@ -134,6 +168,12 @@ impl Run {
             Source::Files { files: LogFiles::Recordings(paths) | LogFiles::Text { paths, .. }, .. } => paths,
             Source::Events(_) => &[],
         }
+    }
+
+    /// What the mapping of a text log says that its accelerometers read; recordings do not say.
+    pub fn accelerometer_unit(&self) -> Option<&'static str> {
+        let Source::Files { files: LogFiles::Text { mapping, .. }, .. } = &self.source else { return None };
+        mapping.files.iter().find_map(|file| Some(file.accel.as_ref()?.sensors.first()?.unit.sent()))
     }
 
     /// The files and folders that it was given as, which documents name; its files where nothing else is known.
@@ -223,7 +263,7 @@ impl Run {
             beside(&fed);
             match fed {
                 fed if !has_accelerometers && fed.is_accel() => {}
-                Fed::Event(event) => to_unit(Fed::Event(&self.taken(event))),
+                Fed::Event(event) => to_unit(Fed::Event(&self.taken(&self.kept(event)))),
                 Fed::Frame(input, frame) => to_unit(Fed::Frame(input, frame)),
             }
             Ok(())

@@ -16,7 +16,7 @@ use crate::axes::AXES;
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::thermal::Stand;
-use crate::fits::thermal::checks::judging;
+use crate::fits::thermal::checks::{far, frozen, judging};
 use crate::numbers::{Size, is_white, norm, real};
 use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
@@ -40,6 +40,8 @@ const WINDOW_S: f64 = 10.0;
 const SAME: f64 = 1e-9;
 /// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
 const DEAD: f64 = 1e-3;
+/// Share of a window that must be there: of a unit at rest its mean lacks nothing by a tick in a hundred.
+const ALMOST_WHOLE: f64 = 0.99;
 /// Share of windows that should be whole.
 const WHOLE: f64 = 0.9;
 /// Largest range of a mean rate of a unit that counts as being at rest (°/h): 5 °/s.
@@ -71,15 +73,22 @@ pub fn validate(
             )));
         }
         let series = run.series(&mut watch)?;
-        readings.push((judging(&run.name, &series, &Stand::default()), series.gyros.length_s()));
+        let at_rest = Stand::default();
+        let mut faults = judging(&run.name, &series, &at_rest);
+        faults.extend(frozen(&run.name, &series, document));
+        let (found, left_out) =
+            far(&run.name, &series, (document, &at_rest), wanted.window_s.unwrap_or(WINDOW_S));
+        faults.extend([found.refusals, found.warnings].concat());
+        readings.push((faults, series.gyros.length_s(), left_out));
     }
-    let longest_s = readings.iter().map(|(_, length_s)| *length_s).fold(0.0, f64::max);
+    let longest_s = readings.iter().map(|(_, length_s, _)| *length_s).fold(0.0, f64::max);
     let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));
-    for (log, (faults, _)) in logs.iter().zip(readings) {
-        let run = &log.run;
+    for (log, (faults, _, left_out)) in logs.iter().zip(readings) {
+        let run = &log.run.without(left_out);
         let documents = [written.loaded.clone(), bare.clone()];
+        let rows = Rows { whole: Some(ALMOST_WHOLE), ..Rows::valid(window_s) };
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
-        let tables = Table::together_seen(run, &documents, Rows::valid(window_s), &mut watch, seen)?;
+        let tables = Table::together_seen(run, &documents, rows, &mut watch, seen)?;
         let mut tables = tables.into_iter();
         let mut next = || tables.next().unwrap_or_default();
         let (after, nominal) = (next(), next());

@@ -8,7 +8,7 @@ use super::driver::{Done, Job, Task};
 use super::output::OutputArgs;
 use super::runs::{BaseArgs, LogArgs};
 use super::units::{Logs, Unit, Work};
-use crate::document::{TOOL, Written, command_line, origin};
+use crate::document::{BASE, TOOL, Written, base_of, command_line, origin};
 use crate::error::Error;
 use crate::fits::drift::columns::{Columns, Kind, unnamed};
 use crate::fits::drift::document::{Parameters, put};
@@ -146,6 +146,7 @@ impl DriftArgs {
         });
         let about = toml::Value::try_from(about).map_err(|error| Error::document(&error))?;
         details.insert("drift".to_owned(), about);
+        details.insert(BASE.to_owned(), base_of(Some(base)));
         whole.details = Some(details);
         document.origin = Some(whole);
         Written::of(&document)

@@ -54,7 +54,9 @@ impl OutputArgs {
             report.warnings.push(format!("every sensor is refused: nothing is written to {}", out.display()));
             return Ok(Done { report, document: None });
         }
-        let document = about.complete(written.document, &job.work.logs(), &report, self.date()?)?;
+        let logs = job.work.logs();
+        let made_from = (job.work.base.as_ref(), &*logs);
+        let document = about.complete(written.document, made_from, &report, self.date()?)?;
         Ok(Done { report, document: Some(document) })
     }
 

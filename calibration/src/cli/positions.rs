@@ -72,9 +72,9 @@ pub(super) struct PositionsArgs {
     /// Reference temperature of the polynomials (°C)
     #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_hyphen_values = true)]
     reference: Option<f64>,
-    /// Unit of the accelerometers' means without a document: "V" or "m/s2"
-    #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
-    accelerometer_unit: String,
+    /// Unit of the accelerometers' means without a document: "V" or "m/s2" (default: the mapping's, else V)
+    #[arg(long, value_name = "UNIT", value_parser = ["V", "m/s2"])]
+    accelerometer_unit: Option<String>,
     #[command(flatten)]
     planned: Budget,
     #[command(flatten)]
@@ -132,7 +132,7 @@ impl PositionsArgs {
         let runs = &work.runs;
         let add = "add [accel] with their channels, nominal scale factors and axes";
         let base = &*work.base_with_accelerometers(add, || {
-            Written::of(&of_run(work.run()?, &self.accelerometer_unit, &mut *watch)?)
+            Written::of(&of_run(work.run()?, self.accelerometer_unit.as_deref(), &mut *watch)?)
         })?;
         let tracks = tracks(runs, base, watch)?;
         let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;

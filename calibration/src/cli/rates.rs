@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use isotherm_cli::Bar;
-use isotherm_correction::earth::Place;
 use isotherm_correction::sample::OutputKind;
 use isotherm_protocol::document::{Document, GyroOutput, Temperature};
 
@@ -68,17 +67,17 @@ pub(super) struct RatesArgs {
 impl RatesArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let place = self.place.place()?;
         let logs = Logs::apart(&self.log, &self.judge, &self.base);
         let task = Task {
             beside: self.steps.as_deref(),
             ..Task::new("Rate table, several units", self.output.files(), logs)
         };
-        task.run(|job| self.output.done(self.fit(job, place.as_slice())?, job))
+        task.run(|job| self.output.done(self.fit(job)?, job))
     }
 
-    fn fit(&self, job: &Job<'_>, place: &[Place]) -> Result<Fitted, Error> {
+    fn fit(&self, job: &Job<'_>) -> Result<Fitted, Error> {
         let work = job.work;
+        let place = &self.place.places([work.runs.len(), work.judges.len()])?;
         let nominal;
         let base = match (&work.base, work.runs.first()) {
             (Some(base), _) => &base.document,

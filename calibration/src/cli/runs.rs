@@ -71,6 +71,13 @@ impl Reading {
         Ok(self.unit.as_deref().map(unit_id).transpose()?)
     }
 
+    /// The part of each log that is read (s since its beginning).
+    pub(super) fn part_s(&self) -> [f64; 2] {
+        let start = self.start.as_s();
+        let end = self.end.map(Span::as_s).or(self.duration.map(|length| start + length.as_s()));
+        [start, end.unwrap_or(f64::INFINITY)]
+    }
+
     /// Runs by unit, each log for itself: every recording is a run, and of text logs as many files as the mapping has.
     pub(super) fn runs(
         &self,

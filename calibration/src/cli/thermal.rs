@@ -2,8 +2,6 @@
 
 mod stands;
 
-use std::path::Path;
-
 use clap::Args;
 use isotherm_correction::units::Span;
 
@@ -55,7 +53,6 @@ pub(super) struct ThermalArgs {
 impl ThermalArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        self.each_once()?;
         let judging = Reading {
             start: self.judge_start.map_or(Span::ZERO, Span::from_s),
             duration: self.judge_duration.map(Span::from_s),
@@ -74,37 +71,6 @@ impl ThermalArgs {
         let base = work.base.as_ref().map(|base| &base.document);
         let fitted = fit(base, (&work.runs, &work.judges), &self.settings(work)?, job.at_work("fitting"))?;
         self.output.done(fitted, job)
-    }
-
-    /// A log counts once, and judges nothing that was fitted to it.
-    fn each_once(&self) -> Result<(), Error> {
-        let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
-            (Ok(a), Ok(b)) => a == b,
-            _ => a == b,
-        };
-        let logs = &self.log.log;
-        let again =
-            logs.iter().enumerate().find(|(at, log)| logs.iter().take(*at).any(|other| same(log, other)));
-        if let Some((_, log)) = again {
-            return Err(Error::Usage(format!(
-                "{} is given twice: cross-validation needs each log once",
-                log.display()
-            )));
-        }
-        let part = |start: f64, length: Option<f64>| [start, length.map_or(f64::INFINITY, |l| start + l)];
-        let fitted = part(self.log.reading.start.as_s(), self.log.reading.duration.map(Span::as_s));
-        let judged = part(self.judge_start.unwrap_or(0.0), self.judge_duration);
-        if fitted[0] >= judged[1] || judged[0] >= fitted[1] {
-            return Ok(());
-        }
-        match self.judge.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
-            None => Ok(()),
-            Some(judge) => Err(Error::Usage(format!(
-                "--judge {}: the document is fitted to the same part of it: give another log, or another part \
-                 (--duration, --judge-start)",
-                judge.display()
-            ))),
-        }
     }
 
     fn settings(&self, work: &Work) -> Result<Settings, Error> {

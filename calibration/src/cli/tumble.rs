@@ -48,9 +48,9 @@ pub(super) struct TumbleArgs {
     /// Shortest pose (s), less half a window at either end
     #[arg(long, hide_short_help = true, value_name = "SECONDS", default_value_t = 1.0, value_parser = above_0)]
     least: f64,
-    /// Unit of the accelerometers' means without a document: "V" (converter readings too) or "m/s2"
-    #[arg(long, value_name = "UNIT", default_value = "V", value_parser = ["V", "m/s2"])]
-    accelerometer_unit: String,
+    /// Unit of the accelerometers' means without a document: "V" (converter readings too) or "m/s2" (default: the mapping's, else V)
+    #[arg(long, value_name = "UNIT", value_parser = ["V", "m/s2"])]
+    accelerometer_unit: Option<String>,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -114,7 +114,7 @@ impl TumbleArgs {
 
     /// A document where there is none.
     fn first_document(&self, run: &Run, bar: Bar) -> Result<Written, Error> {
-        let mut document = of_run(run, &self.accelerometer_unit, bar)?;
+        let mut document = of_run(run, self.accelerometer_unit.as_deref(), bar)?;
         if document.accel.as_ref().is_some_and(|accel| accel.output == AccelOutput::Volts) {
             document.note = Some(
                 "V in this document is the accelerometers' reading in the log: volts, or counts of a converter with \

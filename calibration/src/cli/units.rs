@@ -134,8 +134,35 @@ impl<'a> Logs<'a> {
         self.files.iter().chain(self.judge).map(PathBuf::as_path).chain(self.document).collect()
     }
 
+    /// A log counts once, and judges nothing that was fitted to it.
+    fn each_once(&self) -> Result<(), Error> {
+        let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => a == b,
+        };
+        let logs = self.files;
+        let again =
+            logs.iter().enumerate().find(|(at, log)| logs.iter().take(*at).any(|other| same(log, other)));
+        if let Some((_, log)) = again {
+            return Err(Error::Usage(format!("{} is given twice: each log counts once", log.display())));
+        }
+        let [fitted, judged] = [self.reading, self.judging].map(Reading::part_s);
+        if fitted[0] >= judged[1] || judged[0] >= fitted[1] {
+            return Ok(());
+        }
+        match self.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
+            None => Ok(()),
+            Some(judge) => Err(Error::Usage(format!(
+                "--judge {}: the document is fitted to the same part of it: give another log, or another part \
+                 (--duration, --judge-start)",
+                judge.display()
+            ))),
+        }
+    }
+
     /// The units that there is something to do of: that of the document, else all that the logs have.
     pub(super) fn units(&self) -> Result<Vec<Unit>, Error> {
+        self.each_once()?;
         let folder = self.document.filter(|path| path.is_dir());
         if let Some(document) = self.document.filter(|_| folder.is_none()) {
             let base = Written::read(document)?;

@@ -38,7 +38,7 @@ pub(super) struct ValidateArgs {
 impl ValidateArgs {
     /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let wanted = Wanted { window_s: self.window, place: self.place.known()? };
+        let wanted = Wanted { window_s: self.window, place: self.place.known([1, 0])?.pop() };
         let logs = Logs::judging(&self.log, &self.document);
         let task = Task::new("Judgement of several units", self.page.files(), logs);
         task.run(|job| judged(job, wanted))

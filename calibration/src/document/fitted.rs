@@ -6,6 +6,7 @@ use isotherm_protocol::document::{Created, Document};
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 
+use super::provenance::{BASE, base_of};
 use super::{Written, command_line, origin, tidy};
 use crate::error::Error;
 use crate::report::{Report, Sigmas, residuals};
@@ -39,14 +40,14 @@ pub struct About {
 }
 
 impl About {
-    /// A document with its origin.
+    /// A document with its origin: the document that the fit started from, if any, and its logs.
     ///
     /// # Errors
     /// [`Error::Log`] for a log that cannot be read again, [`Error::Document`].
     pub fn complete(
         &self,
         mut document: Document,
-        logs: &[PathBuf],
+        (base, logs): (Option<&Written>, &[PathBuf]),
         report: &Report,
         created: Created,
     ) -> Result<Written, Error> {
@@ -73,6 +74,7 @@ impl About {
             own.extend(more.clone());
         }
         details.extend(kept(own).map(|own| (self.key.to_owned(), own)));
+        details.insert(BASE.to_owned(), base_of(base));
         self.sigmas.write(&mut details);
         origin.details = Some(details);
         document.origin = Some(origin);

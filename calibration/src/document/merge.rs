@@ -19,6 +19,7 @@ use serde_json::{Map, json};
 use toml::Value;
 
 use crate::document::Written;
+use crate::document::provenance::{BASE, digest_of};
 use crate::document::show::terms::tree;
 use crate::error::Error;
 use crate::report::Report;
@@ -113,6 +114,16 @@ impl Picked {
             let mut after = mine(sections);
             let gone: Vec<String> = before.keys().filter(|key| !after.contains_key(*key)).cloned().collect();
             after.retain(|key, value| before.get(key) != Some(value));
+            let open = |key: &&String| !take.iter().any(|take| covers(&take.key, key));
+            let never: Vec<&str> = gone.iter().filter(open).map(String::as_str).collect();
+            if !after.is_empty() && !never.is_empty() && !is_of(part, base, parts) {
+                conflicts.push(format!(
+                    "{}: in {}, but {} was made from another document, which may not have had this: repeat its fit from {} \
+                     (--calibration), or choose with --take {}={}",
+                    never.join(", "), base.name, part.name, base.name, never[0], base.name
+                ));
+                continue;
+            }
             if !after.is_empty() {
                 let changed = after.into_iter().map(|(key, value)| (key, Some(value)));
                 made.push((
@@ -188,6 +199,13 @@ impl Picked {
             }
         }
     }
+}
+
+/// Whether a part was made from the base or from another part, as far as it says.
+fn is_of(part: &Written, base: &Written, parts: &[Written]) -> bool {
+    let details = part.document.origin.as_ref().and_then(|origin| origin.details.as_ref());
+    let made_from = details.and_then(|details| details.get(BASE)?.as_str());
+    made_from.is_none_or(|digest| parts.iter().chain([base]).any(|one| digest_of(one) == digest))
 }
 
 /// Whether a choice is about a key.

@@ -9,11 +9,24 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::{Log, Origin};
 use sha2::{Digest as _, Sha256};
 
-use crate::document::name_of;
+use crate::document::{Written, name_of};
 use crate::error::Error;
 
 /// Name and version of this program, as documents state it.
 pub const TOOL: &str = concat!("isotherm-calibrate ", env!("CARGO_PKG_VERSION"));
+
+/// Key in `origin.details`: the document that this one was made from.
+pub(crate) const BASE: &str = "base";
+
+/// A document as those made from it name it: the digest of its text, nothing where a fit started without one.
+pub(crate) fn base_of(base: Option<&Written>) -> toml::Value {
+    base.map(digest_of).unwrap_or_default().into()
+}
+
+/// Head of the digest of a document's text.
+pub(super) fn digest_of(document: &Written) -> String {
+    document.loaded.digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
 
 /// The origin of a document made from logs by a command; method, ranges and residuals are the fit's to add.
 ///

@@ -82,3 +82,28 @@ fn examples() -> Vec<Finding> {
 fn all_words() {
     insta::assert_snapshot!(examples().iter().map(|finding| finding.to_string() + "\n").collect::<String>());
 }
+
+#[test]
+fn all_words_of_thermal_fits() {
+    let far = |windows, single| ThermalKind::Far {
+        count: windows,
+        value: 99.0,
+        measure: "°/s",
+        at_s: 12.345,
+        windows,
+        single,
+    };
+    let log = || "judge.csv".to_owned();
+    let axes = || vec!["gyro x".to_owned(), "gyro y".to_owned()];
+    let all = [
+        ThermalKind::BeforeIsBetter { left: [0.2, 9.0], measure: "°/h" },
+        ThermalKind::NotJudged { run: log(), axes: axes(), range_deg_c: Some(0.4), needed: 5.0 },
+        ThermalKind::NotJudged { run: log(), axes: axes(), range_deg_c: None, needed: 5.0 },
+        ThermalKind::SameReadings { log: log(), other: "train.csv".to_owned(), judges: true },
+        ThermalKind::SameReadings { log: log(), other: "train.csv".to_owned(), judges: false },
+        far(1, true),
+        far(80, false),
+        ThermalKind::Frozen { channel: "coil".to_owned(), value: 1.5, window_s: [600.0, 5400.0] },
+    ];
+    insta::assert_snapshot!(all.iter().map(|kind| kind.to_string() + "\n").collect::<String>());
+}

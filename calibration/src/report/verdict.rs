@@ -200,6 +200,11 @@ fn worse(before: &[f64], after: &[f64]) -> Worse {
     if by_chance >= ACCIDENT && !doubled { Worse::ByNoise } else { Worse::Yes }
 }
 
+/// Whether a change made something worse by more than noise.
+pub fn is_worse(before: &[f64], after: &[f64]) -> bool {
+    worse(before, after) == Worse::Yes
+}
+
 /// Verdicts of a second judgement, without what was refused in the first, whose own verdicts stay.
 pub fn beside(first: &[Verdict], second: Vec<Verdict>) -> Vec<Verdict> {
     let refused =

@@ -1,11 +1,14 @@
 //! Columns of readings that nothing can be made of, whatever is to be made of them.
 
 use crate::axes::sensor_name;
-use crate::numbers::real;
+use crate::numbers::{median, percentile, real};
 use crate::report::six;
 
 /// Share of readings that may be no number.
 const LARGEST_MISSING: f64 = 0.01;
+
+/// Times the range of nine in ten readings from the middle one at which a reading is far from all others.
+const FAR: f64 = 10.0;
 
 /// What is wrong with the readings of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +65,14 @@ pub fn missing(column: &[f64]) -> usize {
     column.iter().filter(|reading| !reading.is_finite()).count()
 }
 
+/// Readings of a sensor at rest that are far from all others: their ticks.
+pub fn far(column: &[f64]) -> Vec<usize> {
+    let [low, high] = [5, 95].map(|percent| percentile(column.iter().copied(), percent));
+    let (middle, limit) = (median(column), FAR * (high - low));
+    let is_far = |tick: &usize| limit > 0.0 && (column[*tick] - middle).abs() > limit;
+    (0..column.len()).filter(is_far).collect()
+}
+
 /// The one reading that a column has; `None` where it changes, or has none.
 pub fn dead(column: &[f64]) -> Option<f64> {
     let mut good = column.iter().filter(|reading| reading.is_finite());
@@ -87,5 +98,18 @@ mod tests {
         assert_eq!(found, wanted);
         assert_eq!(Fault::of(&[]), None);
         insta::assert_snapshot!(Fault::Twin(3).words("gyro", 6));
+    }
+
+    #[test]
+    fn far_readings_are_found_beside_drift_noise_and_coarse_counts() {
+        let mut column: Vec<f64> =
+            (0..2000).map(|k| libm::sin(f64::from(k * k)) + 1e-3 * f64::from(k)).collect();
+        assert!(far(&column).is_empty());
+        column[7] = 99.0;
+        column[1500] = f64::NAN;
+        column[1999] = -99.0;
+        assert_eq!(far(&column), [7, 1999]);
+        let counts: Vec<f64> = (0..2000).map(|k| f64::from(u8::from(k % 100 == 0))).collect();
+        assert_eq!((far(&counts), far(&[])), (Vec::new(), Vec::new()));
     }
 }

@@ -102,6 +102,16 @@ impl Series {
 }
 
 impl Ticks {
+    /// Whether more than half of the shorter of two logs is in the other, too: ticks of the same end with the same readings.
+    pub fn overlap(&self, other: &Self) -> bool {
+        let equal = |(tick, end): &(usize, &i64)| {
+            let Ok(twin) = other.end_ns.binary_search(end) else { return false };
+            self.readings.iter().zip(&other.readings).all(|(a, b)| a[*tick].total_cmp(&b[twin]).is_eq())
+        };
+        let alike = self.readings.len() == other.readings.len();
+        alike && 2 * self.end_ns.iter().enumerate().filter(equal).count() > self.len().min(other.len())
+    }
+
     /// Number of ticks.
     pub fn len(&self) -> usize {
         self.end_ns.len()

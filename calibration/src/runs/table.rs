@@ -13,7 +13,7 @@ use isotherm_log::offline::Loaded;
 use super::{Run, Troubles, Watch};
 use crate::error::Error;
 use crate::finding::Kind;
-use crate::numbers::seconds;
+use crate::numbers::{real, seconds};
 
 /// Flags of a tick that carries no reading of its own.
 const NOT_OWN: TickFlags = TickFlags::INTERPOLATED
@@ -42,12 +42,12 @@ pub struct Rows {
     pub length_s: f64,
     /// Which ticks count.
     pub takes: Takes,
-    /// Share of a row that must count, without a gap in it, for the row to have numbers; `None` where any tick is enough.
+    /// Share of a row that must be there and count for the row to have numbers; `None` where any tick is enough.
     pub whole: Option<f64>,
 }
 
 impl Rows {
-    /// Windows without gaps, of valid ticks: what is stated of a unit is a mean over these.
+    /// Windows of valid ticks that are whole but for a thousandth: what is stated of a unit is a mean over these.
     pub const fn valid(length_s: f64) -> Self {
         Self { length_s, takes: Takes::Valid, whole: Some(0.999) }
     }
@@ -73,6 +73,8 @@ pub struct Table {
     pub gap_before: Vec<bool>,
     /// Whether ticks are missing in it.
     pub gap_inside: Vec<bool>,
+    /// Length of those (s).
+    missed_s: Vec<f64>,
     /// Whether a gyro was at its input limit.
     pub overrange: Vec<bool>,
     /// Length of the ticks that count for the rates, and for the forces (s).
@@ -115,7 +117,7 @@ struct Row {
     begin: Option<Timestamp>,
     length_s: f64,
     gap_before: bool,
-    gap_inside: bool,
+    missed_s: f64,
     overrange: bool,
     sums: [[f64; 3]; 2],
     taken_s: [f64; 2],
@@ -130,7 +132,7 @@ impl Row {
                 self.begin = Some(Timestamp::from_ns(begin));
                 self.gap_before = tick.missed > 0;
             }
-            Some(_) => self.gap_inside |= tick.missed > 0,
+            Some(_) => self.missed_s += real(tick.missed) * seconds,
         }
         self.length_s += seconds;
         self.overrange |= tick.gyro_flags.iter().any(|flags| flags.contains(SensorFlags::OVERRANGE));
@@ -226,12 +228,12 @@ impl Table {
         self.time_s.is_empty()
     }
 
-    /// Leaves numbers only in rows that have no gap inside and of which at least this share counts.
+    /// Leaves numbers only in rows of which at least this share is there and counts.
     fn keep_whole(&mut self, share: f64) {
         let kinds = [&mut self.rate_deg_per_h, &mut self.force_m_per_s2];
         for (columns, taken_s) in kinds.into_iter().zip(&self.taken_s) {
             for (row, taken_s) in taken_s.iter().enumerate() {
-                if self.gap_inside[row] || *taken_s <= share * self.length_s[row] {
+                if *taken_s <= share * (self.length_s[row] + self.missed_s[row]) {
                     for column in columns.iter_mut() {
                         column[row] = f64::NAN;
                     }
@@ -267,7 +269,8 @@ impl Table {
         self.length_s.push(row.length_s);
         self.time_s.push(begin_s + 0.5 * row.length_s);
         self.gap_before.push(row.gap_before);
-        self.gap_inside.push(row.gap_inside);
+        self.gap_inside.push(row.missed_s > 0.0);
+        self.missed_s.push(row.missed_s);
         self.overrange.push(row.overrange);
         let [angle, velocity] = row.sums;
         let [rate_s, force_s] = row.taken_s;

@@ -65,6 +65,19 @@ fn drift_states_nothing_beyond_what_a_document_allows() {
 }
 
 #[test]
+fn drift_states_no_ramp_of_a_log_with_gaps() {
+    let folder = tempfile::tempdir().unwrap();
+    let rising = |columns: &mut [Vec<f64>; 3]| {
+        columns[0].iter_mut().enumerate().for_each(|(tick, rate)| *rate += 0.01 * tick as f64);
+    };
+    let states = |kept: fn(usize) -> bool| {
+        let report = crate::command::json(&["drift", &log(folder.path(), rising, kept), "--json"]);
+        report["sensors"][0]["noise"]["R"]["value"].is_number()
+    };
+    assert_eq!([states(|_| true), states(|tick| !(4000..4300).contains(&tick))], [true, false]);
+}
+
+#[test]
 fn drift_leaves_single_readings_far_beyond_the_noise_out() {
     let folder = tempfile::tempdir().unwrap();
     let spoil =

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use isotherm_calibration::document::Written;
-use isotherm_calibration::fits::positions::bare::bare;
+use isotherm_calibration::fits::positions::bare::{bare, of_run};
 use isotherm_calibration::fits::positions::still::StillLimits;
 use isotherm_calibration::fits::positions::track::Track;
 use isotherm_calibration::fits::tumble::acceleration;
@@ -24,6 +24,7 @@ use nalgebra::Matrix3;
 use serde_json::Value;
 
 use crate::command::{data, program, root};
+use crate::simulated_logs::write_text;
 use crate::stand::{self, Dice, GRAVITY, Stand};
 
 fn constant(shape: &Shape) -> f64 {
@@ -408,4 +409,28 @@ fn poses_that_end_long_before_the_log_are_pointed_out() {
     let found = analyse(&changed, &settings()).unwrap();
     assert_eq!(found.poses.len(), 16);
     insta::assert_snapshot!(found.warnings.join("\n"));
+}
+
+#[test]
+fn accelerometers_are_in_what_the_mapping_states() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, path) = (folder.path().join("log.csv"), folder.path().join("mapping.toml"));
+    write_text(&log, &path, &isotherm_simulator::Scenario { duration_s: 10.0, ..mems_chamber(4) });
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (sensors, _) = text.split_once("[[file.temperature]]").unwrap();
+    let output = |unit: &str, given: Option<&str>| {
+        let states = |column: usize| format!("column = {column}, unit = \"raw\"");
+        let stated =
+            |text: String, column| text.replace(&states(column), &states(column).replace("raw", unit));
+        let mapping = Mapping::parse(&(5..8).fold(sensors.to_owned(), stated), "mapping.toml").unwrap();
+        let unit = unit_id("MEMS-0001").unwrap();
+        let (paths, mapping) = (vec![log.clone()], Box::new(mapping));
+        let files = LogFiles::Text { paths, mapping, unit: unit.clone(), batch_ticks: 64 };
+        let run = Run::new("log.csv".to_owned(), unit, files, &Part::default());
+        Ok::<_, String>(of_run(&run, given, ()).map_err(|error| error.to_string())?.accel.unwrap().output)
+    };
+    let (force, volts) = (AccelOutput::MetresPerSecondSquared, AccelOutput::Volts);
+    assert_eq!(["m_per_s2", "volt", "raw"].map(|unit| output(unit, None).unwrap()), [force, volts, volts]);
+    assert_eq!(output("raw", Some("m/s2")), Ok(force));
+    insta::assert_snapshot!(output("m_per_s2", Some("V")).unwrap_err());
 }

@@ -257,3 +257,23 @@ fn faults_of_the_log_that_judges_are_told() {
     let told = [clean, zero, nan, gap, units, jumping].join("\n");
     insta::assert_snapshot!(told.replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
+
+#[test]
+fn some_missing_rows_leave_a_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = isotherm_simulator::presets::mems_chamber(4);
+    let scenario = isotherm_simulator::Scenario { duration_s: 120.0, ..scenario };
+    let windows = |every: u64| {
+        let there = events(&scenario)
+            .filter(|event| !matches!(event, LogEvent::Gyro { tick, .. } if tick.sequence % every == 7));
+        let log = folder.path().join(format!("{every}.mcap"));
+        record_events(&log, "MEMS-0001", there);
+        let document = shipped("MEMS-0001.toml").display().to_string();
+        let (_, said, _) = words(&calibrate(&["validate", &document, &log.display().to_string(), "--json"]));
+        let report: Value = serde_json::from_str(&said).unwrap();
+        let gaps = format!("{:#}", report["warnings"]).contains("gaps in the gyro ticks");
+        (report["verdicts"][0]["out_of_sample"]["after"]["count"].as_u64(), gaps)
+    };
+    // The first window is that of the warming up.
+    assert_eq!((windows(333), windows(100_000)), ((Some(11), true), (Some(11), false)));
+}

@@ -112,7 +112,7 @@ pub struct SigmaModel {
 
 impl SigmaModel {
     /// Those of the parts; `None` where no sensor states any, and none is asked for. A quantisation that is not stated is that of
-    /// counts, whose size (rad or m/s) `counts` gives for gyros and accelerometers.
+    /// counts, whose size (rad or m/s) `counts` gives for gyros and accelerometers; without counts it is 0.
     pub(crate) fn of(
         gyros: &[GyroParts],
         accels: &[AccelParts],
@@ -122,7 +122,8 @@ impl SigmaModel {
         let asked = gyros.iter().any(|gyro| gyro.sigma.is_some()) || accels.iter().any(|a| a.sigma.is_some());
         let filled = |stated: &Option<SigmaParts>, count: Option<f64>| {
             let mut parts = stated.clone().unwrap_or_default();
-            parts.quantisation = parts.quantisation.or(count.map(|count| count / libm::sqrt(12.0)));
+            let counted = count.map(|count| count / libm::sqrt(12.0));
+            parts.quantisation = parts.quantisation.or(counted).or(stated.is_some().then_some(0.0));
             parts
         };
         let gyros = gyros.iter().enumerate().map(|(lane, gyro)| filled(&gyro.sigma, of_gyro(lane)));

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::status::PreLaunchProgress;
+use isotherm_protocol::status::{ActiveCalibration, PreLaunchProgress};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Stands where a value is not known.
@@ -127,6 +127,19 @@ pub(super) fn since_s(seconds: i64) -> String {
     if seconds < 0 { format!("in {words}") } else { words }
 }
 
+/// The age of a calibration in days, where its document states a date only: that is midnight, and hours would say too much.
+pub(super) fn days(calibration: &ActiveCalibration) -> Option<u64> {
+    let dated =
+        calibration.created_unix_s.is_some_and(|created| created.unsigned_abs().is_multiple_of(DAY_S));
+    let age_s = calibration.age_s.and_then(|age_s| u64::try_from(age_s).ok());
+    age_s.filter(|_| dated).map(|age_s| age_s / DAY_S)
+}
+
+/// The age of a calibration, in few characters.
+pub(super) fn age(calibration: &ActiveCalibration) -> Option<String> {
+    days(calibration).map(|days| format!("{days} d")).or(calibration.age_s.map(since_s))
+}
+
 /// How long before `now` a time lies (both in ms since 1970-01-01 UTC); zero where it lies ahead.
 pub(super) fn ago(unix_ms: i64, now_unix_ms: i64) -> Duration {
     Duration::from_millis(u64::try_from(now_unix_ms.saturating_sub(unix_ms)).unwrap_or(0))
@@ -231,6 +244,17 @@ mod tests {
         let times = [0, 119, 120, 7200, 172_799, 172_800].map(|s| since(Duration::from_secs(s)));
         assert_eq!(times, ["0 s", "119 s", "2 min", "2 h", "47 h", "2 d"]);
         assert_eq!((since_s(-7200), ago(5_000, 3_000)), ("in 2 h".to_owned(), Duration::ZERO));
+    }
+
+    #[test]
+    fn the_age_of_a_date_is_in_days() {
+        let of = |created_unix_s, age_s| {
+            age(&ActiveCalibration { created_unix_s, age_s: Some(age_s), ..ActiveCalibration::default() })
+                .unwrap()
+        };
+        let (date, time) = (Some(1_795_219_200), Some(1_795_242_600));
+        assert_eq!([54_000, 140_000, 4_757_400].map(|age_s| of(date, age_s)), ["0 d", "1 d", "55 d"]);
+        assert_eq!((of(time, 54_000), of(date, -7200)), ("15 h".to_owned(), "in 2 h".to_owned()));
     }
 
     #[test]

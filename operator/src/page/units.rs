@@ -63,7 +63,7 @@ fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
     let rate = status.input_rates.gyro_ticks_per_s;
     let rate = figure::or_none(knows_rates(status).then_some(rate), figure::frequency);
     let in_view = channel_in_view(status);
-    let age_s = status.calibration.as_ref().and_then(|calibration| calibration.age_s);
+    let age = status.calibration.as_ref().and_then(figure::age);
     let note = remarks.first();
     let cell = |text: String| Span::styled(text, base);
     let (deg_per_h, mg) = applied(status).map(Into::into).unzip();
@@ -85,7 +85,7 @@ fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
         counter(sums.late, lately.late),
         counter(sums.bad, lately.bad),
         cell(figure::or_none(p99_ns, figure::latency)),
-        cell(figure::or_none(age_s, figure::since_s)),
+        cell(figure::or_none(age, |age| age)),
         Span::styled(
             note.map_or_else(String::new, |remark| remark.words.clone()),
             note.map_or(

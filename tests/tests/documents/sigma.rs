@@ -59,7 +59,6 @@ fn normal(dice: &mut Dice) -> f64 {
 fn gyro_sigma() -> GyroSigma {
     GyroSigma {
         angle_random_walk_deg_per_sqrt_h: Some(0.15),
-        quantisation_arcsec: Some(0.0),
         bias: Some(GyroBiasSigma {
             reference_deg_c: 25.0,
             sigma_deg_per_h: vec![0.0],
@@ -75,7 +74,6 @@ fn gyro_sigma() -> GyroSigma {
 fn accel_sigma(walk_m_per_s_per_sqrt_s: f64) -> AccelSigma {
     AccelSigma {
         velocity_random_walk_m_per_s_per_sqrt_h: Some(walk_m_per_s_per_sqrt_s * 60.0),
-        quantisation_m_per_s: Some(0.0),
         bias: Some(AccelBiasSigma {
             reference_deg_c: 25.0,
             sigma_m_per_s2: vec![0.0],

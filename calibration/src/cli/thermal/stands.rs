@@ -2,11 +2,11 @@
 
 use clap::Args;
 
+use crate::cli::place::{each_or_one, of_log};
 use crate::error::Error;
 use crate::fits::rates::steps::axis;
 use crate::fits::thermal::{Site, Stand, Turning};
 use crate::limits::within;
-use crate::report::counted;
 
 /// Rates of a table that can be used (°/s).
 const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
@@ -14,7 +14,7 @@ const RATES_DEG_PER_S: [f64; 2] = [1.0, 10_000.0];
 /// Place, attitude and turning: each option once for all logs, or once for each.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct StandArgs {
-    /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros
+    /// Geodetic latitude (°, north positive): the Earth's rate is removed from the gyros (default: the mean of each run is)
     #[arg(long, value_name = "DEG", requires = "heading", allow_negative_numbers = true)]
     latitude: Option<f64>,
     /// Heading of the case's x axis from north towards east (°); once for all logs, or for each log in order, then for those of --judge
@@ -35,15 +35,11 @@ pub(in crate::cli) struct StandArgs {
     /// Rate of the table throughout a log (°/s), 0 at rest; likewise
     #[arg(long, value_name = "DEG_PER_S", allow_negative_numbers = true, requires = "axis")]
     rate: Vec<f64>,
-    /// Remove the mean of each run (default without --latitude)
-    #[arg(long, conflicts_with = "latitude")]
-    remove_mean: bool,
 }
 
 impl StandArgs {
     /// One for each of so many runs, and then for each of so many that judge; none where nothing is stated.
     pub(in crate::cli) fn stands(&self, runs: usize, judges: usize) -> Result<Vec<Stand>, Error> {
-        let all = runs + judges;
         let counts = [
             ("--heading", self.heading.len()),
             ("--roll", self.roll.len()),
@@ -51,30 +47,25 @@ impl StandArgs {
             ("--axis", self.axis.len()),
             ("--rate", self.rate.len()),
         ];
-        if let Some((name, count)) = counts.into_iter().find(|(_, count)| *count > 1 && *count != all) {
-            let judging = if judges > 0 { format!(" and {judges} of --judge") } else { String::new() };
-            return Err(Error::Usage(format!(
-                "{count} times {name} for {}{judging}: state it once for all, or once for each log in their order, \
-                 then for those of --judge",
-                counted(runs, "log", "logs")
-            )));
-        }
+        each_or_one(counts, [runs, judges])?;
         if self.latitude.is_none() && self.rate.is_empty() {
             return Ok(Vec::new());
         }
-        (0..all).map(|run| Ok(Stand { site: self.site(run)?, turning: self.turning(run)? })).collect()
+        (0..runs + judges)
+            .map(|run| Ok(Stand { site: self.site(run)?, turning: self.turning(run)? }))
+            .collect()
     }
 
     fn site(&self, run: usize) -> Result<Site, Error> {
-        let (Some(latitude), Some(heading)) = (self.latitude, of_run(&self.heading, run)) else {
+        let (Some(latitude), Some(heading)) = (self.latitude, of_log(&self.heading, run)) else {
             return Ok(Site::Unknown);
         };
-        let tilt = of_run(&self.pitch, run).zip(of_run(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
+        let tilt = of_log(&self.pitch, run).zip(of_log(&self.roll, run)).map(|(pitch, roll)| [pitch, roll]);
         Ok(Site::at(latitude, heading, tilt, self.gravity)?)
     }
 
     fn turning(&self, run: usize) -> Result<Option<Turning>, Error> {
-        let Some((name, rate_deg_per_s)) = of_run(&self.axis, run).zip(of_run(&self.rate, run)) else {
+        let Some((name, rate_deg_per_s)) = of_log(&self.axis, run).zip(of_log(&self.rate, run)) else {
             return Ok(None);
         };
         let axis = axis(&name).map_err(Error::Usage)?;
@@ -90,9 +81,4 @@ impl StandArgs {
         }
         Ok(Some(Turning { axis, rate_deg_per_s }))
     }
-}
-
-/// The value of a run where each has its own, or all have one.
-fn of_run<T: Clone>(values: &[T], run: usize) -> Option<T> {
-    if values.len() == 1 { values.first() } else { values.get(run) }.cloned()
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use isotherm_protocol::document::{Log, Origin};
 use toml::{Table, Value};
 
+use crate::document::provenance::{BASE, base_of};
 use crate::document::show::terms::tree;
 use crate::document::{TOOL, Written, command_line};
 use crate::error::Error;
@@ -37,7 +38,8 @@ pub(super) fn origin(
         }
     }
     log.truncate(MOST_LOGS);
-    let mut details = Table::from_iter([("parts".to_owned(), Value::Table(kept))]);
+    let parts = ("parts".to_owned(), Value::Table(kept));
+    let mut details = Table::from_iter([parts, (BASE.to_owned(), base_of(Some(base)))]);
     sigmas(&documents, from).write(&mut details);
     let origins = || documents.iter().filter_map(|document| document.document.origin.as_ref());
     Ok(Origin {

@@ -152,3 +152,28 @@ fn what_does_not_go_together_is_refused_by_key() {
     });
     insta::assert_snapshot!(reasons.join("\n\n"));
 }
+
+#[test]
+fn what_a_parts_own_base_never_had_is_a_conflict() {
+    let base = named("base.toml", |document| {
+        document.gyro.sensor[0].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
+    });
+    let part = |made_from: &str| {
+        named("part.toml", |document| {
+            bias(7.0)(document);
+            let details = toml::Table::from_iter([(BASE.to_owned(), made_from.into())]);
+            document.origin.get_or_insert_default().details = Some(details);
+        })
+    };
+    let gone = [("gyro.sensor.x.lag".to_owned(), "part.toml".to_owned())];
+    assert_eq!(merge(&base, &[part(&digest_of(&base))], &[]).unwrap().gone, gone);
+    let mut told = Vec::new();
+    for other in ["0123456789abcdef", ""] {
+        let Err(Error::Refused(conflicts)) = merge(&base, &[part(other)], &[]) else { panic!("a conflict") };
+        told.extend(conflicts);
+        let take = |from: &str| [Take { key: "gyro.sensor.x.lag".into(), from: from.into() }];
+        assert!(merge(&base, &[part(other)], &take("base.toml")).unwrap().gone.is_empty());
+        assert_eq!(merge(&base, &[part(other)], &take("part.toml")).unwrap().gone, gone);
+    }
+    insta::assert_snapshot!(told.join("\n"));
+}

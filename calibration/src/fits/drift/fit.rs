@@ -161,7 +161,7 @@ fn finish(
 ) -> Analysis {
     let overlapping = variances.iter().filter(|(estimator, _)| *estimator == Estimator::Overlapping);
     let fitted: Vec<Variance> = overlapping.map(|(_, variance)| *variance).collect();
-    let noise = NoiseFit::of(&fitted, grid.tick_s);
+    let noise = NoiseFit::of(&fitted, grid.tick_s).map(|noise| noise.of_pieces(sensor.pieces.len()));
     let slow = prepared.slow.clone();
     let markov = Fit::with_daily_lines(&slow, 1);
     let beside = markov.as_ref().map(|(fit, _)| fit.beside.periods_h.clone());

@@ -1,7 +1,7 @@
 //! Columns cut at their gaps, and what cannot be analysed at all.
 
 pub mod checks;
-mod far;
+pub mod far;
 pub(crate) mod steps;
 
 use super::columns::Columns;
@@ -193,7 +193,7 @@ fn words(gaps: &[Gap], bridge: bool, tick_s: f64) -> Vec<String> {
         let missing: usize = long.iter().map(|gap| gap.missing).sum();
         notes.push(format!(
             "{} ({}, the longest of {} s) {} the log into {} pieces: Allan differences and spectra do not extend \
-             over a gap.",
+             over a gap, and R is not stated.",
             counted(long.len(), "gap", "gaps"),
             counted(missing, "tick", "ticks"),
             short(real(longest) * tick_s),

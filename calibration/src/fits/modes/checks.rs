@@ -10,9 +10,9 @@ use super::switches::Switches;
 use super::{steps, units};
 use crate::axes::AXES;
 use crate::document::gyro_name;
-use crate::numbers::{Size, dot, ends, median, real, scatter_of_steps};
-use crate::report::{counted, short, six};
-use crate::runs::swapped::Shown;
+use crate::numbers::{Size, dot, ends, median, real, scatter_of_steps, unit};
+use crate::report::{counted, fixed, short, six};
+use crate::runs::swapped::{Looks, Shown};
 
 /// Fewest switches.
 const SWITCHES: usize = 8;
@@ -34,6 +34,9 @@ const COUNTS: f64 = 4.0;
 const PUSH_M_PER_S2: f64 = 5e-3;
 /// Largest mean rate of a unit at rest, Earth rate apart (°/h): 0.05 °/s.
 pub(super) const TURNING_DEG_PER_H: f64 = 180.0;
+/// Difference of the rate about the vertical from the Earth's that is told (°/h), and cosine between gyros for which it is not.
+const VERTICAL_DEG_PER_H: f64 = 3.0;
+const SKEWED: f64 = 0.1;
 /// Parts of the runs: what differs between their means is drift, not noise.
 const PARTS: usize = 20;
 
@@ -197,7 +200,7 @@ pub(super) fn lacks_temperatures(gathered: &Gathered) -> bool {
 }
 
 /// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
-pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, force: Option<[f64; 3]>) -> Vec<String> {
+pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, force: Option<[f64; 3]>) -> Vec<Looks> {
     let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
     let looks = |of: [&'static str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
         let sizes = [0, 1, 2].map(|axis| {
@@ -213,7 +216,31 @@ pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, force: Option<[f64;
         looks(["gyros", "°/h"], |second| second.rate, earth),
         looks(["accelerometers", "m/s²"], |second| second.force, force),
     ];
-    words.into_iter().flatten().map(|looks| looks.to_string()).collect()
+    words.into_iter().flatten().collect()
+}
+
+/// That the rate about the vertical (gyros along these axes) is not the Earth's (rad/s) at the stated latitude: gravity shows the
+/// vertical, and heading has no part in it.
+pub fn vertical(
+    seconds: &[Second],
+    rows: [[f64; 3]; 3],
+    (earth, force): ([f64; 3], [f64; 3]),
+) -> Option<String> {
+    let up = unit(force);
+    // Skewed gyros by threes do not span the case evenly.
+    let even = (0..3).all(|a| (0..a).all(|b| dot(rows[a], rows[b]).abs() < SKEWED));
+    let mean =
+        |axis: usize| Size::of(&seconds.iter().map(|second| second.rate[axis]).collect::<Vec<f64>>()).mean;
+    let shown = (0..3).map(|axis| mean(axis) * dot(rows[axis], up)).sum::<f64>();
+    let stated = earth_along(up, earth);
+    (even && (shown - stated).abs() > VERTICAL_DEG_PER_H).then(|| {
+        format!(
+            "the gyros show {} °/h about the vertical, the Earth turns by {} °/h about it at the stated latitude: unless their \
+             bias is that large, --latitude is wrong",
+            fixed(shown, 2),
+            fixed(stated, 2)
+        )
+    })
 }
 
 /// The first motion of each kind.

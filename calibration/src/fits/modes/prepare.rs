@@ -78,7 +78,13 @@ pub(super) fn check(
         }
         return Err(Error::Refused(reasons));
     }
-    Ok(checks::attitude(&gathered.seconds, along, wanted.place.as_ref().and_then(force_at_rest)))
+    let force = wanted.place.as_ref().and_then(force_at_rest);
+    let looks = checks::attitude(&gathered.seconds, along, force);
+    let rows = group.map(|sensor| document::row(bare, sensor, f64::NAN));
+    // Swapped columns have no vertical to speak of.
+    let level = earth.zip(force.or(gathered.force)).filter(|_| looks.iter().all(|one| one.order.is_none()));
+    let vertical = level.and_then(|of| checks::vertical(&gathered.seconds, rows, of));
+    Ok(looks.iter().map(ToString::to_string).chain(vertical).collect())
 }
 
 pub(super) fn gaps(gathered: &Gathered, warnings: &mut Vec<String>) {

@@ -35,13 +35,22 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
     Ok(plain(series.unit.as_str(), GyroOutput::Mean, temperature, Some(accel_output)))
 }
 
-/// The same from a run whose readings that are no counts are in "V" or "m/s2".
+/// The same from a run whose readings that are no counts are in "V" or "m/s2"; where nobody says, in what its mapping states, or else V.
 ///
 /// # Errors
-/// As [`Run::series`] and [`bare`].
-pub fn of_run(run: &Run, accelerometer_unit: &str, watch: impl Watch) -> Result<Document, Error> {
+/// As [`Run::series`] and [`bare`]; [`Error::Usage`] where the mapping states another unit.
+pub fn of_run(run: &Run, accelerometer_unit: Option<&str>, watch: impl Watch) -> Result<Document, Error> {
+    let of_log = run.accelerometer_unit().filter(|unit| ["V", "m/s²"].contains(unit));
+    if let (Some(given), Some(of_log)) = (accelerometer_unit, of_log)
+        && given != of_log.replace('²', "2")
+    {
+        return Err(Error::Usage(format!(
+            "--accelerometer-unit is {given}, the mapping of {} states {of_log}: leave the option out, or correct the mapping",
+            run.name
+        )));
+    }
     let series = run.series(watch)?;
-    let output = match (series.accels.output, accelerometer_unit) {
+    let output = match (series.accels.output, accelerometer_unit.or(of_log).unwrap_or("V")) {
         (Some(OutputKind::Counts), _) => AccelOutput::Counts,
         (_, "V") => AccelOutput::Volts,
         _ => AccelOutput::MetresPerSecondSquared,

@@ -1,5 +1,7 @@
 //! What must hold of a run before anything is fitted to it; every refusal says what to do.
 
+use std::collections::BTreeSet;
+
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 use isotherm_protocol::document::Document;
@@ -7,9 +9,13 @@ use isotherm_protocol::document::Document;
 use super::samples::Samples;
 use super::stand::Stand;
 use crate::axes::sensor_name;
+use crate::document::accelerometers;
+use crate::finding::ThermalKind;
 use crate::fits::drift::pieces::checks::moves;
+use crate::fits::drift::pieces::far::SINGLE;
 use crate::numbers::{Size, dot, ends, median, median_if_any, norm, real, seconds};
-use crate::report::{Rest, counted, short};
+use crate::report::{Rest, counted, output_unit, short};
+use crate::runs::Reading;
 use crate::runs::faults::{self, Fault};
 use crate::runs::series::{Series, Ticks};
 use crate::runs::swapped::{Looks, Shown};
@@ -29,8 +35,20 @@ const BESIDE: usize = 3;
 const FEWEST: usize = 100;
 /// Smallest range of temperature that is worth a fit (°C).
 pub const SMALLEST_RANGE_DEG_C: f64 = 5.0;
+/// Share of the windows that may have readings far from all others.
+const MOST_FAR: f64 = 0.1;
+/// Share of a run over which a thermometer may read the same, and readings that say nothing of it.
+const LARGEST_FROZEN: f64 = 0.5;
+const FEWEST_FROZEN: usize = 10;
+/// Distance of ticks, over the usual one, from which on one is missing.
+const MISSING_TICK: f64 = 1.75;
 /// Share of readings that may be no number, or of time that may be missing, before a warning.
 const SMALL_SHARE: f64 = 0.001;
+
+/// Whether temperatures (°C) move enough to fit or to judge.
+pub fn moves_enough(deg_c: &[f64]) -> bool {
+    Size::of(deg_c).peak_to_peak >= SMALLEST_RANGE_DEG_C
+}
 
 /// What was found: nothing can be done without the first, the second is to be looked at.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -123,7 +141,7 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let first = ticks.end_ns.first().copied().unwrap_or_default();
     for pair in ticks.end_ns.windows(2) {
         let (gap, since) = (seconds(pair[1].saturating_sub(pair[0])), seconds(pair[0].saturating_sub(first)));
-        if gap > 3.0 * step {
+        if gap > MISSING_TICK * step {
             count += 1;
             missing += gap - step;
             if gap > longest {
@@ -189,6 +207,70 @@ fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate
             high - low
         ));
     }
+}
+
+/// Readings of a unit at rest that are far from all others, to be left out with their windows; refused where they are many, or follow
+/// each other. Counts of mode switches are for the correction to pass over.
+pub fn far(
+    name: &str,
+    series: &Series,
+    (document, stand): (&Document, &Stand),
+    window_s: f64,
+) -> (Findings, BTreeSet<Reading>) {
+    let (mut found, mut all) = (Findings::default(), BTreeSet::new());
+    let kinds = [(true, "gyro", &series.gyros), (false, "accelerometer", &series.accels)];
+    for (gyro, kind, ticks) in kinds.into_iter().filter(|_| stand.turning.is_none()) {
+        let first = ticks.end_ns.first().copied().unwrap_or_default();
+        let since_s = |tick: usize| seconds(ticks.end_ns[tick].saturating_sub(first));
+        let (measure, scale) = match (ticks.output, gyro) {
+            (Some(OutputKind::Mean), true) => ("°/s", 1_f64.to_degrees()),
+            (Some(OutputKind::Mean), false) => (output_unit(document), 1.0),
+            _ => ("counts", 1.0),
+        };
+        for (index, readings) in ticks.readings.iter().enumerate() {
+            let far = faults::far(readings);
+            let Some(at) = far.first().copied().filter(|_| !gyro || document.mode_reversal.is_none()) else {
+                continue;
+            };
+            let mut windows: Vec<f64> =
+                far.iter().map(|tick| libm::floor(since_s(*tick) / window_s)).collect();
+            windows.dedup();
+            let few = real(windows.len()) * window_s <= (MOST_FAR * ticks.length_s()).max(window_s);
+            let single = few && far.chunk_by(|a, b| a + 1 == *b).all(|row| row.len() <= SINGLE);
+            let (count, value, at_s) = (far.len(), scale * readings[at], since_s(at));
+            let words = ThermalKind::Far { count, value, measure, at_s, windows: windows.len(), single };
+            let to = if single { &mut found.warnings } else { &mut found.refusals };
+            to.push(format!("{name}: {kind} {}: {words}", sensor_name(index, ticks.readings.len())));
+            all.extend(far.into_iter().filter(|_| single).map(|tick| (ticks.end_ns[tick], gyro, index)));
+        }
+    }
+    (found, all)
+}
+
+/// Thermometers that sensors of a document follow and that read the same for the larger part of a run.
+pub fn frozen(name: &str, series: &Series, document: &Document) -> Vec<String> {
+    let gyros = document.gyro.sensor.iter().map(|sensor| sensor.channel.as_deref());
+    let accels = accelerometers(document)
+        .iter()
+        .flat_map(|own| [own.channel.as_deref(), own.board_channel.as_deref()]);
+    let followed: BTreeSet<&str> = gyros.chain(accels).flatten().collect();
+    let words = |channel: &str| {
+        let readings = series.temperatures.get(channel)?;
+        let mut from = 0;
+        let runs = readings.raw.chunk_by(|a, b| (a - b).abs() <= 0.0).map(|run| {
+            from += run.len();
+            [from - run.len(), from - 1]
+        });
+        let since_s = readings.since_s();
+        let [from, to] = runs.max_by_key(|[from, to]| to - from)?;
+        let [begin_s, end_s] = [since_s[from], since_s[to]];
+        let still = to - from >= FEWEST_FROZEN && end_s - begin_s > LARGEST_FROZEN * since_s.last()?;
+        still.then(|| {
+            let (channel, value) = (channel.to_owned(), readings.raw[from]);
+            format!("{name}: {}", ThermalKind::Frozen { channel, value, window_s: [begin_s, end_s] })
+        })
+    };
+    followed.into_iter().filter_map(words).collect()
 }
 
 /// Whether a run on a rate table turns as it was stated, all the time; why not, and what to do.

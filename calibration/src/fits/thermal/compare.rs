@@ -5,14 +5,17 @@ use isotherm_log::offline::Loaded;
 use isotherm_pages::Table as Rows;
 use isotherm_protocol::document::{Document, Sample};
 
+use super::checks::moves_enough;
 use super::columns::Term;
 use super::outcome::{Outcome, axis_of};
 use super::stand::Stand;
 use crate::axes::output_name;
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
-use crate::numbers::{real, scatter_of_steps};
-use crate::report::{Curve, Rest, or_dash, short};
+use crate::finding::ThermalKind;
+use crate::numbers::{Size, real, scatter_of_steps};
+use crate::report::curve::channel_of;
+use crate::report::{Curve, Rest, is_worse, or_dash, short};
 use crate::runs::table::{Rows as Windows, Table};
 use crate::runs::{Run, Watch};
 
@@ -50,6 +53,8 @@ struct Stage<'a> {
 pub(super) struct Compared {
     rms: [Option<[f64; HEAD.len()]>; AXES],
     levels: [[f64; 2]; AXES],
+    /// What the document before and the new one leave of each axis, window by window.
+    left: [[Vec<f64>; 2]; AXES],
 }
 
 /// Which of the rivals.
@@ -65,7 +70,8 @@ impl Compared {
         judging: &[Stage<'_>],
         mut watch: impl Watch,
     ) -> Result<Self, Error> {
-        let loaded: Vec<Loaded> = documents.into_iter().map(Written::compiled).collect::<Result<_, _>>()?;
+        let loaded: Vec<Loaded> =
+            documents.iter().copied().map(Written::compiled).collect::<Result<_, _>>()?;
         let mut levels = [[(0.0, 0.0); DOCUMENTS]; AXES];
         for stage in fitted {
             let tables = stage.tables(&loaded, &mut watch)?;
@@ -80,18 +86,21 @@ impl Compared {
         let levels =
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
         let mut sums: [[Sum; HEAD.len()]; AXES] = Default::default();
+        let mut left: [[Vec<f64>; 2]; AXES] = Default::default();
         for stage in judging {
             let tables = stage.tables(&loaded, &mut watch)?;
             let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
-            for axis in (0..AXES).filter(|axis| stage.counts(*axis)) {
-                add(&mut sums[axis], &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
+            let judges = |axis: &usize| stage.counts(*axis) && moves(&tables, documents[0], *axis);
+            for axis in (0..AXES).filter(judges) {
+                let into = (&mut sums[axis], &mut left[axis]);
+                add(into, &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
             }
         }
         let rms = sums.map(|axis| {
             let known = axis.iter().all(|(_, count)| *count > 0.0);
             known.then(|| axis.map(|(square, count)| (square / count).sqrt()))
         });
-        Ok(Self { rms, levels: levels.map(|axis| [axis[0], axis[3]]) })
+        Ok(Self { rms, levels: levels.map(|axis| [axis[0], axis[3]]), left })
     }
 
     /// Levels before and after, for a run that is another part of a log of the fit.
@@ -111,18 +120,12 @@ impl Compared {
         }
     }
 
-    /// Warns of axes of which the document before leaves less than the new one.
-    pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
-        self.rms.iter().enumerate().filter_map(|(axis, rms)| {
-            let [.., new, before] = (*rms)?;
-            let (of, (new_words, before_words)) = (output_name(axis < 3, axis % 3), (short(new), short(before)));
-            (before < new && before_words != new_words).then(|| {
-                let unit = if axis < 3 { "°/h" } else { "m/s²" };
-                format!(
-                    "{of}: on the judging runs this document leaves {new_words} {unit}, the one before it {before_words}: \
-                     keep that one"
-                )
-            })
+    /// That the document before leaves less of an axis than the new one, by more than noise.
+    pub(super) fn before_is_better(&self, axis: usize) -> Option<ThermalKind> {
+        let [before, new] = self.left.get(axis)?;
+        is_worse(before, new).then(|| ThermalKind::BeforeIsBetter {
+            left: [before, new].map(|left| Size::of(left).rms),
+            measure: if axis < 3 { "°/h" } else { "m/s²" },
         })
     }
 
@@ -214,7 +217,7 @@ impl Stage<'_> {
 
 /// Adds the squares of what is left of an axis in windows that all have.
 fn add(
-    sums: &mut [Sum; HEAD.len()],
+    (sums, left): (&mut [Sum; HEAD.len()], &mut [Vec<f64>; 2]),
     tables: &[Table],
     (axis, truth): (usize, Option<f64>),
     levels: [f64; DOCUMENTS],
@@ -239,6 +242,16 @@ fn add(
             *number += 1.0;
         }
     }
+    for (left, document) in left.iter_mut().zip([4, 3]) {
+        left.extend(good.iter().map(|&row| columns[document][row] - off(document)));
+    }
+}
+
+/// Whether the temperature that an axis follows moves enough for a judgement.
+fn moves(tables: &[Table], document: &Document, axis: usize) -> bool {
+    let channel = channel_of(document, axis < 3, axis % 3);
+    let column = channel.and_then(|channel| tables.first()?.temperature_deg_c.get(&channel));
+    column.is_some_and(|deg_c| moves_enough(deg_c))
 }
 
 fn column(table: &Table, axis: usize) -> &[f64] {

@@ -17,7 +17,9 @@ use super::stand::Stand;
 use super::target::{rest, target};
 use crate::document::{Fitted, accelerometers};
 use crate::error::Error;
+use crate::finding::ThermalKind;
 use crate::report::{Rest, six};
+use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
 use crate::runs::{Run, Watch};
 
@@ -51,7 +53,7 @@ pub fn fit(
 ) -> Result<Fitted, Error> {
     let mut warnings = Vec::new();
     let (mut refusals, mut dead) = (Vec::new(), Vec::new());
-    let mut series = Vec::new();
+    let mut series: Vec<Series> = Vec::new();
     let stands: Vec<Stand> = (0..runs.len() + judges.len()).map(|run| settings.stand(run)).collect();
     let all =
         || runs.iter().chain(judges).zip(&stands).enumerate().map(|(index, of)| (index < runs.len(), of));
@@ -65,6 +67,7 @@ pub fn fit(
         } else {
             warnings.extend(checks::judging(&run.name, &of_run, stand));
         }
+        refusals.extend(twins((run, &of_run), series.iter().zip(runs.iter().chain(judges)), !is_fitted));
         series.push(of_run);
     }
     let first = series.first().ok_or_else(|| Error::refused("there is no run to fit to"))?;
@@ -97,9 +100,18 @@ pub fn fit(
         &Settings { fit_window_s: settings.fit_window_s.max(libm::ceil(step_s)), ..settings.clone() };
     let mut samples = Vec::new();
     let mut rests = Vec::new();
+    let mut sound = Vec::new();
     for ((is_fitted, (run, stand)), series) in all().zip(&series) {
-        let of_run = Samples::of(run, series, &plain, stand.window_s(settings.fit_window_s), &mut watch)?;
-        let (of_rest, found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        let window_s = stand.window_s(settings.fit_window_s);
+        let (of_readings, far) = checks::far(&run.name, series, (&plain, stand), window_s);
+        let run = &run.without(far);
+        sound.push(run.clone());
+        let of_run = Samples::of(run, series, &plain, window_s, &mut watch)?;
+        let (of_rest, mut found) =
+            stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        found.refusals.extend(checks::frozen(&run.name, series, &plain));
+        found.refusals.extend(of_readings.refusals);
+        found.warnings.extend(of_readings.warnings);
         if is_fitted {
             rests.extend(of_rest);
             refusals.extend(found.refusals);
@@ -134,7 +146,20 @@ pub fn fit(
         sensors_of(&mut outcome, columns, &all, (known, longest_s), &samples)?;
         outcome.history(name, &known.history);
     }
-    outcome.finish((runs, judges), |run, stand| rest(run, &base, stand, ()), watch)
+    outcome.finish(sound.split_at(runs.len()), |run, stand| rest(run, &base, stand, ()), watch)
+}
+
+/// The logs that have the same readings as a run.
+fn twins<'a>(
+    (run, series): (&Run, &Series),
+    known: impl Iterator<Item = (&'a Series, &'a Run)>,
+    judges: bool,
+) -> Vec<String> {
+    let same = known.filter(|(other, _)| series.gyros.overlap(&other.gyros));
+    let words = |(_, other): (&Series, &Run)| {
+        ThermalKind::SameReadings { log: run.name.clone(), other: other.name.clone(), judges }.to_string()
+    };
+    same.map(words).collect()
 }
 
 /// Whether a run feels what it must in its stated attitude, and what it would put out without error where it does.

@@ -4,9 +4,9 @@ use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Document, Filter, Sample};
 
 use super::branches::History;
-use super::checks::SMALLEST_RANGE_DEG_C;
+use super::checks::{SMALLEST_RANGE_DEG_C, moves_enough};
 use super::columns::{Basis, Term};
-use super::compare;
+use super::compare::{self, Compared};
 use super::fit::Sensor;
 use super::joint::Found;
 use super::model::{put_accel, put_gyro};
@@ -15,7 +15,8 @@ use super::stand::Stand;
 use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
-use crate::numbers::Size;
+use crate::finding::ThermalKind;
+use crate::numbers::{Size, once_each};
 use crate::report::{Curve, FLAT, Judged, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
@@ -121,9 +122,9 @@ impl Outcome {
                 let counts = if stand.turning.is_none() { "" } else { "gyro" };
                 Ok((rest, Rows::valid(stand.window_s(window_s)), counts))
             };
-            let Judged { curves, mut troubles } =
+            let Judged { mut curves, mut troubles } =
                 judge((runs, judges), [&before, &written], of_run, &mut watch)?;
-            troubles.extend(constant(&curves));
+            troubles.extend(unjudged(&mut curves));
             let verdicts = Curve::verdicts(&curves);
             if verdicts.is_empty() {
                 let nothing = "no window of any axis is complete: the log has gaps, or all its ticks are flagged; \
@@ -131,13 +132,12 @@ impl Outcome {
                 return Err(Error::Refused([vec![nothing.to_owned()], troubles].concat()));
             }
             // Every time round there is a sensor less.
-            if !self.take_out(&verdicts) {
+            if !self.take_out(&verdicts, &compared) {
                 break (document, curves, verdicts, troubles, compared);
             }
         };
         let table = compared.table(&self, &curves);
-        self.warnings.extend(compared.warnings());
-        self.say(&mut verdicts);
+        self.say(&mut verdicts, !judges.is_empty());
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
         }
@@ -187,20 +187,27 @@ impl Outcome {
         document
     }
 
-    /// Takes the terms of sensors out whose axis became worse; whether there was one.
-    fn take_out(&mut self, verdicts: &[Verdict]) -> bool {
-        let mut worse = false;
-        for verdict in verdicts {
-            let mine = self.found.iter_mut().find(|(sensor, _, found)| {
-                axis_name(sensor).as_ref() == Some(&verdict.of) && found.refused.is_none()
-            });
-            let Some((_, _, found)) = mine.filter(|_| !verdict.accepted) else { continue };
-            let sample = if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
-            found.refused = Some(format!("{sample} its {}", verdict.reason));
+    /// Takes the terms of sensors out whose axis became worse, by the verdicts or than it is with the document before; whether there was
+    /// one.
+    fn take_out(&mut self, verdicts: &[Verdict], compared: &Compared) -> bool {
+        let why = |sensor: &Sensor| {
+            let axis = axis_name(sensor)?;
+            let worse =
+                verdicts.iter().find(|verdict| verdict.of == axis && !verdict.accepted).map(|verdict| {
+                    let sample =
+                        if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
+                    format!("{sample} its {}", verdict.reason)
+                });
+            let than_before = || compared.before_is_better(axis_of(sensor)?).map(|kind| kind.to_string());
+            worse.or_else(|| than_before().filter(|_| self.had_terms(sensor)))
+        };
+        let standing = self.found.iter().map(|(sensor, _, found)| found.refused.is_none().then_some(sensor));
+        let reasons: Vec<Option<String>> = standing.map(|sensor| why(sensor?)).collect();
+        for ((.., found), why) in self.found.iter_mut().zip(&reasons).filter(|(_, why)| why.is_some()) {
+            found.refused.clone_from(why);
             found.terms.clear();
-            worse = true;
         }
-        worse
+        reasons.iter().any(Option::is_some)
     }
 
     /// That a refused sensor keeps terms which were made with another filter: a document has one for all its sensors.
@@ -249,7 +256,7 @@ impl Outcome {
     }
 
     /// Gives the verdicts their reasons.
-    fn say(&self, verdicts: &mut [Verdict]) {
+    fn say(&self, verdicts: &mut [Verdict], judged: bool) {
         for verdict in verdicts {
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
             let Some((sensor, _, found)) = mine else { continue };
@@ -267,29 +274,27 @@ impl Outcome {
                     (true, false) => format!("{FLAT}; constant bias"),
                     (false, _) => found.words.clone(),
                 };
-                *verdict = verdict.clone().remark(words);
+                let unjudged = if judged && verdict.out_of_sample.is_none() { "; not judged" } else { "" };
+                *verdict = verdict.clone().remark(words + unjudged);
             }
         }
     }
 }
 
-/// Judging runs over which a temperature hardly moves.
-fn constant(curves: &[Curve]) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
-    for curve in curves.iter().filter(|curve| curve.sample == Sample::Out) {
-        let range = Size::of(&curve.temperature_deg_c).peak_to_peak;
-        if !curve.temperature_deg_c.is_empty() && range < SMALLEST_RANGE_DEG_C {
-            let run = &curve.run;
-            let of = format!(
-                "{run}: its temperature moves by {range:.1} °C, at least {SMALLEST_RANGE_DEG_C} °C are needed for \
-                 judging: use a run through the chamber"
-            );
-            if words.iter().all(|other| !other.starts_with(&format!("{run}: "))) {
-                words.push(of);
-            }
-        }
-    }
-    words
+/// Leaves out the curves of judging runs over which their temperature is not known or hardly moves; says so.
+fn unjudged(curves: &mut Vec<Curve>) -> Vec<String> {
+    let idle = |curve: &Curve| curve.sample == Sample::Out && !moves_enough(&curve.temperature_deg_c);
+    let runs = once_each(curves.iter().filter(|curve| idle(curve)).map(|curve| curve.run.clone()));
+    let words = |run: String| {
+        let mine = || curves.iter().filter(|curve| idle(curve) && curve.run == run);
+        let ranges = mine().map(|curve| Size::of(&curve.temperature_deg_c)).filter(|size| size.count > 0);
+        let range_deg_c = ranges.map(|size| size.peak_to_peak).reduce(f64::max);
+        let axes = mine().map(|curve| curve.of.clone()).collect();
+        ThermalKind::NotJudged { run, axes, range_deg_c, needed: SMALLEST_RANGE_DEG_C }.to_string()
+    };
+    let told = runs.into_iter().map(words).collect();
+    curves.retain(|curve| !idle(curve));
+    told
 }
 
 /// The case axis that a sensor of a unit with three stands for, gyros first.

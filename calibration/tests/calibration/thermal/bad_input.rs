@@ -426,6 +426,82 @@ fn gaps_are_told() {
     );
 }
 
+/// A judging run beside one that is fitted.
+fn judged(judge: Run) -> Result<Fitted, Error> {
+    fit(None, (&[run(0..5400, usual)], &[judge]), &Settings::default(), ())
+}
+
+/// A second of another run of the same unit.
+fn other(s: u32) -> Second {
+    let mut second = usual(s);
+    second.rates.iter_mut().for_each(|rate| *rate += 1e-6 * (f64::from(s * 31 % 17) / 17.0 - 0.5));
+    second
+}
+
+#[test]
+fn a_run_without_a_moving_temperature_does_not_judge() {
+    let made = judged(run(0..5400, other)).unwrap();
+    assert!(made.report.verdicts.iter().all(|verdict| verdict.out_of_sample.is_some()));
+    let mut deaf = events(0..5400, other);
+    deaf.retain(|event| !matches!(event, LogEvent::Temperature(_)));
+    let mut told = String::new();
+    for judge in [run_of(deaf), run(0..700, other)] {
+        let report = judged(judge).unwrap().report;
+        for verdict in &report.verdicts {
+            let said = verdict.accepted && verdict.reason.ends_with("; not judged");
+            assert!(verdict.out_of_sample.is_none() && said, "{}", verdict.words());
+        }
+        let about = report.warnings.iter().filter(|words| words.contains("not judged"));
+        told += &about.map(|words| format!("{words}\n")).collect::<String>();
+    }
+    insta::assert_snapshot!(told);
+}
+
+#[test]
+fn a_frozen_thermometer_is_told() {
+    let frozen = |from: u32| run(0..5400, move |s| Second { deg_c: usual(s.min(from)).deg_c, ..other(s) });
+    let refused = [2000, 0].map(|from| tried(frozen(from), Method::Joint).unwrap_err().to_string());
+    let mut told = refused.join("\n");
+    // One that judges is told of.
+    let report = judged(frozen(2000)).unwrap().report;
+    let about = report.warnings.iter().filter(|words| words.contains("frozen"));
+    told += &about.map(|words| format!("\n{words}")).collect::<String>();
+    insta::assert_snapshot!(told);
+    // Steps of half a degree are none.
+    let coarse = |s: u32| Second { deg_c: (2.0 * usual(s).deg_c).round() / 2.0, ..usual(s) };
+    assert!(tried(run(0..5400, coarse), Method::Joint).unwrap().report.accepted());
+}
+
+#[test]
+fn readings_far_from_all_others_are_left_out_or_refused() {
+    let spiked = |every: u32| {
+        run(0..5400, move |s| {
+            let mut second = usual(s);
+            if s % every == 77 {
+                second.rates[1] = 99_f64.to_radians();
+            }
+            second
+        })
+    };
+    let (clean, some) =
+        (tried(run(0..5400, usual), Method::Joint).unwrap(), tried(spiked(1000), Method::Joint).unwrap());
+    let figures = |made: &Fitted| made.report.verdicts.iter().map(|v| v.in_sample[1].rms).collect::<Vec<_>>();
+    for (a, b) in figures(&clean).into_iter().zip(figures(&some)) {
+        assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
+    }
+    let mut told = some.report.warnings.join("\n") + "\n";
+    told += &tried(spiked(80), Method::Joint).unwrap_err().to_string();
+    insta::assert_snapshot!(told);
+}
+
+#[test]
+fn a_judge_with_the_readings_of_the_fit_is_refused() {
+    let Err(Error::Refused(reasons)) = judged(run(0..5400, usual)) else { panic!("refused") };
+    insta::assert_snapshot!(reasons.join("\n"));
+    // A part of it, too.
+    assert!(matches!(judged(run(2400..5400, usual)), Err(Error::Refused(_))));
+}
+
 /// The seconds of a list only, without accelerometers.
 fn run_at(seconds: &[u32]) -> Run {
     let events = events(seconds.iter().copied(), usual).into_iter();

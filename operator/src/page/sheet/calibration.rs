@@ -50,10 +50,9 @@ fn in_force(section: &mut Section, calibration: &ActiveCalibration, columns: usi
     if !calibration.source.is_empty() {
         field("from", &calibration.source);
     }
-    match (calibration.created_unix_s.and_then(day), calibration.age_s) {
-        (Some(day), Some(age_s)) => field("made", &format!("{day}, {}", age(age_s))),
-        (Some(day), None) => field("made", &day),
-        (None, Some(age_s)) => field("made", &age(age_s)),
+    match (calibration.created_unix_s.and_then(day), age(calibration)) {
+        (Some(day), Some(age)) => field("made", &format!("{day}, {age}")),
+        (Some(made), None) | (None, Some(made)) => field("made", &made),
         (None, None) => field("made", "not stated in the document"),
     }
     if let Some(overlay) = calibration.overlay {
@@ -61,9 +60,14 @@ fn in_force(section: &mut Section, calibration: &ActiveCalibration, columns: usi
     }
 }
 
-fn age(age_s: i64) -> String {
-    let words = since_s(age_s);
-    if age_s < 0 { words } else { format!("{words} ago") }
+fn age(calibration: &ActiveCalibration) -> Option<String> {
+    Some(match (figure::days(calibration), calibration.age_s?) {
+        (Some(0), _) => "today".to_owned(),
+        (Some(1), _) => "1 day old".to_owned(),
+        (Some(days), _) => format!("{days} days old"),
+        (None, age_s) if age_s < 0 => since_s(age_s),
+        (None, age_s) => format!("{} ago", since_s(age_s)),
+    })
 }
 
 /// The day of a time (s since 1970-01-01 UTC); `None` before that, and beyond the year 9999.

@@ -10,7 +10,7 @@ pub struct GyroSigma {
     /// N; default: that of `drift`. Source: IEEE 952.
     #[schemars(range(min = 0.0, max = 3000.0))]
     pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
-    /// Q; default for counts: a count/√12. Source: IEEE 952.
+    /// Q; default: a count/√12, without counts 0. Source: IEEE 952.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub quantisation_arcsec: Option<f64>,
     /// B; default: 0. Source: IEEE 952.
@@ -56,7 +56,7 @@ pub struct AccelSigma {
     /// N. Source: IEEE 952.
     #[schemars(range(min = 0.0, max = 1e4))]
     pub velocity_random_walk_m_per_s_per_sqrt_h: Option<f64>,
-    /// Q; default for counts: a count/√12. Source: IEEE 952.
+    /// Q; default: a count/√12, without counts 0. Source: IEEE 952.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub quantisation_m_per_s: Option<f64>,
     /// B; default: 0. Source: IEEE 952.

@@ -153,6 +153,14 @@ impl NoiseFit {
         self.chi_square_per_degree <= LARGEST_CHI_SQUARE
     }
 
+    /// The same of a log in pieces: its Allan differences do not span the gaps, over which a ramp would show.
+    pub fn of_pieces(mut self, pieces: usize) -> Self {
+        if pieces > 1 {
+            self.coefficients[Term::RateRamp as usize] = Coefficient::NotObservable { below: f64::INFINITY };
+        }
+        self
+    }
+
     /// What the fit says of a coefficient.
     pub const fn of_term(&self, term: Term) -> &Coefficient {
         &self.coefficients[term as usize]

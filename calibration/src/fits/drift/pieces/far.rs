@@ -6,7 +6,7 @@ use crate::report::{counted, short};
 /// Readings farther than this from the middle one (robust standard deviations).
 const FAR: f64 = 50.0;
 /// Far readings in a row that are no longer single ones.
-const SINGLE: usize = 3;
+pub const SINGLE: usize = 3;
 
 /// Which readings of a column are far beyond its noise.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! Logs that cannot be used are refused, with every reason and what to do.
 
 use isotherm_cli::Exit;
+use isotherm_correction::earth::Place;
 use isotherm_correction::sample::{GyroTick, LasingMode};
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
@@ -234,4 +235,17 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
     let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
     insta::assert_snapshot!(made.report().warnings.join("\n"));
+}
+
+#[test]
+fn a_latitude_that_the_gyros_contradict_is_told() {
+    let base = base();
+    let runs = [changed(&short(), |_| true)];
+    let told = |latitude_deg: f64| {
+        let place = Place::new(latitude_deg, 30.0, Some([0.0, 0.0])).unwrap();
+        let made = make(&Wanted { place: Some(place), ..wanted(&runs, &base) }, &mut ()).unwrap();
+        made.warnings.into_iter().filter(|words| words.contains("--latitude is wrong")).collect::<Vec<_>>()
+    };
+    assert_eq!(told(55.75), Vec::<String>::new());
+    insta::assert_snapshot!(told(15.75).join("\n"));
 }

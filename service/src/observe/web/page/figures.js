@@ -41,6 +41,14 @@ function since(seconds) {
   return seconds < 0 ? "in " + words : words;
 }
 
+/** The age of a calibration: in days where its document states a date only, which is midnight. */
+function age(seconds, created) {
+  if (seconds < 0) return since(seconds);
+  if (!isNumber(created) || created % 86400 !== 0) return since(seconds) + " ago";
+  const days = Math.floor(seconds / 86400);
+  return days === 0 ? "today" : plural(days, "day") + " old";
+}
+
 /** A point in time, to the second, in UTC as in the audit file. */
 const moment = text => text.replace("T", " ").slice(0, 19);
 const plural = (number, what) => count(number) + " " + what + (number === 1 ? "" : "s");

@@ -128,7 +128,7 @@ class UnitPage {
     this.calibration.show([
       ["In force", calibration ? "revision " + calibration.revision.counter : output ?? NONE],
       ["Document", calibration ? head(calibration.digest ?? calibration.revision.digest) : null],
-      ["Made", calibration && isNumber(calibration.age_s) ? since(calibration.age_s) + " ago" : null],
+      ["Made", calibration && isNumber(calibration.age_s) ? age(calibration.age_s, calibration.created_unix_s) : null],
       ["From", calibration?.source || null],
       ["Waiting", pending ? "revision " + pending.revision.counter : null],
       ["Swaps", count(swaps.accepted) + " accepted, " + count(swaps.refused) + " refused"],
