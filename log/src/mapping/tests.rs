@@ -54,7 +54,7 @@ fn a_sound_mapping_says_what_it_says() {
     assert_eq!((conversions[2].mid_scale, conversions[2].factor), (32768.0, 0.5));
     assert_eq!(gyro.switch.as_ref().unwrap().from, Some(SwitchFrom::ModeChange));
     assert_eq!(file.accel.as_ref().unwrap().sensors[0].column, Some(Column::Index(4)));
-    assert_eq!((file.temperatures[0].unit.shift(), file.temperatures[0].every_rows), (-273.15, 3));
+    assert_eq!((file.temperatures[0].unit.read(0.0), file.temperatures[0].every_rows), (-273.15, 3));
 }
 
 #[test]

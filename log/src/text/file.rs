@@ -302,7 +302,7 @@ impl FileReader {
             if temperature.may_be_empty && row.is_empty(temperature.cell)? {
                 continue;
             }
-            let raw = row.float(temperature.cell)? + temperature.shift;
+            let raw = temperature.unit.read(row.float(temperature.cell)?);
             temperature.since = (temperature.since + 1) % temperature.every_rows;
             if due {
                 let reading =

@@ -5,8 +5,8 @@ use isotherm_document::escape::clipped;
 
 use super::error::Reason;
 use crate::mapping::{
-    Column, Conversion, FileMapping, ModeMapping, SensorUnit, StatusMapping, SwitchMapping, TickMapping,
-    TimeColumn, TimeUnit,
+    Column, Conversion, FileMapping, ModeMapping, SensorUnit, StatusMapping, SwitchMapping, TemperatureUnit,
+    TickMapping, TimeColumn, TimeUnit,
 };
 
 /// What of a header is shown, in characters.
@@ -103,8 +103,8 @@ pub(super) struct TemperatureCell {
     pub(super) channel: ChannelName,
     /// Which cell.
     pub(super) cell: usize,
-    /// Added to what it holds.
-    pub(super) shift: f64,
+    /// Its unit.
+    pub(super) unit: TemperatureUnit,
     /// Every how many rows a reading is taken.
     pub(super) every_rows: u64,
     /// Rows without a reading are in order.
@@ -201,7 +201,7 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
         Ok(TemperatureCell {
             channel: temperature.channel,
             cell: find(&temperature.column)?,
-            shift: temperature.unit.shift(),
+            unit: temperature.unit,
             every_rows: temperature.every_rows,
             may_be_empty: temperature.may_be_empty,
             since: 0,

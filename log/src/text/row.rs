@@ -96,8 +96,8 @@ impl<'a> Row<'a> {
     /// A time (ns).
     pub(super) fn time_ns(&self, time: TimeCell) -> Result<i64, Fault> {
         let text = self.filled(time.cell)?;
-        let (ns, reason) = match (time.unit.exponent(), time.date) {
-            (Some(exponent), _) => (number::time_ns(text, exponent, self.decimal_mark), Reason::NotATime),
+        let (ns, reason) = match (time.unit.scale(), time.date) {
+            (Some(scale), _) => (number::time_ns(text, scale, self.decimal_mark), Reason::NotATime),
             (None, None) => (stamp_ns(text, time.unit), Reason::NotADateTime { unit: time.unit }),
             (None, Some(date)) => {
                 let whole = [self.filled(date)?, text].join(&b' ');

@@ -1,0 +1,43 @@
+//! `import` on logs as test benches write them, with what is odd in them.
+
+use std::path::Path;
+
+use super::common::{replay, stdout, told};
+use super::imports::{Expected, import, log, noise};
+
+/// Writes a log into a folder, and says what `import` says of it on standard error.
+fn imported(folder: &Path, name: &str, text: &str, options: &[&str]) -> String {
+    std::fs::write(folder.join(name), text).unwrap();
+    told(folder, &[&["import", name, "--no-plot"], options].concat())
+}
+
+#[test]
+fn units_that_a_header_states_are_kept() {
+    let front = "time_min,gx_deg_h,gy_deg_h,gz_mrad_s,ax_gal,ay_gal,az_gal,temp_F\n";
+    let row = |row: usize| {
+        let minutes = f64::from(u32::try_from(row).unwrap()) * 1e-3;
+        format!("{minutes:.3},{:.4},10.5,-3.25,1.5,-2.5,980.{},77.{}", noise(row, 1), row % 10, row % 10)
+    };
+    let parts = [
+        "column = \"time_min\"\nunit = \"min\"",
+        "column = \"gx_deg_h\", unit = \"deg_per_h\" }",
+        "column = \"gz_mrad_s\", unit = \"rad_per_s\", scale = 0.001 }",
+        "column = \"az_gal\", unit = \"m_per_s2\", scale = 0.01 }",
+        "channel = \"imu\"\ncolumn = \"temp_F\"\nunit = \"deg_f\"",
+    ];
+    let expected = Expected { parts: &parts, period_ns: 60_000_000, gaps: 0, temperatures: 1 };
+    import("bench.csv", log(front, row).as_bytes(), &[], &expected);
+
+    // What no mapping can state is asked for, not guessed: 9.8 would be taken for gravity in m/s².
+    let front =
+        "time [jiffies],gx [furlong],gy [furlong],gz [furlong],ax [kPa],ay [kPa],az [kPa],temp [mV]\n";
+    let text =
+        log(front, |row| format!("{},1.5,2.5,{:.3},0.1,0.2,9.8,25.{}", row * 10, noise(row, 2), row % 10));
+    let folder = tempfile::tempdir().unwrap();
+    insta::assert_snapshot!(imported(folder.path(), "odd.csv", &text, &[]));
+    let units = ["--gyro-unit", "raw", "--accel-unit", "raw", "--time-unit", "ms"];
+    let output = stdout(&replay(folder.path(), &[&["import", "odd.csv", "--no-plot"][..], &units].concat()));
+    let temperature =
+        "  temperature: temp [mV] in raw as channel \"imu\", 25 to 25.9; the header states \"mV\"";
+    assert!(output.contains(temperature), "{output}");
+}
