@@ -48,6 +48,8 @@ pub struct Hints {
     pub time_unit: Option<String>,
     /// Ticks per second, where the log has no stamps.
     pub rate_hz: Option<f64>,
+    /// Of rows of several units, the one whose are taken.
+    pub serial: Option<String>,
     /// Rows that cannot be read are passed over.
     pub skip_bad_rows: bool,
 }
@@ -74,6 +76,15 @@ pub enum Question {
         width: usize,
         /// The first row, and the header if there is one.
         rows: Vec<String>,
+    },
+    /// Of which unit the log is to be.
+    Serial {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// Its cells.
+        serials: Vec<String>,
     },
     /// The unit of the gyros.
     GyroUnit {
@@ -152,6 +163,7 @@ impl Question {
     pub fn option(&self) -> String {
         match self {
             Self::Columns { .. } => "--columns NAME,NAME,… (such as 'time [s],gx [deg/s],gy,gz,ax [g],ay,az,temp [degC]'; - for others)".to_owned(),
+            Self::Serial { serials, .. } => format!("--serial {}", serials.join("|")),
             Self::GyroUnit { .. } => format!("--gyro-unit {}", GYRO_UNITS.join("|")),
             Self::AccelUnit { .. } => format!("--accel-unit {}", ACCEL_UNITS.join("|")),
             Self::TimeUnit { .. } => format!("--time-unit {}", NUMBER_UNITS.join("|")),
@@ -178,6 +190,10 @@ impl Question {
                 }
                 hints.columns = columns;
             }
+            Self::Serial { serials, .. } => {
+                let serials: Vec<_> = serials.iter().map(String::as_str).collect();
+                hints.serial = one_of(&serials)?;
+            }
             Self::GyroUnit { .. } => hints.gyro_unit = one_of(&GYRO_UNITS)?,
             Self::AccelUnit { .. } => hints.accel_unit = one_of(&ACCEL_UNITS)?,
             Self::TimeUnit { .. } => hints.time_unit = one_of(NUMBER_UNITS)?,
@@ -200,6 +216,10 @@ impl fmt::Display for Question {
                     "{file}: which of the {width} columns are gyros, accelerometers, temperatures and the time? "
                 )?;
                 write!(f, "The first rows: {}", rows.join(" ⏎ "))
+            }
+            Self::Serial { file, column, serials } => {
+                let serials = serials.join(", ");
+                write!(f, "{file} has rows of several units, {serials} in column {column}: of which unit?")
             }
             Self::GyroUnit { columns, unknown, largest } => {
                 let stated = states(unknown.as_ref());

@@ -110,6 +110,8 @@ pub struct ReadReport {
     pub skipped_rows: u64,
     /// Rows that were passed over because of their status.
     pub bad_status_rows: u64,
+    /// Rows of other units.
+    pub rows_of_others: u64,
     /// Why the first of the rows that could not be read could not be.
     pub first_skipped: Option<String>,
     /// A file's last line has no line end: its last cell may be cut.
@@ -131,6 +133,7 @@ impl ReadReport {
         self.dropped_rows += other.dropped_rows;
         self.skipped_rows += other.skipped_rows;
         self.bad_status_rows += other.bad_status_rows;
+        self.rows_of_others += other.rows_of_others;
         self.first_skipped = self.first_skipped.take().or_else(|| other.first_skipped.clone());
         self.unterminated_last_line |= other.unterminated_last_line;
         self.cut_short |= other.cut_short;

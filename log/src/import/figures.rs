@@ -9,6 +9,8 @@ use crate::text::{open_decoded, parse_float, says_order, stamp_ns};
 
 /// Rows by which the usual step, and gravity, are told.
 const SAMPLE: usize = 4096;
+/// Different cells of a column that are kept.
+const MOST_VALUES: usize = 8;
 /// A step longer than so many usual ones is a gap.
 pub(super) const GAP: f64 = 1.5;
 
@@ -33,6 +35,8 @@ pub(super) struct Column {
     pub(super) minimum: f64,
     pub(super) maximum: f64,
     pub(super) steps: Steps,
+    /// Its different cells with how many there are of each; `None` where they are many.
+    pub(super) values: Option<Vec<(String, u64)>>,
     last: Option<(i64, f64)>,
 }
 
@@ -83,12 +87,28 @@ impl Steps {
 }
 
 impl Column {
+    /// No cells yet.
+    fn new() -> Self {
+        Self { values: Some(Vec::new()), ..Self::default() }
+    }
+
+    /// Counts a cell among those that are equal.
+    fn count(&mut self, cell: &str) {
+        let Some(values) = &mut self.values else { return };
+        match values.iter_mut().find(|(value, _)| value == cell) {
+            Some((_, count)) => *count += 1,
+            None if values.len() < MOST_VALUES => values.push((cell.to_owned(), 1)),
+            None => self.values = None,
+        }
+    }
+
     /// Takes a cell; where dates do not say it, day and month stand in the order given.
     fn take(&mut self, cell: &str, mark: u8, order: TimeUnit) {
         if cell.is_empty() {
             self.empty += 1;
             return;
         }
+        self.count(cell);
         let number = parse_float(cell, mark).filter(|number| number.is_finite());
         let (number, parts) = if let Some(number) = number {
             (number, parts(cell, mark).unwrap_or((0, number)))
@@ -167,19 +187,30 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    /// Reads the file to its end; where a date says that the month stands first, once more.
-    pub(super) fn of(path: &Path, found: &Found, order: Option<TimeUnit>) -> Result<Self, Error> {
-        let figures = Self::read(path, found, order.unwrap_or(TimeUnit::DayFirst))?;
+    /// Reads the file to its end, of rows of several units those in which a column has a value; where a date says that the month
+    /// stands first, once more.
+    pub(super) fn of(
+        path: &Path,
+        found: &Found,
+        order: Option<TimeUnit>,
+        select: Option<(usize, &str)>,
+    ) -> Result<Self, Error> {
+        let figures = Self::read(path, found, order.unwrap_or(TimeUnit::DayFirst), select)?;
         let month_first = figures.columns.iter().any(|column| column.order == Some(TimeUnit::MonthFirst));
         if order.is_none() && month_first {
-            return Self::read(path, found, TimeUnit::MonthFirst);
+            return Self::read(path, found, TimeUnit::MonthFirst, select);
         }
         Ok(figures)
     }
 
-    fn read(path: &Path, found: &Found, order: TimeUnit) -> Result<Self, Error> {
+    fn read(
+        path: &Path,
+        found: &Found,
+        order: TimeUnit,
+        select: Option<(usize, &str)>,
+    ) -> Result<Self, Error> {
         let mut lines = open_decoded(path, found.encoding)?;
-        let mut figures = Self { columns: vec![Column::default(); found.width], rows: 0 };
+        let mut figures = Self { columns: vec![Column::new(); found.width], rows: 0 };
         let first = found.rows.first().map(String::as_str).unwrap_or_default();
         let mut begun = false;
         while let Some(line) = lines.next_line().map_err(|error| Error::file(path, "read the log", error))? {
@@ -188,8 +219,11 @@ impl Figures {
             if !begun || comment || line.trim().is_empty() {
                 continue;
             }
-            figures.rows += 1;
             let mut cells = cells(&line, found.split_at);
+            if select.is_some_and(|(column, value)| cells.get(column).is_none_or(|cell| cell != value)) {
+                continue;
+            }
+            figures.rows += 1;
             if let Some((date, time)) = found.date_and_time
                 && let Some(date) = cells.get(date).cloned()
                 && let Some(time) = cells.get_mut(time)

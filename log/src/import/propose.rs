@@ -1,5 +1,7 @@
 //! From what was found of a log to a mapping, and to what must be asked.
 
+mod rows;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,8 +32,15 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         .collect();
     for (path, name) in paths.iter().zip(&names) {
         let found = layout::find(path.as_ref(), hints)?;
-        let figures = Figures::of(path.as_ref(), &found, hints.date_order())?;
-        let file = File { name, found: &found, figures: &figures, hints };
+        let mut figures = Figures::of(path.as_ref(), &found, hints.date_order(), None)?;
+        let serials = File { name, found: &found, figures: &figures, hints, select: None }.serials();
+        let select = rows::select(path.as_ref(), serials.as_ref(), hints, &mut proposal)?;
+        if select.is_some() {
+            figures = Figures::of(path.as_ref(), &found, hints.date_order(), select)?;
+        } else if serials.is_some() {
+            continue;
+        }
+        let file = File { name, found: &found, figures: &figures, hints, select };
         let several = paths.len() > 1;
         let text = match file.own() {
             Some(columns) => {
@@ -44,7 +53,12 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         proposal.mapping.push_str(&text);
     }
     let has_gyros = proposal.mapping.contains("[file.gyro]");
-    if !has_gyros && !proposal.open.iter().any(|open| matches!(open, Question::Columns { .. })) {
+    if !has_gyros
+        && !proposal
+            .open
+            .iter()
+            .any(|open| matches!(open, Question::Columns { .. } | Question::Serial { .. }))
+    {
         let first = paths.first().map_or(Path::new("the log"), AsRef::as_ref);
         return Err(refuse(first, "has no gyro columns with known names: name the columns with --columns"));
     }
@@ -65,6 +79,8 @@ struct File<'a> {
     found: &'a Found,
     figures: &'a Figures,
     hints: &'a Hints,
+    /// Column of serials, and the one whose rows are taken.
+    select: Option<(usize, &'a str)>,
 }
 
 /// The columns of x, y and z.
@@ -140,6 +156,7 @@ impl<'a> File<'a> {
             name,
             found: self.found,
             skip_bad_rows: self.hints.skip_bad_rows,
+            select: self.select,
             time,
             sensors,
             temperatures,

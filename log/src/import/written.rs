@@ -43,6 +43,8 @@ pub(super) struct FileText<'a> {
     pub(super) name: Option<String>,
     pub(super) found: &'a Found,
     pub(super) skip_bad_rows: bool,
+    /// Column of serials, and the one whose rows are taken.
+    pub(super) select: Option<(usize, &'a str)>,
     pub(super) time: Time,
     pub(super) sensors: Vec<Sensors>,
     pub(super) temperatures: Vec<Temperature>,
@@ -91,6 +93,10 @@ impl FileText<'_> {
         }
         if self.skip_bad_rows {
             line(format_args!("on_bad_row = \"skip\""));
+        }
+        if let Some((column, value)) = self.select {
+            let column = self.column(column);
+            line(format_args!("\n[file.select]\ncolumn = {column}\nvalue = {}", quoted(value)));
         }
         line(format_args!("\n[file.time]"));
         if let Some(column) = time.column {

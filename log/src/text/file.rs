@@ -68,6 +68,7 @@ impl FileReader {
                 accel: None,
                 temperatures: Vec::new(),
                 status: None,
+                select: None,
             },
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
@@ -167,7 +168,9 @@ impl FileReader {
             Err(fault) => Err(fault),
         };
         match parts {
-            Ok(parts) => {
+            // Not a row of this stream.
+            Ok(None) => Ok(()),
+            Ok(Some(parts)) => {
                 self.report.rows += 1;
                 self.report.unterminated_last_line |= !self.lines.terminated();
                 self.last_stamp = Some(parts.stamp);
@@ -263,9 +266,15 @@ impl FileReader {
         Ok(i64::try_from(since).unwrap_or(i64::MAX))
     }
 
-    /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
-    fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Parts, Fault> {
+    /// Reads all cells of the row that are used, where it is one of this stream; `stamp` is set as soon as it is known to be good.
+    fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Option<Parts>, Fault> {
         let row = Row::new(self.lines.line(), &self.cells, &self.layout);
+        if let Some((cell, value)) = &self.columns.select
+            && row.text(*cell)? != value.as_bytes()
+        {
+            self.report.rows_of_others += 1;
+            return Ok(None);
+        }
         let now = if let Some(cell) = self.columns.stamps {
             let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
             if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {
@@ -312,7 +321,7 @@ impl FileReader {
         }
         let sequence = |readings: &Readings| readings.sequence;
         let number = gyro.as_ref().map(|(readings, _)| readings).or(accel.as_ref()).and_then(sequence);
-        Ok(Parts { stamp: now, number, gyro, accel })
+        Ok(Some(Parts { stamp: now, number, gyro, accel }))
     }
 
     /// What reading came to so far.

@@ -126,6 +126,8 @@ pub(super) struct Columns {
     pub(super) temperatures: Vec<TemperatureCell>,
     /// What says whether a row holds, and where.
     pub(super) status: Option<(usize, StatusMapping)>,
+    /// What the unit's rows hold, and where.
+    pub(super) select: Option<(usize, String)>,
 }
 
 impl Columns {
@@ -210,7 +212,10 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
     let temperatures = temperatures.collect::<Result<_, Reason>>()?;
     let status =
         mapping.status.as_ref().map(|status| Ok((find(&status.column)?, status.clone()))).transpose()?;
-    let columns = Columns { stamps, gyro, accel, temperatures, status };
+    let select = mapping.select.as_ref();
+    let select =
+        select.map(|select| Ok((find(&select.column)?, select.value.trim().to_owned()))).transpose()?;
+    let columns = Columns { stamps, gyro, accel, temperatures, status, select };
     columns.apart().map(|()| columns)
 }
 

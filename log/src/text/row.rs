@@ -61,7 +61,7 @@ impl<'a> Row<'a> {
     }
 
     /// What a cell holds; an empty cell is in order.
-    fn text(&self, cell: usize) -> Result<&'a [u8], Fault> {
+    pub(super) fn text(&self, cell: usize) -> Result<&'a [u8], Fault> {
         let found = self.cells.get(cell).and_then(|at| self.line.get(at.start..at.end));
         found.ok_or_else(|| self.missing(cell))
     }

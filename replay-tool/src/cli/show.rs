@@ -71,6 +71,9 @@ pub(super) fn rows(report: &ReadReport) -> String {
     if report.bad_status_rows > 0 {
         let _ = writeln!(text, "{} rows were skipped because of their status", report.bad_status_rows);
     }
+    if report.rows_of_others > 0 {
+        let _ = writeln!(text, "{} rows are of other units", report.rows_of_others);
+    }
     if report.cut_short {
         text += "the compressed log is cut short; everything before the end has been used\n";
     }

@@ -41,3 +41,22 @@ fn units_that_a_header_states_are_kept() {
         "  temperature: temp [mV] in raw as channel \"imu\", 25 to 25.9; the header states \"mV\"";
     assert!(output.contains(temperature), "{output}");
 }
+
+#[test]
+fn of_rows_of_several_units_one_is_taken() {
+    // Two units by turns, each with its own time.
+    let text = log("serial,time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+        let (serial, time) = (["A-17", "B-4"][row % 2], f64::from(u32::try_from(row / 2).unwrap()) * 0.01);
+        format!("{serial},{time:.2},{:.3},{}.5,0.1", noise(row, 3), row % 2)
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let refused =
+        imported(path, "two.csv", &text, &[]) + &imported(path, "two.csv", &text, &["--serial", "C-1"]);
+    insta::assert_snapshot!(refused);
+    let output = stdout(&replay(path, &["import", "two.csv", "--no-plot", "--serial", "B-4"]));
+    assert!(output.contains("250 rows are of other units"), "{output}");
+    let mapping = std::fs::read_to_string(path.join("two.mapping.toml")).unwrap();
+    assert!(mapping.contains("[file.select]\ncolumn = \"serial\"\nvalue = \"B-4\""), "{mapping}");
+    assert!(mapping.contains("250 rows") && mapping.contains("tick_ns = 10000000.0"), "{mapping}");
+}
