@@ -35,6 +35,10 @@ pub(super) struct Column {
     pub(super) minimum: f64,
     pub(super) maximum: f64,
     pub(super) steps: Steps,
+    /// The first cell that is not greater than the one before it: its line, and both.
+    pub(super) back: Option<(u64, String, String)>,
+    /// The cell before, up to there.
+    before: String,
     /// Its different cells with how many there are of each; `None` where they are many.
     pub(super) values: Option<Vec<(String, u64)>>,
     last: Option<(i64, f64)>,
@@ -103,7 +107,7 @@ impl Column {
     }
 
     /// Takes a cell; where dates do not say it, day and month stand in the order given.
-    fn take(&mut self, cell: &str, mark: u8, order: TimeUnit) {
+    fn take(&mut self, cell: &str, mark: u8, order: TimeUnit, line: u64) {
         if cell.is_empty() {
             self.empty += 1;
             return;
@@ -134,8 +138,15 @@ impl Column {
         self.maximum = self.maximum.max(number);
         if let Some((whole, fraction)) = self.last.replace(parts) {
             #[expect(clippy::cast_precision_loss, reason = "steps are small")]
-            let step = parts.0.saturating_sub(whole) as f64;
-            self.steps.take(step + (parts.1 - fraction));
+            let step = parts.0.saturating_sub(whole) as f64 + (parts.1 - fraction);
+            self.steps.take(step);
+            if step <= 0.0 && self.back.is_none() {
+                self.back = Some((line, std::mem::take(&mut self.before), cell.to_owned()));
+            }
+        }
+        if self.back.is_none() {
+            self.before.clear();
+            self.before.push_str(cell);
         }
     }
 
@@ -231,7 +242,7 @@ impl Figures {
                 *time = format!("{date} {time}");
             }
             for (column, cell) in figures.columns.iter_mut().zip(cells) {
-                column.take(&cell, found.decimal_mark, order);
+                column.take(&cell, found.decimal_mark, order, lines.number());
             }
         }
         for column in &mut figures.columns {
@@ -264,7 +275,7 @@ mod tests {
 
     fn column_of(cells: impl IntoIterator<Item = String>) -> Column {
         let mut column = Column::default();
-        cells.into_iter().for_each(|cell| column.take(&cell, b'.', TimeUnit::DayFirst));
+        cells.into_iter().for_each(|cell| column.take(&cell, b'.', TimeUnit::DayFirst, 0));
         column.steps.settle();
         column
     }

@@ -338,7 +338,11 @@ impl<'a> File<'a> {
                 found = Some((index, unit, unknown, column));
                 break;
             }
-            let words = format!("{} does not always grow", self.listed(&[index]));
+            let back = self.figures.columns.get(index).and_then(|column| column.back.as_ref());
+            let at = back.map_or_else(String::new, |(line, before, this)| {
+                format!(": {}:{line} has {this:?} after {before:?}; correct the row to use it", self.name)
+            });
+            let words = format!("{} does not always grow{at}", self.listed(&[index]));
             proposal.notes.push(format!("time: {words}: not used"));
             why.get_or_insert(words);
         }

@@ -1,5 +1,6 @@
 //! One file of a log: rows in, events out in time order.
 
+use std::ops::Range;
 use std::path::Path;
 
 use isotherm_correction::sample::TemperatureReading;
@@ -40,6 +41,8 @@ pub(super) struct FileReader {
     readings: Vec<TemperatureReading>,
     /// Stamp of the last good row.
     last_stamp: Option<i64>,
+    /// Its line: what it holds, where its stamp is in it, and its number.
+    last_line: (Vec<u8>, Range<usize>, u64),
     /// Its sequence number, where rows have one.
     last_number: Option<u64>,
     /// Rows since then that could not be read.
@@ -73,6 +76,7 @@ impl FileReader {
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
             last_stamp: None,
+            last_line: (Vec::new(), 0..0, 0),
             last_number: None,
             bad_since: 0,
             width: None,
@@ -174,6 +178,7 @@ impl FileReader {
                 self.report.rows += 1;
                 self.report.unterminated_last_line |= !self.lines.terminated();
                 self.last_stamp = Some(parts.stamp);
+                self.keep_line();
                 self.last_number = parts.number;
                 self.bad_since = 0;
                 self.assembler.take(parts, &self.readings, &self.columns);
@@ -181,6 +186,16 @@ impl FileReader {
             }
             Err(fault) => self.bad_row(fault, stamp),
         }
+    }
+
+    /// Keeps the line of a good row with a stamp, for what comes after it.
+    fn keep_line(&mut self) {
+        let stamp = self.columns.stamps.and_then(|stamp| self.cells.get(stamp.cell));
+        let Some(&Cell { start, end, .. }) = stamp else { return };
+        let (text, of_stamp, number) = &mut self.last_line;
+        text.clear();
+        text.extend_from_slice(self.lines.line());
+        (*of_stamp, *number) = (start..end, self.lines.number());
     }
 
     /// Passes over a bad row, where the mapping says so.
@@ -277,8 +292,11 @@ impl FileReader {
         }
         let now = if let Some(cell) = self.columns.stamps {
             let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
-            if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {
-                let reason = Reason::TimeNotIncreasing { previous_ns };
+            if let Some(last) = self.last_stamp.filter(|last| now <= *last) {
+                let (text, stamp, line) = &self.last_line;
+                let before =
+                    String::from_utf8_lossy(text.get(stamp.clone()).unwrap_or_default()).into_owned();
+                let reason = Reason::TimeNotIncreasing { before, line: *line, again: now == last };
                 return Err(Fault { cell: Some(cell.cell), reason });
             }
             now

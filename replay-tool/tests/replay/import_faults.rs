@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::common::{replay, stdout, told};
+use super::common::{check, replay, stdout, told};
 use super::imports::{Expected, import, log, noise};
 
 /// Writes a log into a folder, and says what `import` says of it on standard error.
@@ -59,4 +59,21 @@ fn of_rows_of_several_units_one_is_taken() {
     let mapping = std::fs::read_to_string(path.join("two.mapping.toml")).unwrap();
     assert!(mapping.contains("[file.select]\ncolumn = \"serial\"\nvalue = \"B-4\""), "{mapping}");
     assert!(mapping.contains("250 rows") && mapping.contains("tick_ns = 10000000.0"), "{mapping}");
+}
+
+#[test]
+fn a_row_out_of_order_is_named_with_both_times() {
+    let table = |at_300: usize| {
+        log("time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+            let time = f64::from(u32::try_from(if row == 300 { at_300 } else { row }).unwrap()) * 0.01;
+            format!("{time:.2},{:.3},1.5,0.1", noise(row, 4))
+        })
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let asked = imported(path, "late.csv", &table(5), &[]);
+    // By a mapping that was made of a log in order.
+    std::fs::write(path.join("whole.csv"), table(300)).unwrap();
+    check(&replay(path, &["import", "whole.csv", "--no-plot"]), 0);
+    insta::assert_snapshot!(asked + &told(path, &["info", "late.csv", "--mapping", "whole.mapping.toml"]));
 }
