@@ -5,7 +5,7 @@ use std::path::Path;
 use super::layout::{Found, cells};
 use crate::error::Error;
 use crate::mapping::TimeUnit;
-use crate::text::{open_decoded, parse_float, says_order, stamp_ns};
+use crate::text::{DAY_NS, is_next_day, open_decoded, parse_float, says_order, stamp_ns};
 
 /// Rows by which the usual step, and gravity, are told.
 const SAMPLE: usize = 4096;
@@ -35,6 +35,8 @@ pub(super) struct Column {
     pub(super) minimum: f64,
     pub(super) maximum: f64,
     pub(super) steps: Steps,
+    /// Times of day that are of the day after that before them.
+    pub(super) midnights: u64,
     /// The first cell that is not greater than the one before it: its line, and both.
     pub(super) back: Option<(u64, String, String)>,
     /// The cell before, up to there.
@@ -137,6 +139,9 @@ impl Column {
         self.minimum = self.minimum.min(number);
         self.maximum = self.maximum.max(number);
         if let Some((whole, fraction)) = self.last.replace(parts) {
+            let next_day = self.stamp_unit == Some(TimeUnit::TimeOfDay) && is_next_day(whole, parts.0);
+            self.midnights += u64::from(next_day);
+            let whole = if next_day { whole - DAY_NS } else { whole };
             #[expect(clippy::cast_precision_loss, reason = "steps are small")]
             let step = parts.0.saturating_sub(whole) as f64 + (parts.1 - fraction);
             self.steps.take(step);

@@ -391,6 +391,11 @@ impl<'a> File<'a> {
             column.steps.gaps,
             (column.steps.longest * ns).round() / 1e6
         ));
+        if column.midnights > 0 {
+            let note =
+                format!("time: no date: passes midnight {} times, after each the next day", column.midnights);
+            proposal.notes.push(note);
+        }
         let date = self.found.date_and_time.filter(|(_, time)| *time == index).map(|(date, _)| date);
         Time {
             column: Some(index),

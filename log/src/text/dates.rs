@@ -18,6 +18,14 @@ pub(crate) fn stamp_ns(cell: &[u8], unit: TimeUnit) -> Option<i64> {
     }
 }
 
+/// A day of times of day (ns).
+pub(crate) const DAY_NS: i64 = 86_400_000_000_000;
+
+/// Whether a time of day is of the day after that of another (ns): it is more than half a day before it.
+pub(crate) fn is_next_day(before: i64, now: i64) -> bool {
+    before.saturating_sub(now) > DAY_NS / 2
+}
+
 /// Whether a cell is a date of numbers without a time.
 pub(crate) fn is_date(cell: &str) -> bool {
     numbers(cell).is_some()

@@ -8,12 +8,13 @@ use isotherm_correction::units::{Span, Timestamp};
 
 use super::assemble::{Assembler, Parts};
 use super::cells::{Cell, OpenQuote, split};
+use super::dates::{DAY_NS, is_next_day};
 use super::error::{LogError, LogFault, Reason};
 use super::input::{LONGEST_LINE, Line, Lines, Source, decoded};
 use super::resolve::{Columns, TickCells, resolve};
 use super::row::{Fault, Readings, Row};
 use super::{LogEvent, ReadReport};
-use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping};
+use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping, TimeUnit};
 
 /// Most nominal ticks between two rows of a log without gaps.
 const LONGEST_STEP: u64 = 10;
@@ -39,6 +40,8 @@ pub(super) struct FileReader {
     assembler: Assembler,
     /// Temperature readings of the current row.
     readings: Vec<TemperatureReading>,
+    /// Midnights that times of day have passed (ns).
+    days_ns: i64,
     /// Stamp of the last good row.
     last_stamp: Option<i64>,
     /// Its line: what it holds, where its stamp is in it, and its number.
@@ -75,6 +78,7 @@ impl FileReader {
             },
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
+            days_ns: 0,
             last_stamp: None,
             last_line: (Vec::new(), 0..0, 0),
             last_number: None,
@@ -291,7 +295,13 @@ impl FileReader {
             return Ok(None);
         }
         let now = if let Some(cell) = self.columns.stamps {
-            let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
+            let mut now = row.time_ns(cell)?.saturating_add(self.time.origin_ns).saturating_add(self.days_ns);
+            if cell.unit == TimeUnit::TimeOfDay && self.last_stamp.is_some_and(|last| is_next_day(last, now))
+            {
+                now = now.saturating_add(DAY_NS);
+                self.days_ns = self.days_ns.saturating_add(DAY_NS);
+                self.report.midnights += 1;
+            }
             if let Some(last) = self.last_stamp.filter(|last| now <= *last) {
                 let (text, stamp, line) = &self.last_line;
                 let before =

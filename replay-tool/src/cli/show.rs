@@ -71,6 +71,13 @@ pub(super) fn rows(report: &ReadReport) -> String {
     if report.bad_status_rows > 0 {
         let _ = writeln!(text, "{} rows were skipped because of their status", report.bad_status_rows);
     }
+    if report.midnights > 0 {
+        let _ = writeln!(
+            text,
+            "midnights passed by times without a date, after each the next day: {}",
+            report.midnights
+        );
+    }
     if report.rows_of_others > 0 {
         let _ = writeln!(text, "{} rows are of other units", report.rows_of_others);
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::common::{check, replay, stdout, told};
-use super::imports::{Expected, import, log, noise};
+use super::imports::{Expected, TEN_MS, import, log, noise};
 
 /// Writes a log into a folder, and says what `import` says of it on standard error.
 fn imported(folder: &Path, name: &str, text: &str, options: &[&str]) -> String {
@@ -76,4 +76,23 @@ fn a_row_out_of_order_is_named_with_both_times() {
     std::fs::write(path.join("whole.csv"), table(300)).unwrap();
     check(&replay(path, &["import", "whole.csv", "--no-plot"]), 0);
     insta::assert_snapshot!(asked + &told(path, &["info", "late.csv", "--mapping", "whole.mapping.toml"]));
+}
+
+#[test]
+fn a_time_of_day_goes_on_over_midnight() {
+    let text = log("clock,gx_dps,gy_dps,gz_dps\n", |row| {
+        let ms = (86_398_000 + row * 10) % 86_400_000;
+        let (s, ms) = (ms / 1000, ms % 1000);
+        format!("{:02}:{:02}:{:02}.{ms:03},{:.3},1.5,0.1", s / 3600, s / 60 % 60, s % 60, noise(row, 5))
+    });
+    let parts = ["unit = \"time_of_day\"", "passes midnight 1 times"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    import("night.csv", text.as_bytes(), &[], &expected);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("night.csv"), &text).unwrap();
+    let output = stdout(&replay(folder.path(), &["import", "night.csv", "--no-plot"]));
+    assert!(
+        output.contains("midnights passed by times without a date, after each the next day: 1"),
+        "{output}"
+    );
 }
