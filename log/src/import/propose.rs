@@ -150,6 +150,7 @@ impl<'a> File<'a> {
         let temperatures = self.temperatures(&meanings, proposal);
         let of_sensors = sensors.iter().flat_map(|it| it.columns).flatten();
         let used = of_sensors.chain(temperatures.iter().map(|it| it.column)).chain(counter).chain(time.date);
+        self.note_states(proposal);
         self.unused(&used.chain(time.column).collect::<Vec<_>>(), &sensors, proposal);
         let name = named.then(|| self.name.to_owned());
         FileText {

@@ -96,3 +96,25 @@ fn a_time_of_day_goes_on_over_midnight() {
         "{output}"
     );
 }
+
+#[test]
+fn a_column_of_states_is_said_to_be_ignored_and_how_it_would_not_be() {
+    let text = log("time_s,gx_dps,gy_dps,gz_dps,valid,test status\n", |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+        let (valid, status) = if row % 100 == 50 { (0, "FAIL") } else { (1, "OK") };
+        format!("{time:.2},{:.3},1.5,0.1,{valid},{status}", noise(row, 6))
+    });
+    let parts = [
+        "status: valid is ignored: \"1\" in 495 rows, \"0\" in 5 rows; to pass over other rows, add [file.status] with column = 5 and good = [\"1\"]",
+        "status: test status is ignored: \"OK\" in 495 rows, \"FAIL\" in 5 rows",
+    ];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    let (mapping, _) = import("states.csv", text.as_bytes(), &[], &expected);
+    // As the note says.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("states.csv"), &text).unwrap();
+    let mapping = mapping + "\n[file.status]\ncolumn = 5\ngood = [\"1\"]\n";
+    std::fs::write(folder.path().join("states.mapping.toml"), mapping).unwrap();
+    let output = stdout(&replay(folder.path(), &["info", "states.csv"]));
+    assert!(output.contains("5 rows were skipped because of their status"), "{output}");
+}

@@ -1,4 +1,4 @@
-//! Columns that say of a row whose it is.
+//! Columns that say of a row whose it is, and whether it holds.
 
 use std::path::Path;
 
@@ -10,6 +10,10 @@ use crate::error::Error;
 
 /// Words of columns that name a unit.
 const SERIALS: [&str; 9] = ["serial", "serialno", "sn", "id", "uid", "device", "unit", "sensor", "imu"];
+
+/// Words of columns that say whether a row holds.
+const STATES: [&str; 11] =
+    ["status", "state", "valid", "validity", "ok", "flag", "flags", "quality", "health", "error", "fail"];
 
 /// A column of serials: which, its name, and its cells.
 pub(super) struct Serials {
@@ -25,6 +29,22 @@ impl File<'_> {
             meaning(name, None).is_none() && parts(name).iter().any(|part| words.contains(&part.as_str()))
         });
         named.filter_map(move |(index, _)| Some((index, self.figures.columns.get(index)?.values.clone()?)))
+    }
+
+    /// Notes what a column of states holds that the mapping does not regard, and how it would.
+    pub(super) fn note_states(self, proposal: &mut Proposal) {
+        for (index, mut values) in self.few(&STATES) {
+            values.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+            let Some((most, _)) = values.first() else { continue };
+            let held: Vec<_> =
+                values.iter().map(|(value, count)| format!("{value:?} in {count} rows")).collect();
+            proposal.notes.push(format!(
+                "status: {} is ignored: {}; to pass over other rows, add [file.status] with column = {} and good = [{most:?}]",
+                self.listed(&[index]),
+                held.join(", "),
+                index + 1
+            ));
+        }
     }
 
     /// The column of serials, where rows are of several units.
