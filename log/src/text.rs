@@ -110,6 +110,8 @@ pub struct ReadReport {
     pub skipped_rows: u64,
     /// Rows that were passed over because of their status.
     pub bad_status_rows: u64,
+    /// Rows that repeat the one before them with its time, passed over.
+    pub repeated_rows: u64,
     /// Midnights that times of day without a date have passed.
     pub midnights: u64,
     /// Rows of other units.
@@ -135,6 +137,7 @@ impl ReadReport {
         self.dropped_rows += other.dropped_rows;
         self.skipped_rows += other.skipped_rows;
         self.bad_status_rows += other.bad_status_rows;
+        self.repeated_rows += other.repeated_rows;
         self.midnights += other.midnights;
         self.rows_of_others += other.rows_of_others;
         self.first_skipped = self.first_skipped.take().or_else(|| other.first_skipped.clone());

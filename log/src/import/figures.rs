@@ -200,6 +200,8 @@ fn parts(cell: &str, mark: u8) -> Option<(i64, f64)> {
 pub(super) struct Figures {
     pub(super) columns: Vec<Column>,
     pub(super) rows: u64,
+    /// Rows that are the one before them again.
+    pub(super) repeated: u64,
 }
 
 impl Figures {
@@ -226,9 +228,9 @@ impl Figures {
         select: Option<(usize, &str)>,
     ) -> Result<Self, Error> {
         let mut lines = open_decoded(path, found.encoding)?;
-        let mut figures = Self { columns: vec![Column::new(); found.width], rows: 0 };
+        let mut figures = Self { columns: vec![Column::new(); found.width], rows: 0, repeated: 0 };
         let first = found.rows.first().map(String::as_str).unwrap_or_default();
-        let mut begun = false;
+        let (mut begun, mut before) = (false, String::new());
         while let Some(line) = lines.next_line().map_err(|error| Error::file(path, "read the log", error))? {
             begun |= line == first;
             let comment = found.comment.is_some_and(|prefix| line.trim_start().starts_with(prefix));
@@ -240,6 +242,11 @@ impl Figures {
                 continue;
             }
             figures.rows += 1;
+            // Where rows have a time; readings at rest alone may be equal and are counted.
+            if line == before {
+                figures.repeated += 1;
+                continue;
+            }
             if let Some((date, time)) = found.date_and_time
                 && let Some(date) = cells.get(date).cloned()
                 && let Some(time) = cells.get_mut(time)
@@ -249,6 +256,7 @@ impl Figures {
             for (column, cell) in figures.columns.iter_mut().zip(cells) {
                 column.take(&cell, found.decimal_mark, order, lines.number());
             }
+            before = line;
         }
         for column in &mut figures.columns {
             column.steps.settle();

@@ -392,6 +392,10 @@ impl<'a> File<'a> {
             column.steps.gaps,
             (column.steps.longest * ns).round() / 1e6
         ));
+        if self.figures.repeated > 0 {
+            let note = format!("time: {} rows repeat the row before them: dropped", self.figures.repeated);
+            proposal.notes.push(note);
+        }
         if column.midnights > 0 {
             let note =
                 format!("time: no date: passes midnight {} times, after each the next day", column.midnights);

@@ -304,6 +304,10 @@ impl FileReader {
             }
             if let Some(last) = self.last_stamp.filter(|last| now <= *last) {
                 let (text, stamp, line) = &self.last_line;
+                if now == last && text == self.lines.line() {
+                    self.report.repeated_rows += 1;
+                    return Ok(None);
+                }
                 let before =
                     String::from_utf8_lossy(text.get(stamp.clone()).unwrap_or_default()).into_owned();
                 let reason = Reason::TimeNotIncreasing { before, line: *line, again: now == last };

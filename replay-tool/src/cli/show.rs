@@ -71,6 +71,9 @@ pub(super) fn rows(report: &ReadReport) -> String {
     if report.bad_status_rows > 0 {
         let _ = writeln!(text, "{} rows were skipped because of their status", report.bad_status_rows);
     }
+    if report.repeated_rows > 0 {
+        let _ = writeln!(text, "{} rows repeat the row before them and were dropped", report.repeated_rows);
+    }
     if report.midnights > 0 {
         let _ = writeln!(
             text,

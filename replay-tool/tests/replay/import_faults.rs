@@ -118,3 +118,25 @@ fn a_column_of_states_is_said_to_be_ignored_and_how_it_would_not_be() {
     let output = stdout(&replay(folder.path(), &["info", "states.csv"]));
     assert!(output.contains("5 rows were skipped because of their status"), "{output}");
 }
+
+#[test]
+fn rows_that_a_logger_wrote_twice_are_dropped_and_counted() {
+    let table = |second: &str| {
+        log("time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+            let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+            let row = format!("{time:.2},{:.3},1.5,0.1", noise(row, 7));
+            format!("{row}\n{row}{second}")
+        })
+    };
+    let parts = ["500 rows repeat the row before them: dropped"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    import("twice.csv", table("").as_bytes(), &[], &expected);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("twice.csv"), table("")).unwrap();
+    let output = stdout(&replay(path, &["import", "twice.csv", "--no-plot"]));
+    assert!(output.contains("500 rows repeat the row before them and were dropped"), "{output}");
+    // The same time with other values is neither.
+    std::fs::write(path.join("other.csv"), table("5")).unwrap();
+    insta::assert_snapshot!(told(path, &["info", "other.csv", "--mapping", "twice.mapping.toml"]));
+}
