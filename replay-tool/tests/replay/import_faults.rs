@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::common::{check, replay, stdout, told};
+use super::common::{check, replay, root, stderr, stdout, told};
 use super::imports::{Expected, TEN_MS, import, log, noise};
 
 /// Writes a log into a folder, and says what `import` says of it on standard error.
@@ -139,4 +139,24 @@ fn rows_that_a_logger_wrote_twice_are_dropped_and_counted() {
     // The same time with other values is neither.
     std::fs::write(path.join("other.csv"), table("5")).unwrap();
     insta::assert_snapshot!(told(path, &["info", "other.csv", "--mapping", "twice.mapping.toml"]));
+}
+
+#[test]
+fn a_log_that_is_read_in_a_wrong_unit_is_doubted() {
+    let text = log("time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n", |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+        format!("{time:.2},{:.3},1.5,5.1,0.001,0.002,1.000", noise(row, 8))
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let document = root().join("config/calibration/chamber-mems.toml").canonicalize().unwrap();
+    imported(path, "rest.csv", &text, &[]);
+    let right = std::fs::read_to_string(path.join("rest.mapping.toml")).unwrap();
+    let wrong = right.replace("deg_per_s", "rad_per_s").replace("unit = \"g\"", "unit = \"m_per_s2\"");
+    std::fs::write(path.join("wrong.toml"), wrong).unwrap();
+    let corrected = |mapping| {
+        let document = document.to_str().unwrap();
+        stderr(&replay(path, &["correct", "rest.csv", "--mapping", mapping, "--calibration", document]))
+    };
+    insta::assert_snapshot!(format!("{}---\n{}", corrected("rest.mapping.toml"), corrected("wrong.toml")));
 }
