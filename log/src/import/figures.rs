@@ -101,10 +101,11 @@ impl Column {
     /// Counts a cell among those that are equal.
     fn count(&mut self, cell: &str) {
         let Some(values) = &mut self.values else { return };
+        let many = values.len() == MOST_VALUES;
         match values.iter_mut().find(|(value, _)| value == cell) {
             Some((_, count)) => *count += 1,
-            None if values.len() < MOST_VALUES => values.push((cell.to_owned(), 1)),
-            None => self.values = None,
+            None if many => self.values = None,
+            None => values.push((cell.to_owned(), 1)),
         }
     }
 

@@ -116,11 +116,12 @@ pub(super) fn named(kind: Kind, increment: bool, parts: &[String]) -> Option<(Un
         Some((unit(kind, increment, &text).filter(|_| stands)?, start))
     });
     let has = |word: &str| parts.iter().any(|part| part == word);
+    let pair = |pair: [&str; 2]| parts.windows(2).any(|parts| parts == pair);
     let ends = |word: &str| parts.last().is_some_and(|last| last == word);
     let whole = |unit| Some(((unit, 1.0), parts.len()));
     found.or_else(|| match kind {
         _ if has("raw") || has("lsb") || has("out") => Some((raw_unit(kind, increment, false)?, parts.len())),
-        Kind::Gyro if !increment && (ends("rad") || has("angular") && has("velocity")) => whole("rad_per_s"),
+        Kind::Gyro if !increment && (ends("rad") || pair(["angular", "velocity"])) => whole("rad_per_s"),
         Kind::Gyro if !increment && ends("deg") => whole("deg_per_s"),
         Kind::Accel if has("linear") && has("acceleration") && has("field") => whole("m_per_s2"),
         _ => None,

@@ -14,7 +14,7 @@ pub(crate) fn stamp_ns(cell: &[u8], unit: TimeUnit) -> Option<i64> {
         TimeUnit::DayFirst => ordered_ns(cell, "%d/%m"),
         TimeUnit::MonthFirst => ordered_ns(cell, "%m/%d"),
         TimeUnit::TimeOfDay => civil_ns(&format!("1/1/1970 {}", with_point(cell)?), "%d/%m/%Y"),
-        TimeUnit::Nanoseconds | TimeUnit::Microseconds | TimeUnit::Milliseconds | TimeUnit::Seconds => None,
+        _ => None,
     }
 }
 
