@@ -1,9 +1,11 @@
 //! Small files read and written whole, and outputs that must not fall on inputs.
 
+use std::collections::BTreeSet;
 use std::fs::{File, Permissions, canonicalize};
 use std::io::{self, BufWriter, Read, Stdout, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf, absolute};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -78,6 +80,21 @@ pub fn write_whole(path: &Path, bytes: &[u8], overwrite: bool) -> io::Result<()>
     placed.map(drop).map_err(|failed| failed.error)
 }
 
+/// What is being written and has no name yet.
+static WRITING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn writing() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is not whole, for a program that ends at once.
+pub fn remove_partials() {
+    for path in writing().iter() {
+        // It may not have been created yet.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
 /// A file that is written under another name until it is whole; removed when dropped before.
 #[derive(Debug)]
 pub struct Partial {
@@ -94,6 +111,7 @@ impl Partial {
         let kept = path.exists() && !path.is_file();
         if !kept {
             writing.push(".partial");
+            self::writing().insert(writing.clone().into());
         }
         Self { path: path.to_owned(), writing: writing.into(), kept }
     }
@@ -118,6 +136,7 @@ impl Partial {
         if !self.kept {
             std::fs::rename(&self.writing, &self.path)
                 .map_err(|source| Error::file(&self.path, "name the file", source))?;
+            writing().remove(&self.writing);
             self.kept = true;
         }
         Ok(())
@@ -129,6 +148,7 @@ impl Drop for Partial {
         if !self.kept {
             // It may never have been created.
             let _ = std::fs::remove_file(&self.writing);
+            writing().remove(&self.writing);
         }
     }
 }

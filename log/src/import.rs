@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `layout` | encoding, delimiter, decimal mark, comments, header, row of units |
 //! | `words` | the words of a column's name, in English |
-//! | `names` | what a column holds, along which axis, in which unit |
+//! | `names` | what a column holds, along which axis |
+//! | `units` | in which unit |
 //! | `clock` | units of time, rates |
 //! | `figures` | what the rows say: period, gaps, counters, empty cells |
 //! | `propose` | the mapping, what it rests on, and what cannot be told |
@@ -16,6 +17,7 @@ mod figures;
 mod layout;
 mod names;
 mod propose;
+mod units;
 mod words;
 mod written;
 
@@ -46,6 +48,8 @@ pub struct Hints {
     pub time_unit: Option<String>,
     /// Ticks per second, where the log has no stamps.
     pub rate_hz: Option<f64>,
+    /// Of rows of several units, the one whose are taken.
+    pub serial: Option<String>,
     /// Rows that cannot be read are passed over.
     pub skip_bad_rows: bool,
 }
@@ -73,10 +77,21 @@ pub enum Question {
         /// The first row, and the header if there is one.
         rows: Vec<String>,
     },
+    /// Of which unit the log is to be.
+    Serial {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// Its cells.
+        serials: Vec<String>,
+    },
     /// The unit of the gyros.
     GyroUnit {
         /// Their columns.
         columns: String,
+        /// What they state, which is no unit of theirs that is known.
+        unknown: Option<String>,
         /// Largest reading.
         largest: String,
     },
@@ -84,6 +99,8 @@ pub enum Question {
     AccelUnit {
         /// Their columns.
         columns: String,
+        /// What they state, which is no unit of theirs that is known.
+        unknown: Option<String>,
         /// Largest reading.
         largest: String,
     },
@@ -91,6 +108,8 @@ pub enum Question {
     TimeUnit {
         /// Their column.
         column: String,
+        /// What it states, which is no unit of time that is known.
+        unknown: Option<String>,
         /// The usual step, in that unit.
         step: String,
     },
@@ -117,7 +136,9 @@ pub const GYRO_UNITS: [&str; 9] =
 pub const ACCEL_UNITS: [&str; 8] =
     ["m_per_s2", "g", "mg", "volt", "raw", "counts", "m_per_s", "raw_per_tick"];
 /// Units of stamps, as the mapping spells them: numbers, then dates and times of day.
-pub const TIME_UNITS: [&str; 8] = ["s", "ms", "us", "ns", "iso", "dmy", "mdy", "time_of_day"];
+pub const TIME_UNITS: [&str; 10] = ["s", "ms", "us", "ns", "min", "h", "iso", "dmy", "mdy", "time_of_day"];
+/// Those of numbers.
+const NUMBER_UNITS: &[&str] = TIME_UNITS.split_at(6).0;
 /// Those of dates and times of day.
 pub(crate) const STAMP_UNITS: [(TimeUnit, &str); 4] = [
     (TimeUnit::DateTime, "iso"),
@@ -142,9 +163,10 @@ impl Question {
     pub fn option(&self) -> String {
         match self {
             Self::Columns { .. } => "--columns NAME,NAME,… (such as 'time [s],gx [deg/s],gy,gz,ax [g],ay,az,temp [degC]'; - for others)".to_owned(),
+            Self::Serial { serials, .. } => format!("--serial {}", serials.join("|")),
             Self::GyroUnit { .. } => format!("--gyro-unit {}", GYRO_UNITS.join("|")),
             Self::AccelUnit { .. } => format!("--accel-unit {}", ACCEL_UNITS.join("|")),
-            Self::TimeUnit { .. } => format!("--time-unit {}", TIME_UNITS[..4].join("|")),
+            Self::TimeUnit { .. } => format!("--time-unit {}", NUMBER_UNITS.join("|")),
             Self::DateOrder { .. } => format!("--time-unit {}", DATE_ORDERS.join("|")),
             Self::Rate { .. } => "--rate-hz HZ".to_owned(),
         }
@@ -168,9 +190,13 @@ impl Question {
                 }
                 hints.columns = columns;
             }
+            Self::Serial { serials, .. } => {
+                let serials: Vec<_> = serials.iter().map(String::as_str).collect();
+                hints.serial = one_of(&serials)?;
+            }
             Self::GyroUnit { .. } => hints.gyro_unit = one_of(&GYRO_UNITS)?,
             Self::AccelUnit { .. } => hints.accel_unit = one_of(&ACCEL_UNITS)?,
-            Self::TimeUnit { .. } => hints.time_unit = one_of(&TIME_UNITS[..4])?,
+            Self::TimeUnit { .. } => hints.time_unit = one_of(NUMBER_UNITS)?,
             Self::DateOrder { .. } => hints.time_unit = one_of(&DATE_ORDERS)?,
             Self::Rate { .. } => {
                 let rate = text.parse().ok().filter(|rate: &f64| (1e-3..=1e6).contains(rate));
@@ -191,17 +217,24 @@ impl fmt::Display for Question {
                 )?;
                 write!(f, "The first rows: {}", rows.join(" ⏎ "))
             }
-            Self::GyroUnit { columns, largest } => {
-                write!(f, "what is the unit of the gyros {columns}? The largest reading is {largest}")
+            Self::Serial { file, column, serials } => {
+                let serials = serials.join(", ");
+                write!(f, "{file} has rows of several units, {serials} in column {column}: of which unit?")
             }
-            Self::AccelUnit { columns, largest } => {
+            Self::GyroUnit { columns, unknown, largest } => {
+                let stated = states(unknown.as_ref());
+                write!(f, "what is the unit of the gyros {columns}?{stated} The largest reading is {largest}")
+            }
+            Self::AccelUnit { columns, unknown, largest } => {
+                let stated = states(unknown.as_ref());
                 write!(
                     f,
-                    "what is the unit of the accelerometers {columns}? The largest reading is {largest}"
+                    "what is the unit of the accelerometers {columns}?{stated} The largest reading is {largest}"
                 )
             }
-            Self::TimeUnit { column, step } => {
-                write!(f, "what is the unit of the time {column}? It usually grows by {step}")
+            Self::TimeUnit { column, unknown, step } => {
+                let stated = states(unknown.as_ref());
+                write!(f, "what is the unit of the time {column}?{stated} It usually grows by {step}")
             }
             Self::DateOrder { column, first } => {
                 write!(f, "does {first:?} in {column} begin with the day (dmy) or with the month (mdy)?")
@@ -212,6 +245,13 @@ impl fmt::Display for Question {
             }
         }
     }
+}
+
+/// What a header states in vain.
+fn states(unknown: Option<&String>) -> String {
+    unknown.map_or_else(String::new, |text| {
+        format!(" The header states {text:?}, which import does not know: for other units, give the nearest and set `scale` in the mapping.")
+    })
 }
 
 /// Refuses a log whose form no mapping can describe, in a sentence.

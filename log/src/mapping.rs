@@ -68,6 +68,8 @@ pub struct FileMapping {
     pub temperatures: Vec<TemperatureMapping>,
     /// What says of each row whether it holds, where the file has that.
     pub status: Option<StatusMapping>,
+    /// Which rows are of the unit, in a file with several.
+    pub select: Option<SelectMapping>,
 }
 
 /// A column, by name or by place.
@@ -176,6 +178,16 @@ pub struct StatusMapping {
     /// Bits of the status word of which none is set in a row that holds.
     #[schemars(range(min = 1))]
     pub bad_bits: Option<u64>,
+}
+
+/// Rows of one unit among those of several: others are passed over as if they were not there.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct SelectMapping {
+    /// Which column.
+    pub column: Column,
+    /// What it holds in the unit's rows.
+    pub value: String,
 }
 
 /// Where mode-switch commands come from: either of them.
@@ -379,6 +391,7 @@ impl FileMapping {
         let accel = self.accel.iter().flat_map(TickMapping::columns);
         let temperatures = self.temperatures.iter().map(|temperature| &temperature.column);
         let status = self.status.iter().map(|status| &status.column);
-        stamps.chain(gyro).chain(accel).chain(temperatures).chain(status)
+        let select = self.select.iter().map(|select| &select.column);
+        stamps.chain(gyro).chain(accel).chain(temperatures).chain(status).chain(select)
     }
 }

@@ -27,7 +27,7 @@ use crate::mapping::{Delimiter, Encoding, Mapping};
 use crate::progress::Progress;
 use file::FileReader;
 
-pub(crate) use dates::{is_date, says_order, stamp_ns};
+pub(crate) use dates::{DAY_NS, is_date, is_next_day, says_order, stamp_ns};
 pub(crate) use input::{Source as Bytes, open as open_raw};
 
 pub use error::{LogError, LogFault, Reason};
@@ -110,6 +110,12 @@ pub struct ReadReport {
     pub skipped_rows: u64,
     /// Rows that were passed over because of their status.
     pub bad_status_rows: u64,
+    /// Rows that repeat the one before them with its time, passed over.
+    pub repeated_rows: u64,
+    /// Midnights that times of day without a date have passed.
+    pub midnights: u64,
+    /// Rows of other units.
+    pub rows_of_others: u64,
     /// Why the first of the rows that could not be read could not be.
     pub first_skipped: Option<String>,
     /// A file's last line has no line end: its last cell may be cut.
@@ -131,6 +137,9 @@ impl ReadReport {
         self.dropped_rows += other.dropped_rows;
         self.skipped_rows += other.skipped_rows;
         self.bad_status_rows += other.bad_status_rows;
+        self.repeated_rows += other.repeated_rows;
+        self.midnights += other.midnights;
+        self.rows_of_others += other.rows_of_others;
         self.first_skipped = self.first_skipped.take().or_else(|| other.first_skipped.clone());
         self.unterminated_last_line |= other.unterminated_last_line;
         self.cut_short |= other.cut_short;

@@ -21,6 +21,7 @@ use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
 use isotherm_correction::units::Span;
 
 use crate::error::Error;
+use crate::stop::without_traces;
 use log_args::LogArgs;
 
 /// Records, plays, corrects, compares, plots, converts and simulates logs.
@@ -64,6 +65,9 @@ fn seconds(text: &str) -> Result<Span, String> {
 
 /// Runs the command that the arguments name.
 fn run(cli: Cli) -> Result<Exit, Error> {
+    if let Command::Correct(_) | Command::Convert(_) | Command::Simulate(_) = &cli.command {
+        without_traces()?;
+    }
     match cli.command {
         Command::Record(args) => record::run(&args),
         Command::Recover(args) => recover::run(&args),

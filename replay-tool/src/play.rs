@@ -147,6 +147,9 @@ pub async fn play(
             let instances = pair_reports(&opened, options.wait).await.unwrap_or_default();
             report.units.iter_mut().for_each(|unit| unit.note_instances(&instances));
         }
+        if ended.is_ok() && options.acknowledge != Acknowledge::No {
+            silence::note_unknown_channels(&opened, player.channels(), &mut report).await;
+        }
         Played { report, log: player.log_report(), ended }
     };
     let closed = isotherm_bus::close(opened, CLOSE_LIMIT).await;

@@ -3,6 +3,9 @@
 use std::future::poll_fn;
 use std::task::Poll;
 
+use isotherm_cli::failed_lines;
+use isotherm_log::file::remove_partials;
+use tokio::runtime::Builder;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use crate::error::Error;
@@ -26,4 +29,21 @@ impl Stop {
         })
         .await;
     }
+}
+
+/// From the call on, a stop signal ends the program and leaves nothing behind that is not whole.
+pub(crate) fn without_traces() -> Result<(), Error> {
+    let runtime = Builder::new_current_thread().enable_io().build();
+    let runtime = runtime.map_err(|source| Error::Runtime { source })?;
+    let mut stop = {
+        let _inside = runtime.enter();
+        Stop::on(&[SignalKind::interrupt(), SignalKind::terminate()])?
+    };
+    std::thread::spawn(move || {
+        runtime.block_on(stop.asked());
+        remove_partials();
+        let exit = failed_lines(&Error::Stopped, Error::Stopped.exit());
+        std::process::exit(i32::from(exit as u8));
+    });
+    Ok(())
 }

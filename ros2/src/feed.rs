@@ -244,7 +244,7 @@ impl Feeder {
         Ok(mapping.map(|mapping| TemperatureReading {
             channel: mapping.channel,
             time,
-            raw: temperature + mapping.shift,
+            raw: mapping.unit.read(temperature),
         }))
     }
 }

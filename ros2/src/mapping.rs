@@ -10,7 +10,9 @@ use std::sync::LazyLock;
 use isotherm_correction::sample::{ChannelName, OutputKind};
 use isotherm_correction::units::Span;
 use isotherm_document::{Form, Problem, Reader, element, join};
-use isotherm_log::mapping::{AccelUnit, Conversion, GyroUnit, Marks, SensorUnit, TimeMapping};
+use isotherm_log::mapping::{
+    AccelUnit, Conversion, GyroUnit, Marks, SensorUnit, TemperatureUnit, TimeMapping,
+};
 use isotherm_protocol::key::UnitId;
 
 use crate::Error;
@@ -80,8 +82,8 @@ pub struct TemperatureMapping {
     pub topic: String,
     /// Name of the channel, as the calibration document spells it.
     pub channel: ChannelName,
-    /// Added to a reading.
-    pub shift: f64,
+    /// Its unit.
+    pub unit: TemperatureUnit,
 }
 
 impl Mapping {
@@ -154,7 +156,7 @@ fn unit(r: &mut Reader<'_>, path: &str, keys: UnitKeys) -> Option<UnitMapping> {
     });
     let temperatures = keys.temperature.into_iter().map(|keys| {
         let channel = ChannelName::from(&keys.channel).ok()?;
-        Some(TemperatureMapping { topic: keys.topic, channel, shift: keys.unit.shift() })
+        Some(TemperatureMapping { topic: keys.topic, channel, unit: keys.unit })
     });
     Some(UnitMapping {
         unit: UnitId::new(&keys.serial).ok()?,

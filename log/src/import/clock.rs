@@ -1,7 +1,8 @@
 //! Units of time and rates that a log does not state with its columns.
 
-/// Nanoseconds in the units of time.
-pub(super) const UNITS_NS: [(&str, f64); 4] = [("s", 1e9), ("ms", 1e6), ("us", 1e3), ("ns", 1.0)];
+/// Nanoseconds in the units of time; the first four may be told by the steps.
+pub(super) const UNITS_NS: [(&str, f64); 6] =
+    [("s", 1e9), ("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("min", 6e10), ("h", 3.6e12)];
 /// Ticks that are likely (ns).
 const LIKELY_TICK_NS: std::ops::RangeInclusive<f64> = 1e6..=1e9;
 /// Ticks that are possible (ns).
@@ -28,7 +29,7 @@ pub(super) fn rate_in(lines: &[String]) -> Option<f64> {
 /// The unit of stamps by their usual step: the only one that gives the stated rate, a time of this century, or a likely tick.
 pub(super) fn unit_of(step: f64, largest: f64, stated_hz: Option<f64>) -> Option<String> {
     let only = |fits: &dyn Fn(f64) -> bool| {
-        let mut units = UNITS_NS.iter().filter(|(_, ns)| fits(*ns));
+        let mut units = UNITS_NS.iter().take(4).filter(|(_, ns)| fits(*ns));
         match (units.next(), units.next()) {
             (Some((unit, _)), None) => Some((*unit).to_owned()),
             _ => None,

@@ -5,10 +5,12 @@ use std::path::Path;
 use super::layout::{Found, cells};
 use crate::error::Error;
 use crate::mapping::TimeUnit;
-use crate::text::{open_decoded, parse_float, says_order, stamp_ns};
+use crate::text::{DAY_NS, is_next_day, open_decoded, parse_float, says_order, stamp_ns};
 
 /// Rows by which the usual step, and gravity, are told.
 const SAMPLE: usize = 4096;
+/// Different cells of a column that are kept.
+const MOST_VALUES: usize = 8;
 /// A step longer than so many usual ones is a gap.
 pub(super) const GAP: f64 = 1.5;
 
@@ -33,6 +35,14 @@ pub(super) struct Column {
     pub(super) minimum: f64,
     pub(super) maximum: f64,
     pub(super) steps: Steps,
+    /// Times of day that are of the day after that before them.
+    pub(super) midnights: u64,
+    /// The first cell that is not greater than the one before it: its line, and both.
+    pub(super) back: Option<(u64, String, String)>,
+    /// The cell before, up to there.
+    before: String,
+    /// Its different cells with how many there are of each; `None` where they are many.
+    pub(super) values: Option<Vec<(String, u64)>>,
     last: Option<(i64, f64)>,
 }
 
@@ -83,12 +93,29 @@ impl Steps {
 }
 
 impl Column {
+    /// No cells yet.
+    fn new() -> Self {
+        Self { values: Some(Vec::new()), ..Self::default() }
+    }
+
+    /// Counts a cell among those that are equal.
+    fn count(&mut self, cell: &str) {
+        let Some(values) = &mut self.values else { return };
+        let many = values.len() == MOST_VALUES;
+        match values.iter_mut().find(|(value, _)| value == cell) {
+            Some((_, count)) => *count += 1,
+            None if many => self.values = None,
+            None => values.push((cell.to_owned(), 1)),
+        }
+    }
+
     /// Takes a cell; where dates do not say it, day and month stand in the order given.
-    fn take(&mut self, cell: &str, mark: u8, order: TimeUnit) {
+    fn take(&mut self, cell: &str, mark: u8, order: TimeUnit, line: u64) {
         if cell.is_empty() {
             self.empty += 1;
             return;
         }
+        self.count(cell);
         let number = parse_float(cell, mark).filter(|number| number.is_finite());
         let (number, parts) = if let Some(number) = number {
             (number, parts(cell, mark).unwrap_or((0, number)))
@@ -113,9 +140,19 @@ impl Column {
         self.minimum = self.minimum.min(number);
         self.maximum = self.maximum.max(number);
         if let Some((whole, fraction)) = self.last.replace(parts) {
+            let next_day = self.stamp_unit == Some(TimeUnit::TimeOfDay) && is_next_day(whole, parts.0);
+            self.midnights += u64::from(next_day);
+            let whole = if next_day { whole - DAY_NS } else { whole };
             #[expect(clippy::cast_precision_loss, reason = "steps are small")]
-            let step = parts.0.saturating_sub(whole) as f64;
-            self.steps.take(step + (parts.1 - fraction));
+            let step = parts.0.saturating_sub(whole) as f64 + (parts.1 - fraction);
+            self.steps.take(step);
+            if step <= 0.0 && self.back.is_none() {
+                self.back = Some((line, std::mem::take(&mut self.before), cell.to_owned()));
+            }
+        }
+        if self.back.is_none() {
+            self.before.clear();
+            self.before.push_str(cell);
         }
     }
 
@@ -164,32 +201,53 @@ fn parts(cell: &str, mark: u8) -> Option<(i64, f64)> {
 pub(super) struct Figures {
     pub(super) columns: Vec<Column>,
     pub(super) rows: u64,
+    /// Rows that are the one before them again.
+    pub(super) repeated: u64,
 }
 
 impl Figures {
-    /// Reads the file to its end; where a date says that the month stands first, once more.
-    pub(super) fn of(path: &Path, found: &Found, order: Option<TimeUnit>) -> Result<Self, Error> {
-        let figures = Self::read(path, found, order.unwrap_or(TimeUnit::DayFirst))?;
+    /// Reads the file to its end, of rows of several units those in which a column has a value; where a date says that the month
+    /// stands first, once more.
+    pub(super) fn of(
+        path: &Path,
+        found: &Found,
+        order: Option<TimeUnit>,
+        select: Option<(usize, &str)>,
+    ) -> Result<Self, Error> {
+        let figures = Self::read(path, found, order.unwrap_or(TimeUnit::DayFirst), select)?;
         let month_first = figures.columns.iter().any(|column| column.order == Some(TimeUnit::MonthFirst));
         if order.is_none() && month_first {
-            return Self::read(path, found, TimeUnit::MonthFirst);
+            return Self::read(path, found, TimeUnit::MonthFirst, select);
         }
         Ok(figures)
     }
 
-    fn read(path: &Path, found: &Found, order: TimeUnit) -> Result<Self, Error> {
+    fn read(
+        path: &Path,
+        found: &Found,
+        order: TimeUnit,
+        select: Option<(usize, &str)>,
+    ) -> Result<Self, Error> {
         let mut lines = open_decoded(path, found.encoding)?;
-        let mut figures = Self { columns: vec![Column::default(); found.width], rows: 0 };
+        let mut figures = Self { columns: vec![Column::new(); found.width], rows: 0, repeated: 0 };
         let first = found.rows.first().map(String::as_str).unwrap_or_default();
-        let mut begun = false;
+        let (mut begun, mut before) = (false, String::new());
         while let Some(line) = lines.next_line().map_err(|error| Error::file(path, "read the log", error))? {
             begun |= line == first;
             let comment = found.comment.is_some_and(|prefix| line.trim_start().starts_with(prefix));
             if !begun || comment || line.trim().is_empty() {
                 continue;
             }
-            figures.rows += 1;
             let mut cells = cells(&line, found.split_at);
+            if select.is_some_and(|(column, value)| cells.get(column).is_none_or(|cell| cell != value)) {
+                continue;
+            }
+            figures.rows += 1;
+            // Where rows have a time; readings at rest alone may be equal and are counted.
+            if line == before {
+                figures.repeated += 1;
+                continue;
+            }
             if let Some((date, time)) = found.date_and_time
                 && let Some(date) = cells.get(date).cloned()
                 && let Some(time) = cells.get_mut(time)
@@ -197,8 +255,9 @@ impl Figures {
                 *time = format!("{date} {time}");
             }
             for (column, cell) in figures.columns.iter_mut().zip(cells) {
-                column.take(&cell, found.decimal_mark, order);
+                column.take(&cell, found.decimal_mark, order, lines.number());
             }
+            before = line;
         }
         for column in &mut figures.columns {
             column.steps.settle();
@@ -230,7 +289,7 @@ mod tests {
 
     fn column_of(cells: impl IntoIterator<Item = String>) -> Column {
         let mut column = Column::default();
-        cells.into_iter().for_each(|cell| column.take(&cell, b'.', TimeUnit::DayFirst));
+        cells.into_iter().for_each(|cell| column.take(&cell, b'.', TimeUnit::DayFirst, 0));
         column.steps.settle();
         column
     }

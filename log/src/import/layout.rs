@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::names::is_unit;
+use super::units::is_unit;
 use super::{Hints, refuse};
 use crate::error::Error;
 use crate::mapping::{Delimiter, Encoding, TimeUnit};

@@ -1,5 +1,6 @@
 //! What a column holds, by its name.
 
+use super::units::{kind_of, named, unit};
 use super::words::parts;
 
 /// A quantity that a log may have.
@@ -28,6 +29,8 @@ pub(super) struct Meaning {
     pub(super) unit: Option<&'static str>,
     /// How much of that unit a reading of 1 is, where it is not one: 0.001 of °/s where the column says mdps.
     pub(super) scale: Option<f64>,
+    /// What stands in the unit's place and is no unit that is known here.
+    pub(super) unknown: Option<String>,
     /// Of several that hold the same, the least is taken.
     pub(super) rank: u8,
 }
@@ -84,13 +87,18 @@ const OTHERS: [&str; 22] = [
 pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     let (bare, own) = bracketed(name);
     let mut parts = parts(bare);
-    let stated =
-        own.or(of_row.map(|text| text.trim_matches(['(', ')', '[', ']']))).filter(|text| !text.is_empty());
+    let stated = own.or(of_row.map(|text| text.trim_matches(['(', ')', '[', ']'])));
+    let stated = stated.filter(|text| text.chars().any(|c| c.is_alphabetic() || "°\"″%".contains(c)));
     // "T_case_degC": the unit is the name's end.
-    let celsius = stated.is_none() && parts.len() > 2 && parts.ends_with(&["deg".to_owned(), "c".to_owned()]);
-    let stated = if celsius { Some("degC") } else { stated };
-    parts.truncate(parts.len() - 2 * usize::from(celsius));
-    let by_unit = kind_of_unit(stated);
+    let degrees = match parts.as_slice() {
+        [_, .., deg, scale] if stated.is_none() && deg == "deg" && (scale == "c" || scale == "f") => {
+            Some(format!("deg{scale}"))
+        }
+        _ => None,
+    };
+    parts.truncate(parts.len() - 2 * usize::from(degrees.is_some()));
+    let stated = stated.or(degrees.as_deref());
+    let by_unit = stated.and_then(kind_of);
     let axis = take_axis(&mut parts, matches!(by_unit, Some(Kind::Gyro | Kind::Accel)));
     let has = |words: &[&str]| parts.iter().any(|part| words.contains(&part.as_str()));
     let pair = |first: &str, second: &str| {
@@ -139,7 +147,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     {
         (Kind::Counter, false)
     } else if parts.iter().any(|part| part.contains("time") || part == "stamp" || part == "sow")
-        || matches!(parts.as_slice(), [one] if one == "t")
+        || matches!(parts.as_slice(), [one, rest @ ..] if one == "t" && (rest.is_empty() || named(Kind::Time, false, &parts).is_some()))
         || has(&["tow"])
     {
         (Kind::Time, false)
@@ -148,8 +156,13 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     } else {
         return None;
     };
-    let (unit, scale) = scaled_unit(kind, increment, stated, &parts);
-    let mut rank = u8::from(unit.is_none()) * 4;
+    let by_name = || named(kind, increment, &parts);
+    let found = stated.and_then(|text| Some((unit(kind, increment, text)?, parts.len()))).or_else(by_name);
+    // Channels have their name without the unit.
+    let ends = found.map(|(_, begins)| begins).filter(|_| kind == Kind::Temperature).unwrap_or(parts.len());
+    let found = found.map(|(unit, _)| unit);
+    let unknown = stated.filter(|_| found.is_none()).map(ToOwned::to_owned);
+    let mut rank = u8::from(found.is_none()) * 4;
     let known = match kind {
         Kind::Gyro => increment || has(&GYROS) || has(&["angular"]),
         Kind::Accel => increment || has(&ACCELS) || pair("specific", "force"),
@@ -163,18 +176,11 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         rank += u8::from(!has(&["startup", "timestamp", "stamp", "sensor"])) * 2;
         rank += u8::from(has(&["header", "mag", "baro"]));
     }
-    let stem = parts.join(" ");
+    let stem = parts[..ends].join(" ");
     let axis = axis.filter(|_| kind != Kind::Time);
-    Some(Meaning { kind, axis, stem, increment, unit, scale, rank })
-}
-
-/// The quantity that is measured in a unit of angular rate, specific force or temperature.
-pub(super) fn kind_of_unit(stated: Option<&str>) -> Option<Kind> {
-    let is = |kind: &Kind| match scaled_unit(*kind, false, Some(stated?), &[]).0? {
-        "deg_per_s" | "rad_per_s" | "deg_per_h" | "m_per_s2" | "g" | "mg" | "deg_c" | "kelvin" => Some(()),
-        _ => None,
-    };
-    [Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().find(|kind| is(kind).is_some())
+    let scale = found.map(|(_, scale)| scale).filter(|scale| (scale - 1.0).abs() > f64::EPSILON);
+    let unit = found.map(|(unit, _)| unit);
+    Some(Meaning { kind, axis, stem, increment, unit, scale, unknown, rank })
 }
 
 /// Whether a column is a gyro's, by its name.
@@ -184,32 +190,7 @@ pub(super) fn is_gyro(name: &str) -> bool {
 
 /// The quantity by the unit that a column's name states.
 pub(super) fn kind_by_unit(name: &str, of_row: Option<&str>) -> Option<Kind> {
-    kind_of_unit(bracketed(name).1.or(of_row))
-}
-
-/// Whether a cell is a unit of measure, and nothing else.
-pub(super) fn is_unit(text: &str) -> bool {
-    let known = |kind| scaled_unit(kind, false, Some(text), &[]).0.is_some_and(|unit| unit != "raw");
-    !text.is_empty() && [Kind::Time, Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().any(known)
-}
-
-/// The unit, as the mapping spells it, and the factor from a reading to it, where that is not 1: of sensors, thousandths and millionths
-/// have no unit of their own.
-fn scaled_unit(
-    kind: Kind,
-    increment: bool,
-    stated: Option<&str>,
-    parts: &[String],
-) -> (Option<&'static str>, Option<f64>) {
-    let plain = unit(kind, increment, stated, parts);
-    let stated =
-        stated.map(str::trim).filter(|_| plain.is_none() && matches!(kind, Kind::Gyro | Kind::Accel));
-    let prefixes = [("m", 1e-3), ("u", 1e-6), ("µ", 1e-6), ("μ", 1e-6)];
-    let scaled = prefixes.into_iter().find_map(|(prefix, scale)| {
-        let unit = unit(kind, increment, Some(stated?.strip_prefix(prefix)?), parts)?;
-        Some((Some(unit), Some(scale)))
-    });
-    scaled.unwrap_or((plain, None))
+    kind_of(bracketed(name).1.or(of_row)?)
 }
 
 /// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word, or the second of two where
@@ -226,7 +207,10 @@ fn take_axis(parts: &mut Vec<String>, of_sensors: bool) -> Option<usize> {
         return letter(&parts.remove(at));
     }
     let last = parts.last()?.clone();
-    if let Ok(index) = last.parse::<usize>() {
+    // "ax_m_s2" ends with its unit.
+    let squared =
+        parts.iter().rev().nth(1).is_some_and(|before| ["s", "ms", "mps"].contains(&before.as_str()));
+    if let Some(index) = last.parse::<usize>().ok().filter(|_| !squared) {
         parts.pop();
         return Some(index).filter(|index| *index < 3);
     }
@@ -245,92 +229,6 @@ fn take_axis(parts: &mut Vec<String>, of_sensors: bool) -> Option<usize> {
         }
     }
     None
-}
-
-/// The unit, as the mapping spells it.
-fn unit(kind: Kind, increment: bool, stated: Option<&str>, parts: &[String]) -> Option<&'static str> {
-    let text: String = stated
-        .unwrap_or_default()
-        .to_lowercase()
-        .chars()
-        .filter(|c| !c.is_whitespace() && !matches!(c, '.' | '(' | ')'))
-        .collect();
-    let text = text
-        .replace("degrees", "deg")
-        .replace("degree", "deg")
-        .replace("grad", "deg")
-        .replace(['°', 'º', '˚'], "deg");
-    let text = text.replace("seconds", "s").replace("second", "s").replace("sec", "s");
-    let text = text
-        .replace("^-1", "-1")
-        .replace("^-2", "-2")
-        .replace("^2", "2")
-        .replace('²', "2")
-        .replace("µ", "u")
-        .replace('μ', "u");
-    let has = |word: &str| parts.iter().any(|part| part == word);
-    let raw = matches!(text.as_str(), "lsb" | "count" | "counts" | "raw" | "adc" | "digit")
-        || text.is_empty() && (has("raw") || has("lsb") || has("out"));
-    match kind {
-        Kind::Gyro if increment => match text.as_str() {
-            "deg" => Some("deg"),
-            "rad" => Some("rad"),
-            "arcs" | "as" | "\"" | "arcsec" => Some("arcsec"),
-            "counts" => Some("counts"),
-            _ if raw => Some("raw_per_tick"),
-            _ => None,
-        },
-        Kind::Gyro => match text.as_str() {
-            "deg/s" | "degs-1" | "dps" => Some("deg_per_s"),
-            "rad/s" | "rads-1" => Some("rad_per_s"),
-            "deg/h" | "deg/hr" | "degh-1" => Some("deg_per_h"),
-            "counts" => Some("counts"),
-            _ if raw => Some("raw"),
-            "" if has("dps") || has("deg") => Some("deg_per_s"),
-            "" if has("rad") || parts.windows(2).any(|pair| pair == ["angular", "velocity"]) => {
-                Some("rad_per_s")
-            }
-            _ => None,
-        },
-        Kind::Accel if increment => match text.as_str() {
-            "m/s" | "ms-1" => Some("m_per_s"),
-            "counts" => Some("counts"),
-            _ if raw => Some("raw_per_tick"),
-            _ => None,
-        },
-        Kind::Accel => match text.as_str() {
-            "m/s2" | "ms-2" | "m/s/s" | "ms2" => Some("m_per_s2"),
-            "g" | "gs" => Some("g"),
-            "mg" => Some("mg"),
-            "v" | "volt" => Some("volt"),
-            "counts" => Some("counts"),
-            _ if raw => Some("raw"),
-            "" if parts.len() > 1 && parts.last().is_some_and(|last| last == "g") => Some("g"),
-            "" if has("ms") || parts.windows(2).any(|pair| pair[0] == "m" && pair[1] == "s") => {
-                Some("m_per_s2")
-            }
-            "" if has("linear") && has("acceleration") && has("field") => Some("m_per_s2"),
-            _ => None,
-        },
-        Kind::Time => match text.as_str() {
-            "ns" => Some("ns"),
-            "us" => Some("us"),
-            "ms" => Some("ms"),
-            "s" => Some("s"),
-            _ => ["ns", "us", "ms", "s"]
-                .into_iter()
-                .find(|word| parts.len() > 1 && parts.last().is_some_and(|last| last == word)),
-        },
-        Kind::Temperature => match text.as_str() {
-            "degc" | "c" | "celsius" => Some("deg_c"),
-            "k" | "kelvin" => Some("kelvin"),
-            "v" | "volt" => Some("volt"),
-            "" | "-" | "deg" if !raw => None,
-            // °F and all else is for the document to convert.
-            _ => Some("raw"),
-        },
-        Kind::Counter => None,
-    }
 }
 
 #[cfg(test)]
@@ -411,34 +309,13 @@ mod tests {
             ("Gyro X [°/s]", None, Some((Gyro, Some(0), Some("deg_per_s")))),
             ("time_ms", None, Some((Time, None, Some("ms")))),
             ("X_Value", None, Some((Time, None, None))),
-            ("temp [F]", None, Some((Temperature, None, Some("raw")))),
+            ("temp [F]", None, Some((Temperature, None, Some("deg_f")))),
             ("Temperature", None, Some((Temperature, None, None))),
             ("Accel_LN_X_CAL", Some("m/(s^2)"), Some((Accel, Some(0), Some("m_per_s2")))),
         ];
         for (name, row, expected) in cases {
             let found = meaning(name, row).map(|found| (found.kind, found.axis, found.unit));
             assert_eq!(found, expected, "{name}");
-        }
-    }
-
-    #[test]
-    fn thousandths_and_millionths_are_a_scale() {
-        let scaled = |name| meaning(name, None).map(|found| (found.unit, found.scale));
-        for (name, unit, scale) in [
-            ("G_x [mdps]", "deg_per_s", Some(1e-3)),
-            ("gx [mrad/s]", "rad_per_s", Some(1e-3)),
-            ("gx [µrad/s]", "rad_per_s", Some(1e-6)),
-            ("ax [ug]", "g", Some(1e-6)),
-            ("ax [mg]", "mg", None),
-            ("ax [m/s2]", "m_per_s2", None),
-        ] {
-            assert_eq!(scaled(name), Some((Some(unit), scale)), "{name}");
-        }
-        for unit in ["ms", "m/(s^2)", "deg/s", "mdps", "degC"] {
-            assert!(is_unit(unit), "{unit}");
-        }
-        for word in ["", "-", "time", "Gyro_X", "1.5"] {
-            assert!(!is_unit(word), "{word}");
         }
     }
 

@@ -1,5 +1,7 @@
 //! From what was found of a log to a mapping, and to what must be asked.
 
+mod rows;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,8 +32,15 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         .collect();
     for (path, name) in paths.iter().zip(&names) {
         let found = layout::find(path.as_ref(), hints)?;
-        let figures = Figures::of(path.as_ref(), &found, hints.date_order())?;
-        let file = File { name, found: &found, figures: &figures, hints };
+        let mut figures = Figures::of(path.as_ref(), &found, hints.date_order(), None)?;
+        let serials = File { name, found: &found, figures: &figures, hints, select: None }.serials();
+        let select = rows::select(path.as_ref(), serials.as_ref(), hints, &mut proposal)?;
+        if select.is_some() {
+            figures = Figures::of(path.as_ref(), &found, hints.date_order(), select)?;
+        } else if serials.is_some() {
+            continue;
+        }
+        let file = File { name, found: &found, figures: &figures, hints, select };
         let several = paths.len() > 1;
         let text = match file.own() {
             Some(columns) => {
@@ -44,7 +53,12 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         proposal.mapping.push_str(&text);
     }
     let has_gyros = proposal.mapping.contains("[file.gyro]");
-    if !has_gyros && !proposal.open.iter().any(|open| matches!(open, Question::Columns { .. })) {
+    if !has_gyros
+        && !proposal
+            .open
+            .iter()
+            .any(|open| matches!(open, Question::Columns { .. } | Question::Serial { .. }))
+    {
         let first = paths.first().map_or(Path::new("the log"), AsRef::as_ref);
         return Err(refuse(first, "has no gyro columns with known names: name the columns with --columns"));
     }
@@ -65,6 +79,8 @@ struct File<'a> {
     found: &'a Found,
     figures: &'a Figures,
     hints: &'a Hints,
+    /// Column of serials, and the one whose rows are taken.
+    select: Option<(usize, &'a str)>,
 }
 
 /// The columns of x, y and z.
@@ -109,11 +125,16 @@ impl<'a> File<'a> {
         let time = self.time(&meanings, counter.is_some(), proposal);
         let mut sensors = Vec::new();
         for (group, kind) in groups.into_iter().zip(["gyro", "accel"]) {
-            let Some((columns, first)) = group else { continue };
-            let (unit, scale) = self.sensor_unit(columns, &first, kind, proposal);
+            let Some(axes) = group else { continue };
+            let columns = axes.map(|axis| axis.map(|(index, _)| index));
+            let units = self.sensor_units(axes, kind, proposal);
             let there: Vec<usize> = columns.into_iter().flatten().collect();
             let may_be_empty = there.iter().all(|column| self.is_in_some_rows(*column));
-            let part = scale.map_or_else(String::new, |scale| format!("{scale:?} "));
+            let mut said: Vec<_> = units
+                .iter()
+                .map(|(unit, scale)| scale.map_or_else(String::new, |scale| format!("{scale:?} ")) + unit)
+                .collect();
+            said.dedup();
             let axes = |there: bool| {
                 let named =
                     columns.iter().zip(["x", "y", "z"]).filter(|(column, _)| column.is_some() == there);
@@ -123,18 +144,20 @@ impl<'a> File<'a> {
                 none if none.is_empty() => none,
                 lacks => format!(" as {}; 0 for {lacks}, which the log does not have", axes(true)),
             };
-            proposal.notes.push(format!("{kind}: {} in {part}{unit}{as_axes}", self.listed(&there)));
-            sensors.push(Sensors { kind, columns, unit, scale, counter, may_be_empty });
+            proposal.notes.push(format!("{kind}: {} in {}{as_axes}", self.listed(&there), said.join(", ")));
+            sensors.push(Sensors { kind, columns, units, counter, may_be_empty });
         }
         let temperatures = self.temperatures(&meanings, proposal);
         let of_sensors = sensors.iter().flat_map(|it| it.columns).flatten();
         let used = of_sensors.chain(temperatures.iter().map(|it| it.column)).chain(counter).chain(time.date);
+        self.note_states(proposal);
         self.unused(&used.chain(time.column).collect::<Vec<_>>(), &sensors, proposal);
         let name = named.then(|| self.name.to_owned());
         FileText {
             name,
             found: self.found,
             skip_bad_rows: self.hints.skip_bad_rows,
+            select: self.select,
             time,
             sensors,
             temperatures,
@@ -208,8 +231,7 @@ impl<'a> File<'a> {
     }
 
     /// The columns of a kind, x, y and z, of the best of those that the log has; of gyros one or two are better than none.
-    fn group(meanings: &Meanings, kind: Kind) -> Option<([Option<usize>; 3], Meaning)> {
-        // Where only the first of three names its unit, the others have it too.
+    fn group(meanings: &Meanings, kind: Kind) -> Option<Axes<'_>> {
         let mut groups: BTreeMap<&str, Axes<'_>> = BTreeMap::new();
         for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == kind) {
             let axis = meaning.axis.unwrap_or(0);
@@ -218,52 +240,66 @@ impl<'a> File<'a> {
         let lacking = |axes: &Axes<'_>| axes.iter().filter(|axis| axis.is_none()).count();
         let rank = |axes: &Axes<'_>| axes.iter().flatten().map(|(_, meaning)| meaning.rank).min();
         let taken = groups.into_values().filter(|axes| kind == Kind::Gyro || lacking(axes) == 0);
-        let best = taken.min_by_key(|axes| {
+        taken.min_by_key(|axes| {
             (lacking(axes), rank(axes), axes.iter().flatten().next().map(|(index, _)| *index))
-        })?;
-        let first = best.iter().flatten().map(|(_, meaning)| *meaning).min_by_key(|meaning| meaning.rank)?;
-        Some((best.map(|axis| axis.map(|(index, _)| index)), first.clone()))
+        })
     }
 
-    /// The unit as the mapping spells it, and how much of it a reading of 1 is, where it is not one.
-    fn sensor_unit(
+    /// The unit of each as the mapping spells it, and how much of it a reading of 1 is, where it is not one.
+    fn sensor_units(self, axes: Axes<'_>, kind: &str, proposal: &mut Proposal) -> [(String, Option<f64>); 3] {
+        let hint = if kind == "gyro" { &self.hints.gyro_unit } else { &self.hints.accel_unit };
+        let there = || axes.iter().flatten();
+        let unknown = there().find_map(|(_, meaning)| meaning.unknown.clone());
+        // Where only the first of three names its unit, the others have it too.
+        let first = there().find(|(_, meaning)| meaning.unit.is_some()).map(|(_, meaning)| *meaning);
+        match (hint, first) {
+            (None, Some(first)) if unknown.is_none() => axes.map(|axis| {
+                let own = axis.map(|(_, meaning)| meaning).filter(|own| own.unit.is_some()).unwrap_or(first);
+                (own.unit.unwrap_or_default().to_owned(), own.scale)
+            }),
+            (Some(unit), _) => [(); 3].map(|()| (unit.clone(), None)),
+            _ => {
+                let unit = self.guessed_unit(axes, unknown, kind, proposal);
+                [(); 3].map(|()| (unit.to_owned(), None))
+            }
+        }
+    }
+
+    /// The unit of sensors whose names state none that is known: a guess, or a question.
+    fn guessed_unit(
         self,
-        columns: [Option<usize>; 3],
-        first: &Meaning,
+        axes: Axes<'_>,
+        unknown: Option<String>,
         kind: &str,
         proposal: &mut Proposal,
-    ) -> (String, Option<f64>) {
-        let hint = if kind == "gyro" { &self.hints.gyro_unit } else { &self.hints.accel_unit };
-        if let Some(unit) = hint {
-            return (unit.clone(), None);
-        }
-        if let Some(unit) = first.unit {
-            return (unit.to_owned(), first.scale);
-        }
+    ) -> &'static str {
+        let columns = axes.map(|axis| axis.map(|(index, _)| index));
+        let increment = axes.iter().flatten().any(|(_, meaning)| meaning.increment);
         let headed = |name: &str| self.found.header.iter().flatten().any(|have| have == name);
-        if headed("PacketCounter") && headed("Gyr_X") && !first.increment {
+        if headed("PacketCounter") && headed("Gyr_X") && !increment {
             proposal.notes.push(format!("{kind}: header of Xsens' MT Manager, which writes rad/s and m/s²"));
-            return (if kind == "gyro" { "rad_per_s" } else { "m_per_s2" }.to_owned(), None);
+            return if kind == "gyro" { "rad_per_s" } else { "m_per_s2" };
         }
         if kind == "accel"
-            && !first.increment
+            && unknown.is_none()
+            && !increment
             && let [Some(x), Some(y), Some(z)] = columns
             && let Some(size) = usual_size(self.found, [x, y, z])
             && let Some((unit, _)) = GRAVITY.iter().find(|(_, g)| (size / g - 1.0).abs() < 0.1)
         {
             proposal.notes.push(format!("accel: unit from the size at the beginning, {size:.4}"));
-            return ((*unit).to_owned(), None);
+            return unit;
         }
         let columns: Vec<usize> = columns.into_iter().flatten().collect();
         let largest = columns.iter().filter_map(|column| self.figures.columns.get(*column));
         let largest = largest.fold(0.0_f64, |largest, column| largest.max(column.largest)).to_string();
         let columns = self.listed(&columns);
         proposal.open.push(if kind == "gyro" {
-            Question::GyroUnit { columns, largest }
+            Question::GyroUnit { columns, unknown, largest }
         } else {
-            Question::AccelUnit { columns, largest }
+            Question::AccelUnit { columns, unknown, largest }
         });
-        ("raw".to_owned(), None)
+        "raw"
     }
 
     fn counter(self, meanings: &Meanings, proposal: &mut Proposal) -> Option<usize> {
@@ -287,26 +323,32 @@ impl<'a> File<'a> {
 
     fn time(self, meanings: &Meanings, counted: bool, proposal: &mut Proposal) -> Time {
         let named = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Time);
-        let mut clocks: Vec<_> = named.map(|(index, meaning)| (meaning.rank, *index, meaning.unit)).collect();
+        let mut clocks: Vec<_> = named
+            .map(|(index, meaning)| (meaning.rank, *index, meaning.unit, meaning.unknown.as_ref()))
+            .collect();
         // Dates and times of day say themselves what they are.
         let dated =
             self.figures.columns.iter().enumerate().filter(|(_, column)| column.stamp_unit().is_some());
-        let unnamed = dated.filter(|(index, _)| !clocks.iter().any(|(_, named, _)| named == index));
-        let unnamed: Vec<_> = unnamed.map(|(index, _)| (u8::MAX, index, None)).collect();
+        let unnamed = dated.filter(|(index, _)| !clocks.iter().any(|(_, named, ..)| named == index));
+        let unnamed: Vec<_> = unnamed.map(|(index, _)| (u8::MAX, index, None, None)).collect();
         clocks.extend(unnamed);
         clocks.sort_unstable();
         let (mut found, mut why) = (None, None);
-        for (_, index, unit) in clocks {
+        for (_, index, unit, unknown) in clocks {
             if let Some(column) = self.figures.columns.get(index).filter(|column| column.increases()) {
-                found = Some((index, unit, column));
+                found = Some((index, unit, unknown, column));
                 break;
             }
-            let words = format!("{} does not always grow", self.listed(&[index]));
+            let back = self.figures.columns.get(index).and_then(|column| column.back.as_ref());
+            let at = back.map_or_else(String::new, |(line, before, this)| {
+                format!(": {}:{line} has {this:?} after {before:?}; correct the row to use it", self.name)
+            });
+            let words = format!("{} does not always grow{at}", self.listed(&[index]));
             proposal.notes.push(format!("time: {words}: not used"));
             why.get_or_insert(words);
         }
         let stated = self.hints.rate_hz.or_else(|| rate_in(&self.found.preamble));
-        let Some((index, named_unit, column)) = found else {
+        let Some((index, named_unit, unknown, column)) = found else {
             let Some(rate) = stated else {
                 proposal.open.push(Question::Rate { file: self.name.to_owned(), why });
                 return Time { tick_ns: 1e7, ..Time::default() };
@@ -329,9 +371,10 @@ impl<'a> File<'a> {
             Some(*word)
         });
         let unit = self.hints.time_unit.as_deref().or(dated).or(named_unit).map(ToOwned::to_owned);
-        let unit = unit.or_else(|| unit_of(step, column.maximum, stated)).unwrap_or_else(|| {
-            let column = self.listed(&[index]);
-            proposal.open.push(Question::TimeUnit { column, step: step.to_string() });
+        let told = unit.or_else(|| unit_of(step, column.maximum, stated).filter(|_| unknown.is_none()));
+        let unit = told.unwrap_or_else(|| {
+            let (column, unknown) = (self.listed(&[index]), unknown.cloned());
+            proposal.open.push(Question::TimeUnit { column, unknown, step: step.to_string() });
             "s".to_owned()
         });
         let ns = UNITS_NS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, ns)| *ns);
@@ -349,6 +392,15 @@ impl<'a> File<'a> {
             column.steps.gaps,
             (column.steps.longest * ns).round() / 1e6
         ));
+        if self.figures.repeated > 0 {
+            let note = format!("time: {} rows repeat the row before them: dropped", self.figures.repeated);
+            proposal.notes.push(note);
+        }
+        if column.midnights > 0 {
+            let note =
+                format!("time: no date: passes midnight {} times, after each the next day", column.midnights);
+            proposal.notes.push(note);
+        }
         let date = self.found.date_and_time.filter(|(_, time)| *time == index).map(|(date, _)| date);
         Time {
             column: Some(index),
@@ -372,7 +424,8 @@ impl<'a> File<'a> {
         let mut found: Vec<Temperature> = Vec::new();
         for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Temperature) {
             let Some(column) = self.figures.columns.get(*index) else { continue };
-            let unit = meaning.unit.unwrap_or_else(|| {
+            let unknown = meaning.unknown.as_ref().filter(|text| !text.starts_with("deg") && *text != "°");
+            let unit = meaning.unit.or(unknown.map(|_| "raw")).unwrap_or_else(|| {
                 let likely = column.minimum > -90.0 && column.maximum < 200.0 && column.fractions > 0;
                 if likely { "deg_c" } else { "raw" }
             });
@@ -389,10 +442,13 @@ impl<'a> File<'a> {
                 channel = format!("{channel}_{}", found.len() + 1);
             }
             proposal.notes.push(format!(
-                "temperature: {} in {unit} as channel {channel:?}, {} to {}",
+                "temperature: {} in {unit} as channel {channel:?}, {} to {}{}",
                 self.listed(&[*index]),
                 column.minimum,
-                column.maximum
+                column.maximum,
+                unknown.map_or_else(String::new, |text| format!(
+                    "; the header states {text:?}, which import does not know: the calibration must take it as it is"
+                ))
             ));
             let may_be_empty = column.empty > 0;
             found.push(Temperature { channel, column: *index, unit, may_be_empty });

@@ -11,9 +11,8 @@ pub(super) struct Sensors {
     pub(super) kind: &'static str,
     /// Of x, y and z; `None` for an axis that the log does not have.
     pub(super) columns: [Option<usize>; 3],
-    pub(super) unit: String,
-    /// How much of the unit a reading of 1 is, where it is not one.
-    pub(super) scale: Option<f64>,
+    /// Of each; and how much of the unit a reading of 1 is, where it is not one.
+    pub(super) units: [(String, Option<f64>); 3],
     pub(super) counter: Option<usize>,
     pub(super) may_be_empty: bool,
 }
@@ -44,6 +43,8 @@ pub(super) struct FileText<'a> {
     pub(super) name: Option<String>,
     pub(super) found: &'a Found,
     pub(super) skip_bad_rows: bool,
+    /// Column of serials, and the one whose rows are taken.
+    pub(super) select: Option<(usize, &'a str)>,
     pub(super) time: Time,
     pub(super) sensors: Vec<Sensors>,
     pub(super) temperatures: Vec<Temperature>,
@@ -93,6 +94,10 @@ impl FileText<'_> {
         if self.skip_bad_rows {
             line(format_args!("on_bad_row = \"skip\""));
         }
+        if let Some((column, value)) = self.select {
+            let column = self.column(column);
+            line(format_args!("\n[file.select]\ncolumn = {column}\nvalue = {}", quoted(value)));
+        }
         line(format_args!("\n[file.time]"));
         if let Some(column) = time.column {
             line(format_args!("column = {}\nunit = \"{}\"", self.column(column), time.unit));
@@ -105,7 +110,7 @@ impl FileText<'_> {
             line(format_args!("gap_after_ticks = {ticks:?}"));
         }
         for sensors in &self.sensors {
-            let counts = sensors.unit == "counts";
+            let counts = sensors.units.iter().all(|(unit, _)| unit == "counts");
             let output = if counts { "counts" } else { "mean" };
             line(format_args!("\n[file.{}]\noutput = \"{output}\"", sensors.kind));
             if let Some(counter) = sensors.counter {
@@ -115,12 +120,12 @@ impl FileText<'_> {
                 line(format_args!("may_be_empty = true"));
             }
             line(format_args!("sensors = ["));
-            let scale = sensors.scale.map_or_else(String::new, |scale| format!(", scale = {scale:?}"));
-            for column in &sensors.columns {
+            for (column, (unit, scale)) in sensors.columns.iter().zip(&sensors.units) {
+                let scale = scale.map_or_else(String::new, |scale| format!(", scale = {scale:?}"));
                 let source = column.map_or("constant = 0.0".to_owned(), |column| {
                     format!("column = {}", self.column(column))
                 });
-                line(format_args!("    {{ {source}, unit = \"{}\"{scale} }},", sensors.unit));
+                line(format_args!("    {{ {source}, unit = \"{unit}\"{scale} }},"));
             }
             line(format_args!("]"));
         }

@@ -70,7 +70,7 @@ fn time(r: &mut Reader<'_>, path: &str, time: &TimeMapping, own_durations: bool)
     }
     let stamped = r.has(&at("column"));
     if stamped && !r.has(&at("unit")) {
-        let what = "is missing: unit of the stamps, \"ns\", \"us\", \"ms\", \"s\", \"iso\", \"dmy\", \"mdy\" or \"time_of_day\"";
+        let what = "is missing: unit of the stamps, \"ns\", \"us\", \"ms\", \"s\", \"min\", \"h\", \"iso\", \"dmy\", \"mdy\" or \"time_of_day\"";
         r.report(&at("unit"), what);
     }
     if time.stamps.as_ref().is_some_and(|stamps| stamps.date.is_some() && !stamps.unit.has_date()) {
@@ -123,7 +123,7 @@ fn ticks<U: SensorUnit>(r: &mut Reader<'_>, path: &str, ticks: &TickMapping<U>) 
     if ticks.duration_column.is_some() && ticks.duration_unit.is_none() {
         r.report(&unit, "is missing: unit of the duration column, \"ns\", \"us\", \"ms\" or \"s\"");
     }
-    if ticks.duration_column.is_some() && ticks.duration_unit.is_some_and(|unit| unit.exponent().is_none()) {
+    if ticks.duration_column.is_some() && ticks.duration_unit.is_some_and(|unit| unit.scale().is_none()) {
         r.report(&unit, "must be \"ns\", \"us\", \"ms\" or \"s\": a duration has no date");
     }
     // What the readings stand for is not known: nothing can be said of their units.

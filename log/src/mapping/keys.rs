@@ -134,6 +134,8 @@ impl SensorUnit for AccelUnit {
 pub enum TemperatureUnit {
     /// °C.
     DegC,
+    /// °F.
+    DegF,
     /// K.
     Kelvin,
     /// V.
@@ -143,16 +145,20 @@ pub enum TemperatureUnit {
 }
 
 impl TemperatureUnit {
-    /// What is added to a reading; −0 changes none.
+    /// A reading as it is sent.
     #[must_use]
-    pub fn shift(self) -> f64 {
-        if self == Self::Kelvin { -273.15 } else { -0.0 }
+    pub fn read(self, reading: f64) -> f64 {
+        match self {
+            Self::Kelvin => reading - 273.15,
+            Self::DegF => (reading - 32.0) / 1.8,
+            Self::DegC | Self::Volt | Self::Raw => reading,
+        }
     }
 
     /// What its readings are sent in.
     pub(crate) fn sent(self) -> &'static str {
         match self {
-            Self::DegC | Self::Kelvin => "°C",
+            Self::DegC | Self::DegF | Self::Kelvin => "°C",
             Self::Volt => "V",
             Self::Raw => "raw",
         }

@@ -54,7 +54,7 @@ fn a_sound_mapping_says_what_it_says() {
     assert_eq!((conversions[2].mid_scale, conversions[2].factor), (32768.0, 0.5));
     assert_eq!(gyro.switch.as_ref().unwrap().from, Some(SwitchFrom::ModeChange));
     assert_eq!(file.accel.as_ref().unwrap().sensors[0].column, Some(Column::Index(4)));
-    assert_eq!((file.temperatures[0].unit.shift(), file.temperatures[0].every_rows), (-273.15, 3));
+    assert_eq!((file.temperatures[0].unit.read(0.0), file.temperatures[0].every_rows), (-273.15, 3));
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn every_broken_line_is_named_with_its_place_and_key() {
         ("header = true", "header = true\ncomment = \"-\"", 5, 11, "file[0].comment"),
         ("header = true", "header = true\nskip_lines = -1", 5, 14, "file[0].skip_lines"),
         ("header = true", "header = true\non_bad_row = \"ignore\"", 5, 14, "file[0].on_bad_row"),
-        ("unit = \"ms\"", "unit = \"min\"", 7, 8, "file[0].time.unit"),
+        ("unit = \"ms\"", "unit = \"day\"", 7, 8, "file[0].time.unit"),
         ("unit = \"ms\"\n", "", 5, 1, "file[0].time.unit"),
         ("column = \"t\"\n", "", 6, 8, "file[0].time.unit"),
         ("tick_ms = 10\n", "", 5, 1, "file[0].time.tick_ms"),
@@ -112,7 +112,7 @@ fn every_broken_line_is_named_with_its_place_and_key() {
             11,
             "file[0].temperature[0].channel",
         ),
-        ("unit = \"kelvin\"", "unit = \"deg_f\"", 24, 8, "file[0].temperature[0].unit"),
+        ("unit = \"kelvin\"", "unit = \"rankine\"", 24, 8, "file[0].temperature[0].unit"),
         ("every_rows = 3", "every_rows = 0", 25, 14, "file[0].temperature[0].every_rows"),
         ("every_rows = 3", "every_rows = 3\nevery = 3", 26, 1, "file[0].temperature[0].every"),
     ];
@@ -146,7 +146,7 @@ fn all_problems_are_reported_at_once_in_the_order_of_lines() {
 
 #[test]
 fn a_problem_reads_like_a_sentence() {
-    let problems = Mapping::parse(&SOUND.replace("\"ms\"", "\"min\""), "m.toml").unwrap_err();
+    let problems = Mapping::parse(&SOUND.replace("\"ms\"", "\"day\""), "m.toml").unwrap_err();
     insta::assert_snapshot!(problems[0]);
     let syntax = Mapping::parse("version = 1\nfile = [", "m.toml").unwrap_err();
     assert_eq!((syntax.len(), syntax[0].line), (1, 2));

@@ -22,6 +22,12 @@ pub enum TimeUnit {
     /// Seconds.
     #[serde(rename = "s")]
     Seconds,
+    /// Minutes.
+    #[serde(rename = "min")]
+    Minutes,
+    /// Hours.
+    #[serde(rename = "h")]
+    Hours,
     /// None: date and time of ISO 8601, in UTC where they name no offset.
     #[serde(rename = "iso")]
     DateTime,
@@ -37,14 +43,16 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// What a number is to be multiplied by to be in ns, as a power of ten; `None` where stamps are no numbers.
+    /// What a number is to be multiplied by to be in ns, as a whole number and a power of ten; `None` where stamps are no numbers.
     #[must_use]
-    pub fn exponent(self) -> Option<i32> {
+    pub fn scale(self) -> Option<(u8, i32)> {
         match self {
-            Self::Nanoseconds => Some(0),
-            Self::Microseconds => Some(3),
-            Self::Milliseconds => Some(6),
-            Self::Seconds => Some(9),
+            Self::Nanoseconds => Some((1, 0)),
+            Self::Microseconds => Some((1, 3)),
+            Self::Milliseconds => Some((1, 6)),
+            Self::Seconds => Some((1, 9)),
+            Self::Minutes => Some((6, 10)),
+            Self::Hours => Some((36, 11)),
             Self::DateTime | Self::DayFirst | Self::MonthFirst | Self::TimeOfDay => None,
         }
     }

@@ -6,6 +6,10 @@ use isotherm_correction::sample::{CorrectedTick, SensorFlags, TickFlags};
 use isotherm_correction::units::{AngularRate, Span};
 use serde::Serialize;
 
+/// What a unit on the ground does not read over a whole log (m/s², °/s).
+const FORCES: std::ops::RangeInclusive<f64> = 5.0..=15.0;
+const MOST_RATE: f64 = 100.0;
+
 /// Sums over corrected ticks.
 #[derive(Debug, Clone, Default)]
 pub struct Sums {
@@ -23,6 +27,8 @@ pub struct Sums {
     angle_rad: [f64; 3],
     /// Velocity gained (m/s).
     velocity_m_per_s: [f64; 3],
+    /// The same, whatever its direction.
+    speed_m_per_s: f64,
     flags: FlagCounts,
 }
 
@@ -76,6 +82,9 @@ pub struct Summary {
     pub mean_rate_deg_per_h: [f64; 3],
     /// Mean specific force along the case axes (m/s²).
     pub mean_specific_force_m_per_s2: [f64; 3],
+    /// Mean size of the specific force (m/s²).
+    #[serde(skip)]
+    pub mean_force_m_per_s2: f64,
     /// Outputs with each flag that occurred.
     pub flags: BTreeMap<&'static str, u64>,
     /// Outputs in which any sensor has a flag other than `VALID`, for each that occurred.
@@ -106,6 +115,7 @@ impl Sums {
         for (sum, delta) in self.velocity_m_per_s.iter_mut().zip(tick.delta_velocity) {
             *sum += delta;
         }
+        self.speed_m_per_s += size(tick.delta_velocity);
         self.flags.add(tick);
     }
 
@@ -131,8 +141,30 @@ impl Sums {
                 .angle_rad
                 .map(|sum| AngularRate::from_rad_per_s(mean(sum)).as_deg_per_h()),
             mean_specific_force_m_per_s2: self.velocity_m_per_s.map(mean),
+            mean_force_m_per_s2: mean(self.speed_m_per_s),
             flags,
             sensor_flags,
         }
+    }
+}
+
+/// The size of a vector.
+fn size(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
+}
+
+impl Summary {
+    /// What looks like a wrong unit or scale, in words.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let (rate, force) = (size(self.mean_rate_deg_per_h) / 3600.0, self.mean_force_m_per_s2);
+        let check = "unless the unit moved so, check the units in the mapping and the calibration";
+        let rate =
+            (rate > MOST_RATE).then(|| format!("the mean rate of the whole log is {rate:.1} °/s: {check}"));
+        // Without accelerometers it is zero.
+        let force = (force > 0.0 && !FORCES.contains(&force)).then(|| {
+            format!("the mean specific force of the whole log is {force:.3} m/s², far from gravity: {check}")
+        });
+        rate.into_iter().chain(force).collect()
     }
 }

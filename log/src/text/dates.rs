@@ -14,8 +14,16 @@ pub(crate) fn stamp_ns(cell: &[u8], unit: TimeUnit) -> Option<i64> {
         TimeUnit::DayFirst => ordered_ns(cell, "%d/%m"),
         TimeUnit::MonthFirst => ordered_ns(cell, "%m/%d"),
         TimeUnit::TimeOfDay => civil_ns(&format!("1/1/1970 {}", with_point(cell)?), "%d/%m/%Y"),
-        TimeUnit::Nanoseconds | TimeUnit::Microseconds | TimeUnit::Milliseconds | TimeUnit::Seconds => None,
+        _ => None,
     }
+}
+
+/// A day of times of day (ns).
+pub(crate) const DAY_NS: i64 = 86_400_000_000_000;
+
+/// Whether a time of day is of the day after that of another (ns): it is more than half a day before it.
+pub(crate) fn is_next_day(before: i64, now: i64) -> bool {
+    before.saturating_sub(now) > DAY_NS / 2
 }
 
 /// Whether a cell is a date of numbers without a time.

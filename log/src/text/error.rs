@@ -95,10 +95,14 @@ pub enum Reason {
     #[error("is a duration below 0")]
     NegativeDuration,
     /// The time does not increase.
-    #[error("is not after the row before it, {previous_ns} ns: time must increase")]
+    #[error("is {}: time must increase", if *.again { format!("the time of line {line} again, with other values") } else { format!("not after {before:?} of line {line}") })]
     TimeNotIncreasing {
-        /// Time of the row before (ns).
-        previous_ns: i64,
+        /// Time of the row before, as it is written.
+        before: String,
+        /// Its line.
+        line: u64,
+        /// They are equal.
+        again: bool,
     },
     /// A step of time that no tick spans, where the mapping knows of no gaps.
     #[error(

@@ -1,5 +1,6 @@
 //! One file of a log: rows in, events out in time order.
 
+use std::ops::Range;
 use std::path::Path;
 
 use isotherm_correction::sample::TemperatureReading;
@@ -7,12 +8,13 @@ use isotherm_correction::units::{Span, Timestamp};
 
 use super::assemble::{Assembler, Parts};
 use super::cells::{Cell, OpenQuote, split};
+use super::dates::{DAY_NS, is_next_day};
 use super::error::{LogError, LogFault, Reason};
 use super::input::{LONGEST_LINE, Line, Lines, Source, decoded};
 use super::resolve::{Columns, TickCells, resolve};
 use super::row::{Fault, Readings, Row};
 use super::{LogEvent, ReadReport};
-use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping};
+use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping, TimeUnit};
 
 /// Most nominal ticks between two rows of a log without gaps.
 const LONGEST_STEP: u64 = 10;
@@ -38,8 +40,12 @@ pub(super) struct FileReader {
     assembler: Assembler,
     /// Temperature readings of the current row.
     readings: Vec<TemperatureReading>,
+    /// Midnights that times of day have passed (ns).
+    days_ns: i64,
     /// Stamp of the last good row.
     last_stamp: Option<i64>,
+    /// Its line: what it holds, where its stamp is in it, and its number.
+    last_line: (Vec<u8>, Range<usize>, u64),
     /// Its sequence number, where rows have one.
     last_number: Option<u64>,
     /// Rows since then that could not be read.
@@ -68,10 +74,13 @@ impl FileReader {
                 accel: None,
                 temperatures: Vec::new(),
                 status: None,
+                select: None,
             },
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
+            days_ns: 0,
             last_stamp: None,
+            last_line: (Vec::new(), 0..0, 0),
             last_number: None,
             bad_since: 0,
             width: None,
@@ -167,10 +176,13 @@ impl FileReader {
             Err(fault) => Err(fault),
         };
         match parts {
-            Ok(parts) => {
+            // Not a row of this stream.
+            Ok(None) => Ok(()),
+            Ok(Some(parts)) => {
                 self.report.rows += 1;
                 self.report.unterminated_last_line |= !self.lines.terminated();
                 self.last_stamp = Some(parts.stamp);
+                self.keep_line();
                 self.last_number = parts.number;
                 self.bad_since = 0;
                 self.assembler.take(parts, &self.readings, &self.columns);
@@ -178,6 +190,16 @@ impl FileReader {
             }
             Err(fault) => self.bad_row(fault, stamp),
         }
+    }
+
+    /// Keeps the line of a good row with a stamp, for what comes after it.
+    fn keep_line(&mut self) {
+        let stamp = self.columns.stamps.and_then(|stamp| self.cells.get(stamp.cell));
+        let Some(&Cell { start, end, .. }) = stamp else { return };
+        let (text, of_stamp, number) = &mut self.last_line;
+        text.clear();
+        text.extend_from_slice(self.lines.line());
+        (*of_stamp, *number) = (start..end, self.lines.number());
     }
 
     /// Passes over a bad row, where the mapping says so.
@@ -263,13 +285,32 @@ impl FileReader {
         Ok(i64::try_from(since).unwrap_or(i64::MAX))
     }
 
-    /// Reads all cells of the row that are used; `stamp` is set as soon as it is known to be good.
-    fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Parts, Fault> {
+    /// Reads all cells of the row that are used, where it is one of this stream; `stamp` is set as soon as it is known to be good.
+    fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Option<Parts>, Fault> {
         let row = Row::new(self.lines.line(), &self.cells, &self.layout);
+        if let Some((cell, value)) = &self.columns.select
+            && row.text(*cell)? != value.as_bytes()
+        {
+            self.report.rows_of_others += 1;
+            return Ok(None);
+        }
         let now = if let Some(cell) = self.columns.stamps {
-            let now = row.time_ns(cell)?.saturating_add(self.time.origin_ns);
-            if let Some(previous_ns) = self.last_stamp.filter(|last| now <= *last) {
-                let reason = Reason::TimeNotIncreasing { previous_ns };
+            let mut now = row.time_ns(cell)?.saturating_add(self.time.origin_ns).saturating_add(self.days_ns);
+            if cell.unit == TimeUnit::TimeOfDay && self.last_stamp.is_some_and(|last| is_next_day(last, now))
+            {
+                now = now.saturating_add(DAY_NS);
+                self.days_ns = self.days_ns.saturating_add(DAY_NS);
+                self.report.midnights += 1;
+            }
+            if let Some(last) = self.last_stamp.filter(|last| now <= *last) {
+                let (text, stamp, line) = &self.last_line;
+                if now == last && text == self.lines.line() {
+                    self.report.repeated_rows += 1;
+                    return Ok(None);
+                }
+                let before =
+                    String::from_utf8_lossy(text.get(stamp.clone()).unwrap_or_default()).into_owned();
+                let reason = Reason::TimeNotIncreasing { before, line: *line, again: now == last };
                 return Err(Fault { cell: Some(cell.cell), reason });
             }
             now
@@ -302,7 +343,7 @@ impl FileReader {
             if temperature.may_be_empty && row.is_empty(temperature.cell)? {
                 continue;
             }
-            let raw = row.float(temperature.cell)? + temperature.shift;
+            let raw = temperature.unit.read(row.float(temperature.cell)?);
             temperature.since = (temperature.since + 1) % temperature.every_rows;
             if due {
                 let reading =
@@ -312,7 +353,7 @@ impl FileReader {
         }
         let sequence = |readings: &Readings| readings.sequence;
         let number = gyro.as_ref().map(|(readings, _)| readings).or(accel.as_ref()).and_then(sequence);
-        Ok(Parts { stamp: now, number, gyro, accel })
+        Ok(Some(Parts { stamp: now, number, gyro, accel }))
     }
 
     /// What reading came to so far.

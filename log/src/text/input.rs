@@ -146,7 +146,7 @@ impl Lines {
     }
 
     /// Its number, from 1.
-    pub(super) fn number(&self) -> u64 {
+    pub(crate) fn number(&self) -> u64 {
         self.number
     }
 

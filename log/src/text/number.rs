@@ -63,8 +63,9 @@ pub(super) fn word(cell: &[u8]) -> Option<u64> {
     }
 }
 
-/// A time in ns, exactly as written and rounded to the nearest where it has more digits; its unit is 10^`exponent` ns.
-pub(super) fn time_ns(cell: &[u8], exponent: i32, decimal_mark: u8) -> Option<i64> {
+/// A time in ns, exactly as written and rounded to the nearest where it has more digits; its unit is
+/// `factor` · 10^`exponent` ns.
+pub(super) fn time_ns(cell: &[u8], (factor, exponent): (u8, i32), decimal_mark: u8) -> Option<i64> {
     let (negative, digits) = sign(cell);
     let split = digits.iter().position(|byte| byte.eq_ignore_ascii_case(&b'e'));
     let (mantissa, power) = match split.and_then(|at| digits.split_at_checked(at)) {
@@ -88,6 +89,8 @@ pub(super) fn time_ns(cell: &[u8], exponent: i32, decimal_mark: u8) -> Option<i6
     }
     let shift = i32::try_from(power.saturating_sub(places)).ok()?.checked_add(exponent)?;
     let scale = 10i128.checked_pow(shift.unsigned_abs());
+    // 30 digits and two more fit.
+    number *= i128::from(factor);
     let nanoseconds = match (shift >= 0, scale) {
         (true, Some(scale)) => number.checked_mul(scale)?,
         (true, None) if number == 0 => 0,
@@ -135,9 +138,11 @@ mod tests {
             (".5", 9, Some(500_000_000)),
         ];
         for (cell, exponent, expected) in table {
-            assert_eq!(time_ns(cell.as_bytes(), *exponent, b'.'), *expected, "{cell}");
+            assert_eq!(time_ns(cell.as_bytes(), (1, *exponent), b'.'), *expected, "{cell}");
         }
-        assert_eq!(time_ns(b"1,5", 9, b','), Some(1_500_000_000));
+        assert_eq!(time_ns(b"0.000166666667", (6, 10), b'.'), Some(10_000_000));
+        assert_eq!(time_ns(b"1.5", (36, 11), b'.'), Some(5_400_000_000_000));
+        assert_eq!(time_ns(b"1,5", (1, 9), b','), Some(1_500_000_000));
     }
 
     #[test]

@@ -5,8 +5,8 @@ use isotherm_document::escape::clipped;
 
 use super::error::Reason;
 use crate::mapping::{
-    Column, Conversion, FileMapping, ModeMapping, SensorUnit, StatusMapping, SwitchMapping, TickMapping,
-    TimeColumn, TimeUnit,
+    Column, Conversion, FileMapping, ModeMapping, SensorUnit, StatusMapping, SwitchMapping, TemperatureUnit,
+    TickMapping, TimeColumn, TimeUnit,
 };
 
 /// What of a header is shown, in characters.
@@ -103,8 +103,8 @@ pub(super) struct TemperatureCell {
     pub(super) channel: ChannelName,
     /// Which cell.
     pub(super) cell: usize,
-    /// Added to what it holds.
-    pub(super) shift: f64,
+    /// Its unit.
+    pub(super) unit: TemperatureUnit,
     /// Every how many rows a reading is taken.
     pub(super) every_rows: u64,
     /// Rows without a reading are in order.
@@ -126,6 +126,8 @@ pub(super) struct Columns {
     pub(super) temperatures: Vec<TemperatureCell>,
     /// What says whether a row holds, and where.
     pub(super) status: Option<(usize, StatusMapping)>,
+    /// What the unit's rows hold, and where.
+    pub(super) select: Option<(usize, String)>,
 }
 
 impl Columns {
@@ -201,7 +203,7 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
         Ok(TemperatureCell {
             channel: temperature.channel,
             cell: find(&temperature.column)?,
-            shift: temperature.unit.shift(),
+            unit: temperature.unit,
             every_rows: temperature.every_rows,
             may_be_empty: temperature.may_be_empty,
             since: 0,
@@ -210,7 +212,10 @@ pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Column
     let temperatures = temperatures.collect::<Result<_, Reason>>()?;
     let status =
         mapping.status.as_ref().map(|status| Ok((find(&status.column)?, status.clone()))).transpose()?;
-    let columns = Columns { stamps, gyro, accel, temperatures, status };
+    let select = mapping.select.as_ref();
+    let select =
+        select.map(|select| Ok((find(&select.column)?, select.value.trim().to_owned()))).transpose()?;
+    let columns = Columns { stamps, gyro, accel, temperatures, status, select };
     columns.apart().map(|()| columns)
 }
 

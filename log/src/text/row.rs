@@ -61,7 +61,7 @@ impl<'a> Row<'a> {
     }
 
     /// What a cell holds; an empty cell is in order.
-    fn text(&self, cell: usize) -> Result<&'a [u8], Fault> {
+    pub(super) fn text(&self, cell: usize) -> Result<&'a [u8], Fault> {
         let found = self.cells.get(cell).and_then(|at| self.line.get(at.start..at.end));
         found.ok_or_else(|| self.missing(cell))
     }
@@ -96,8 +96,8 @@ impl<'a> Row<'a> {
     /// A time (ns).
     pub(super) fn time_ns(&self, time: TimeCell) -> Result<i64, Fault> {
         let text = self.filled(time.cell)?;
-        let (ns, reason) = match (time.unit.exponent(), time.date) {
-            (Some(exponent), _) => (number::time_ns(text, exponent, self.decimal_mark), Reason::NotATime),
+        let (ns, reason) = match (time.unit.scale(), time.date) {
+            (Some(scale), _) => (number::time_ns(text, scale, self.decimal_mark), Reason::NotATime),
             (None, None) => (stamp_ns(text, time.unit), Reason::NotADateTime { unit: time.unit }),
             (None, Some(date)) => {
                 let whole = [self.filled(date)?, text].join(&b' ');

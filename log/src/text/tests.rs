@@ -390,7 +390,7 @@ fn a_last_row_that_is_cut_off_is_said_to_be() {
     for cut in ["10", "2", "20,1,-", "20,"] {
         assert!(error(&mapping, format!("10,1,7,20\n{cut}").as_bytes()).cut, "{cut}");
     }
-    let fault = error(&mapping, b"10,1,7,20\n10,1,7,20\n");
+    let fault = error(&mapping, b"10,1,7,20\n10,1,7,21\n");
     assert!(matches!(fault.reason, Reason::TimeNotIncreasing { .. }) && !fault.cut, "{fault}");
 }
 

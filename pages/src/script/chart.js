@@ -75,7 +75,8 @@ class Chart {
     const width = this.paper ? 720 : Math.max(this.stack.clientWidth, 280);
     const density = Math.min(Math.max(window.devicePixelRatio || 1, this.paper ? 2 : 1), 3);
     for (const panel of this.panels) panel.resize(width, density);
-    this.draw();
+    // At once: what has a new size is empty, and would be shown so.
+    this.drawNow();
   }
 
   visibleMarks() { return this.shape.marks.filter(mark => !this.hidden.has(mark.kind)); }

@@ -82,7 +82,6 @@ class ZoomChart extends Chart {
     document.documentElement.classList.toggle("paper", paper);
     this.colours = this.readColours();
     this.resize();
-    this.drawNow();
   }
 
   press(event) {

@@ -53,6 +53,9 @@ pub(super) struct ImportArgs {
     /// Unit of the time column, or the order of its dates (default: from the header, its cells and steps)
     #[arg(long, value_name = "UNIT", value_parser = PossibleValuesParser::new(TIME_UNITS))]
     time_unit: Option<String>,
+    /// Serial of the unit to take, if rows are of several
+    #[arg(long, value_name = "SERIAL")]
+    serial: Option<String>,
     /// Ticks per second, for a log without usable time (Hz)
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
@@ -96,6 +99,7 @@ impl ImportArgs {
             accel_unit: self.accel_unit.clone(),
             time_unit: self.time_unit.clone(),
             rate_hz: self.rate_hz,
+            serial: self.serial.clone(),
             skip_bad_rows: false,
         }
     }

@@ -71,6 +71,19 @@ pub(super) fn rows(report: &ReadReport) -> String {
     if report.bad_status_rows > 0 {
         let _ = writeln!(text, "{} rows were skipped because of their status", report.bad_status_rows);
     }
+    if report.repeated_rows > 0 {
+        let _ = writeln!(text, "{} rows repeat the row before them and were dropped", report.repeated_rows);
+    }
+    if report.midnights > 0 {
+        let _ = writeln!(
+            text,
+            "midnights passed by times without a date, after each the next day: {}",
+            report.midnights
+        );
+    }
+    if report.rows_of_others > 0 {
+        let _ = writeln!(text, "{} rows are of other units", report.rows_of_others);
+    }
     if report.cut_short {
         text += "the compressed log is cut short; everything before the end has been used\n";
     }

@@ -1,9 +1,10 @@
 //! A log as the messages that are to be played: due, filtered, in series of their own.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 
 use isotherm_bus::outlet::{GyroTicks, new_series};
+use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::part::{LogFiles, Messages};
@@ -75,6 +76,8 @@ pub(super) struct Playlist<'a> {
     /// When the units' next health readings are due, where they are given.
     health_due: Option<Timestamp>,
     ready: VecDeque<Cue>,
+    /// Temperature channels that the units have in the log.
+    pub(super) channels: BTreeMap<UnitId, BTreeSet<ChannelName>>,
 }
 
 impl<'a> Playlist<'a> {
@@ -83,8 +86,8 @@ impl<'a> Playlist<'a> {
         let messages = options.files.open(&options.part)?;
         let series = SeriesNumbers::from(options.series.unwrap_or_else(new_series));
         let schedule = schedule(options);
-        let ready = VecDeque::new();
-        Ok(Self { options, messages, first_bytes: None, schedule, series, health_due: None, ready })
+        let (ready, channels) = Default::default();
+        Ok(Self { options, messages, first_bytes: None, schedule, series, health_due: None, ready, channels })
     }
 
     /// Goes back to the beginning: what follows is of new series.
@@ -160,6 +163,8 @@ impl<'a> Playlist<'a> {
                 codec::decode::<TemperatureBatch>(&frame).map_or(unreadable, |batch| {
                     let ends = (batch.readings.first().zip(batch.readings.last()))
                         .map(|(first, last)| (first.time, last.time));
+                    let channels = self.channels.entry(unit.clone()).or_default();
+                    channels.extend(batch.readings.iter().map(|reading| reading.channel));
                     (Load::Temperature(batch.readings.len() as u64), ends)
                 })
             }

@@ -134,6 +134,9 @@ pub struct UnitReport {
     pub restarts: Option<u64>,
     /// Instances of one pair that have the unit, each of which may publish a tick; looked for where ticks or restarts are too many.
     pub instances: Option<u64>,
+    /// Temperature channels sent that the unit's calibration does not have.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown_channels: Vec<String>,
 }
 
 impl UnitReport {
@@ -148,6 +151,7 @@ impl UnitReport {
             runs: told(|account| account.runs),
             restarts: told(|account| account.restarts),
             instances: None,
+            unknown_channels: Vec::new(),
         }
     }
 

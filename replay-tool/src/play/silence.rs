@@ -1,6 +1,6 @@
-//! Saying why nothing comes back, before patience ends.
+//! Saying what the service says nothing of: why nothing comes back, before patience ends, and what it does not use.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -8,12 +8,13 @@ use std::time::Duration;
 use isotherm_bus::outlet::UnderWay;
 use isotherm_bus::presence;
 use isotherm_correction::operation;
+use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::{Output, Status};
 use tokio::time::Instant;
 use zenoh::Session;
 
-use super::Watch;
+use super::{PlayReport, UnitReport, Watch};
 
 /// Time between two looks.
 const LOOK: Duration = Duration::from_millis(500);
@@ -65,6 +66,24 @@ pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch
 pub(super) async fn explained(session: &Session, unit: &UnitId, ticks: u64, waited: Duration) -> String {
     let status = presence::status(session, unit, ANSWER).await;
     words(unit, ticks, waited, status.as_ref())
+}
+
+/// Notes the temperature channels sent that a unit's calibration does not have; of copies the first stands for all.
+pub(super) async fn note_unknown_channels(
+    session: &Session,
+    sent: &BTreeMap<UnitId, BTreeSet<ChannelName>>,
+    report: &mut PlayReport,
+) {
+    for (of, channels) in sent {
+        let is_sent =
+            |unit: &&mut UnitReport| unit.of == of.as_str() && unit.counts.temperature_readings_sent > 0;
+        let Some(unit) = report.units.iter_mut().find(is_sent) else { continue };
+        let Ok(serial) = UnitId::new(&unit.unit) else { continue };
+        let status = presence::status(session, &serial, ANSWER).await;
+        let Some(status) = status.filter(|status| status.calibration.is_some()) else { continue };
+        let unknown = channels.iter().filter(|name| status.channels.iter().all(|known| known.name != **name));
+        unit.unknown_channels = unknown.map(ToString::to_string).collect();
+    }
 }
 
 fn words(unit: &UnitId, ticks: u64, waited: Duration, status: Option<&Status>) -> String {

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
 
 use crate::common::{self, check, replay, root, stderr, stdout, told};
 
@@ -313,4 +313,24 @@ fn a_unit_that_a_recording_does_not_have_is_said_with_those_that_it_has() {
     });
     insta::assert_snapshot!(told.concat());
     assert!(!folder.path().join("x.html").exists() && !folder.path().join("x.csv").exists());
+}
+
+#[test]
+fn a_signal_leaves_nothing_behind_that_is_not_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["simulate", "--preset", "mems-chamber", "--duration", "10000000", "--out", "long.csv"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_isotherm-replay"))
+        .current_dir(folder.path())
+        .args(arguments)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !folder.path().join("long.csv.partial").exists() {
+        assert_eq!(child.try_wait().unwrap(), None);
+        std::thread::yield_now();
+    }
+    let asked = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(asked.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -336,11 +336,10 @@ fn st_thousandths_of_a_unit_are_a_scale() {
         let time = f64::from(u32::try_from(row).unwrap()) / 104.0;
         format!("{time:.6},1.5,-2.5,1000.{},{:.1},70.0,-35.0,77.{}", row % 10, noise(row, 16) * 1e3, row % 10)
     });
-    // What no mapping knows of a temperature is left to the document.
     let parts = [
         "column = \"G_x [mdps]\", unit = \"deg_per_s\", scale = 0.001 }",
         "column = \"A_z [mg]\", unit = \"mg\" }",
-        "column = \"Temp [F]\"\nunit = \"raw\"",
+        "column = \"Temp [F]\"\nunit = \"deg_f\"",
     ];
     let expected = Expected { parts: &parts, period_ns: 9_615_000, gaps: 0, temperatures: 1 };
     import("mems_studio.csv", text.as_bytes(), &[], &expected);

@@ -14,6 +14,7 @@ mod common;
 mod conversions;
 mod correct_diff_step;
 mod examples;
+mod import_faults;
 mod import_languages;
 mod imports;
 mod info_plot;

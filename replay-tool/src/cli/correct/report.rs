@@ -47,6 +47,9 @@ impl<'r> Report<'r> {
             if replica.further_notices > 0 {
                 show::warn(&format!("unit {}: {} more of these", unit.unit, replica.further_notices));
             }
+            for doubt in unit.summary.doubts() {
+                show::warn(&format!("unit {}: {doubt}", unit.unit));
+            }
         }
     }
 

@@ -78,10 +78,10 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     sink.finish(&inputs)?;
     bar.finish();
 
-    for trouble in unit.troubles() {
+    let (summary, log) = (sums.summary(), events.inner().report());
+    for trouble in unit.troubles().into_iter().chain(summary.doubts()) {
         show::warn(&trouble);
     }
-    let (summary, log) = (sums.summary(), events.inner().report());
     let digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
     let report = Report {
         unit: loaded.unit.as_str(),

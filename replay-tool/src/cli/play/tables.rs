@@ -1,5 +1,7 @@
 //! The summary as tables, and what must be said beside it.
 
+use std::collections::BTreeSet;
+
 use super::{Report, show};
 use crate::play::{Acknowledge, PlayOptions, PlayReport, UnitReport};
 use isotherm_document::few;
@@ -27,7 +29,14 @@ pub(super) fn warnings(play: &PlayReport) -> Vec<String> {
     let unreadable = of(|unit| unit.counts.messages_unreadable > 0).map(|units| {
         format!("{units}: some of the log's messages cannot be read; they were played unchanged")
     });
-    uncalibrated.into_iter().chain(mixed).chain(unreadable).collect()
+    let unknown = of(|unit| !unit.unknown_channels.is_empty()).map(|units| {
+        let channels: BTreeSet<_> = play.units.iter().flat_map(|unit| &unit.unknown_channels).collect();
+        let channels = few(channels);
+        format!(
+            "{units}: the calibration has no temperature channels {channels}: their readings were not used"
+        )
+    });
+    uncalibrated.into_iter().chain(mixed).chain(unreadable).chain(unknown).collect()
 }
 
 /// The summary as tables.

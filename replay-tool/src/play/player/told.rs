@@ -1,8 +1,11 @@
 //! Where playing is, and what it came to.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use isotherm_correction::sample::ChannelName;
 use isotherm_log::source::LogReport;
+use isotherm_protocol::key::UnitId;
 use tokio::time::Instant;
 
 use super::{Player, Stage};
@@ -62,6 +65,11 @@ impl<W: Watch> Player<'_, W> {
     /// What reading the log came to.
     pub(in crate::play) fn log_report(&self) -> LogReport {
         self.playlist.report()
+    }
+
+    /// Temperature channels that the units have in the log.
+    pub(in crate::play) fn channels(&self) -> &BTreeMap<UnitId, BTreeSet<ChannelName>> {
+        &self.playlist.channels
     }
 
     /// What playing came to.

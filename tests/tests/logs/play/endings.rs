@@ -120,3 +120,19 @@ async fn a_row_that_cannot_be_read_ends_playing_with_its_place() {
     assert_eq!(output.status.code(), Some(1), "{errors}");
     assert!(errors.contains("log.csv:402:1: "), "{errors}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_temperature_channel_that_the_calibration_does_not_have_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let [log, mapping] = simulated(folder.path(), "mems-chamber", 2);
+    let text = std::fs::read_to_string(&mapping).unwrap();
+    std::fs::write(&mapping, text.replacen("channel = \"gyro0\"", "channel = \"girO0\"", 1)).unwrap();
+    let service = service();
+    let arguments =
+        ["-m", &mapping, &log, "-u", UNIT, "--connect", &service.locator, "--speed", "max", "--json"];
+    let player = begin(&arguments);
+    let output = in_time(LIMIT, move || player.wait_with_output().unwrap()).await;
+    assert_eq!(summary(&output, 0)["units"][0]["unknown_channels"], json!(["girO0"]));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(errors.contains("MEMS-0001: the calibration has no temperature channels girO0: "), "{errors}");
+}

@@ -1,0 +1,162 @@
+//! `import` on logs as test benches write them, with what is odd in them.
+
+use std::path::Path;
+
+use super::common::{check, replay, root, stderr, stdout, told};
+use super::imports::{Expected, TEN_MS, import, log, noise};
+
+/// Writes a log into a folder, and says what `import` says of it on standard error.
+fn imported(folder: &Path, name: &str, text: &str, options: &[&str]) -> String {
+    std::fs::write(folder.join(name), text).unwrap();
+    told(folder, &[&["import", name, "--no-plot"], options].concat())
+}
+
+#[test]
+fn units_that_a_header_states_are_kept() {
+    let front = "time_min,gx_deg_h,gy_deg_h,gz_mrad_s,ax_gal,ay_gal,az_gal,temp_F\n";
+    let row = |row: usize| {
+        let minutes = f64::from(u32::try_from(row).unwrap()) * 1e-3;
+        format!("{minutes:.3},{:.4},10.5,-3.25,1.5,-2.5,980.{},77.{}", noise(row, 1), row % 10, row % 10)
+    };
+    let parts = [
+        "column = \"time_min\"\nunit = \"min\"",
+        "column = \"gx_deg_h\", unit = \"deg_per_h\" }",
+        "column = \"gz_mrad_s\", unit = \"rad_per_s\", scale = 0.001 }",
+        "column = \"az_gal\", unit = \"m_per_s2\", scale = 0.01 }",
+        "channel = \"imu\"\ncolumn = \"temp_F\"\nunit = \"deg_f\"",
+    ];
+    let expected = Expected { parts: &parts, period_ns: 60_000_000, gaps: 0, temperatures: 1 };
+    import("bench.csv", log(front, row).as_bytes(), &[], &expected);
+
+    // What no mapping can state is asked for, not guessed: 9.8 would be taken for gravity in m/s².
+    let front =
+        "time [jiffies],gx [furlong],gy [furlong],gz [furlong],ax [kPa],ay [kPa],az [kPa],temp [mV]\n";
+    let text =
+        log(front, |row| format!("{},1.5,2.5,{:.3},0.1,0.2,9.8,25.{}", row * 10, noise(row, 2), row % 10));
+    let folder = tempfile::tempdir().unwrap();
+    insta::assert_snapshot!(imported(folder.path(), "odd.csv", &text, &[]));
+    let units = ["--gyro-unit", "raw", "--accel-unit", "raw", "--time-unit", "ms"];
+    let output = stdout(&replay(folder.path(), &[&["import", "odd.csv", "--no-plot"][..], &units].concat()));
+    let temperature =
+        "  temperature: temp [mV] in raw as channel \"imu\", 25 to 25.9; the header states \"mV\"";
+    assert!(output.contains(temperature), "{output}");
+}
+
+#[test]
+fn of_rows_of_several_units_one_is_taken() {
+    // Two units by turns, each with its own time.
+    let text = log("serial,time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+        let (serial, time) = (["A-17", "B-4"][row % 2], f64::from(u32::try_from(row / 2).unwrap()) * 0.01);
+        format!("{serial},{time:.2},{:.3},{}.5,0.1", noise(row, 3), row % 2)
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let refused =
+        imported(path, "two.csv", &text, &[]) + &imported(path, "two.csv", &text, &["--serial", "C-1"]);
+    insta::assert_snapshot!(refused);
+    let output = stdout(&replay(path, &["import", "two.csv", "--no-plot", "--serial", "B-4"]));
+    assert!(output.contains("250 rows are of other units"), "{output}");
+    let mapping = std::fs::read_to_string(path.join("two.mapping.toml")).unwrap();
+    assert!(mapping.contains("[file.select]\ncolumn = \"serial\"\nvalue = \"B-4\""), "{mapping}");
+    assert!(mapping.contains("250 rows") && mapping.contains("tick_ns = 10000000.0"), "{mapping}");
+}
+
+#[test]
+fn a_row_out_of_order_is_named_with_both_times() {
+    let table = |at_300: usize| {
+        log("time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+            let time = f64::from(u32::try_from(if row == 300 { at_300 } else { row }).unwrap()) * 0.01;
+            format!("{time:.2},{:.3},1.5,0.1", noise(row, 4))
+        })
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let asked = imported(path, "late.csv", &table(5), &[]);
+    // By a mapping that was made of a log in order.
+    std::fs::write(path.join("whole.csv"), table(300)).unwrap();
+    check(&replay(path, &["import", "whole.csv", "--no-plot"]), 0);
+    insta::assert_snapshot!(asked + &told(path, &["info", "late.csv", "--mapping", "whole.mapping.toml"]));
+}
+
+#[test]
+fn a_time_of_day_goes_on_over_midnight() {
+    let text = log("clock,gx_dps,gy_dps,gz_dps\n", |row| {
+        let ms = (86_398_000 + row * 10) % 86_400_000;
+        let (s, ms) = (ms / 1000, ms % 1000);
+        format!("{:02}:{:02}:{:02}.{ms:03},{:.3},1.5,0.1", s / 3600, s / 60 % 60, s % 60, noise(row, 5))
+    });
+    let parts = ["unit = \"time_of_day\"", "passes midnight 1 times"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    import("night.csv", text.as_bytes(), &[], &expected);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("night.csv"), &text).unwrap();
+    let output = stdout(&replay(folder.path(), &["import", "night.csv", "--no-plot"]));
+    assert!(
+        output.contains("midnights passed by times without a date, after each the next day: 1"),
+        "{output}"
+    );
+}
+
+#[test]
+fn a_column_of_states_is_said_to_be_ignored_and_how_it_would_not_be() {
+    let text = log("time_s,gx_dps,gy_dps,gz_dps,valid,test status\n", |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+        let (valid, status) = if row % 100 == 50 { (0, "FAIL") } else { (1, "OK") };
+        format!("{time:.2},{:.3},1.5,0.1,{valid},{status}", noise(row, 6))
+    });
+    let parts = [
+        "status: valid is ignored: \"1\" in 495 rows, \"0\" in 5 rows; to pass over other rows, add [file.status] with column = 5 and good = [\"1\"]",
+        "status: test status is ignored: \"OK\" in 495 rows, \"FAIL\" in 5 rows",
+    ];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    let (mapping, _) = import("states.csv", text.as_bytes(), &[], &expected);
+    // As the note says.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("states.csv"), &text).unwrap();
+    let mapping = mapping + "\n[file.status]\ncolumn = 5\ngood = [\"1\"]\n";
+    std::fs::write(folder.path().join("states.mapping.toml"), mapping).unwrap();
+    let output = stdout(&replay(folder.path(), &["info", "states.csv"]));
+    assert!(output.contains("5 rows were skipped because of their status"), "{output}");
+}
+
+#[test]
+fn rows_that_a_logger_wrote_twice_are_dropped_and_counted() {
+    let table = |second: &str| {
+        log("time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+            let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+            let row = format!("{time:.2},{:.3},1.5,0.1", noise(row, 7));
+            format!("{row}\n{row}{second}")
+        })
+    };
+    let parts = ["500 rows repeat the row before them: dropped"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    import("twice.csv", table("").as_bytes(), &[], &expected);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("twice.csv"), table("")).unwrap();
+    let output = stdout(&replay(path, &["import", "twice.csv", "--no-plot"]));
+    assert!(output.contains("500 rows repeat the row before them and were dropped"), "{output}");
+    // The same time with other values is neither.
+    std::fs::write(path.join("other.csv"), table("5")).unwrap();
+    insta::assert_snapshot!(told(path, &["info", "other.csv", "--mapping", "twice.mapping.toml"]));
+}
+
+#[test]
+fn a_log_that_is_read_in_a_wrong_unit_is_doubted() {
+    let text = log("time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n", |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+        format!("{time:.2},{:.3},1.5,5.1,0.001,0.002,1.000", noise(row, 8))
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let document = root().join("config/calibration/chamber-mems.toml").canonicalize().unwrap();
+    imported(path, "rest.csv", &text, &[]);
+    let right = std::fs::read_to_string(path.join("rest.mapping.toml")).unwrap();
+    let wrong = right.replace("deg_per_s", "rad_per_s").replace("unit = \"g\"", "unit = \"m_per_s2\"");
+    std::fs::write(path.join("wrong.toml"), wrong).unwrap();
+    let corrected = |mapping| {
+        let document = document.to_str().unwrap();
+        stderr(&replay(path, &["correct", "rest.csv", "--mapping", mapping, "--calibration", document]))
+    };
+    insta::assert_snapshot!(format!("{}---\n{}", corrected("rest.mapping.toml"), corrected("wrong.toml")));
+}
