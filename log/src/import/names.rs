@@ -158,8 +158,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     };
     let by_name = || named(kind, increment, &parts);
     let found = stated.and_then(|text| Some((unit(kind, increment, text)?, parts.len()))).or_else(by_name);
-    // Channels have their name without the unit.
-    let ends = found.map(|(_, begins)| begins).filter(|_| kind == Kind::Temperature).unwrap_or(parts.len());
+    let ends = found.map_or(parts.len(), |(_, ends)| ends);
     let found = found.map(|(unit, _)| unit);
     let unknown = stated.filter(|_| found.is_none()).map(ToOwned::to_owned);
     let mut rank = u8::from(found.is_none()) * 4;
@@ -176,7 +175,11 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         rank += u8::from(!has(&["startup", "timestamp", "stamp", "sensor"])) * 2;
         rank += u8::from(has(&["header", "mag", "baro"]));
     }
-    let stem = parts[..ends].join(" ");
+    let mut stem = parts[..ends].join(" ");
+    if ends < parts.len() && kind != Kind::Temperature {
+        // Each axis may have its own unit; readings without one are others.
+        stem += " unit";
+    }
     let axis = axis.filter(|_| kind != Kind::Time);
     let scale = found.map(|(_, scale)| scale).filter(|scale| (scale - 1.0).abs() > f64::EPSILON);
     let unit = found.map(|(unit, _)| unit);
@@ -325,5 +328,7 @@ mod tests {
         assert_eq!(stem("Gyr_X"), stem("Gyr_Z"));
         assert_eq!(stem("gyrox"), stem("gyroz"));
         assert_ne!(stem("Gyr_Raw_X"), stem("Gyro_DPS_X"));
+        assert_eq!(stem("gx_deg_h"), stem("gz_mrad_s"));
+        assert_ne!(stem("gx_deg_h"), stem("gx"));
     }
 }

@@ -106,14 +106,17 @@ fn known(kind: Kind, increment: bool, plain: &str) -> Option<Unit> {
     Some((unit, scale))
 }
 
-/// The unit that the parts of a name have after the first, and where it begins: `deg`, `h` of `gx_deg_h`.
+/// The unit that the parts of a name have after the first, such as `deg`, `h` of `gx_deg_h`; and how many parts name the quantity: those
+/// before a unit at the end, but raw readings are a quantity of their own.
 pub(super) fn named(kind: Kind, increment: bool, parts: &[String]) -> Option<(Unit, usize)> {
     let places = (1..=4).rev().flat_map(|length| (1..parts.len()).rev().map(move |start| (start, length)));
     let found = places.into_iter().find_map(|(start, length)| {
         let text = parts.get(start..start + length)?.concat();
+        let at_end = start + length == parts.len();
         // A letter is a unit at the end alone.
-        let stands = text.len() > 1 || start + length == parts.len();
-        Some((unit(kind, increment, &text).filter(|_| stands)?, start))
+        let found = unit(kind, increment, &text).filter(|_| at_end || text.len() > 1)?;
+        let is_raw = matches!(found.0, "raw" | "raw_per_tick" | "counts");
+        Some((found, if at_end && !is_raw { start } else { parts.len() }))
     });
     let has = |word: &str| parts.iter().any(|part| part == word);
     let pair = |pair: [&str; 2]| parts.windows(2).any(|parts| parts == pair);
