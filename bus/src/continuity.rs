@@ -39,13 +39,13 @@ impl Continuity {
         let ticks = u64::from(tick.ticks.max(1));
         let first = sequence.saturating_sub(ticks - 1);
         match self.last {
-            Some(last) if last.0 != series || flags.contains(TickFlags::RESTART) => self.restarts += 1,
-            Some((_, last)) => {
+            Some(_) if flags.contains(TickFlags::RESTART) => self.restarts += 1,
+            Some((same, last)) if same == series => {
                 let expected = last.saturating_add(1).saturating_add(missed);
                 self.lost += first.saturating_sub(expected);
                 self.duplicated += expected.saturating_sub(first);
             }
-            None => {}
+            _ => {}
         }
         self.ticks += ticks;
         self.announced_missing += missed;

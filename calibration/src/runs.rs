@@ -140,7 +140,9 @@ impl Run {
                 LogEvent::Accel { tick, .. } => tick.readings.get_mut(*sensor),
                 LogEvent::Temperature(_) => None,
             };
-            reading.into_iter().for_each(|reading| *reading = f64::NAN);
+            if let Some(reading) = reading {
+                *reading = f64::NAN;
+            }
         }
         kept
     }

@@ -2417,9 +2417,9 @@ static inline uint64_t isotherm_first(const isotherm_corrected_tick *tick) {
 /* Enters a tick of a batch of this series. */
 static inline void isotherm_enter(isotherm_account *account, uint64_t series, const isotherm_corrected_tick *tick) {
     const uint64_t first = isotherm_first(tick);
-    if (account->begun && (series != account->series || (tick->flags & ISOTHERM_TICK_RESTART) != 0)) {
+    if (account->begun && (tick->flags & ISOTHERM_TICK_RESTART) != 0) {
         ++account->restarts;
-    } else if (account->begun) {
+    } else if (account->begun && series == account->series) {
         const uint64_t expected = isotherm_add_saturating(isotherm_add_saturating(account->last, 1), tick->missed);
         if (first > expected) account->lost = isotherm_add_saturating(account->lost, first - expected);
         if (first < expected) account->duplicated = isotherm_add_saturating(account->duplicated, expected - first);

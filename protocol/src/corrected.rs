@@ -107,7 +107,9 @@ impl Message for CorrectedBatch {
             .map(|applied| (&applied.channel, [applied.temperature_deg_c, applied.rate_deg_c_per_s]));
         let Self { ref unit, series, revision, ref ticks, ref sigmas, .. } = *self;
         Head { unit, series, revision, temperatures, ticks: ticks.len() }.append(frame);
-        ticks.iter().for_each(|tick| append_tick(frame, tick));
+        for tick in ticks {
+            append_tick(frame, tick);
+        }
         sigma::append(frame, series, sigmas);
         Ok(())
     }

@@ -31,6 +31,7 @@ pub(super) struct TickTally {
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
     run: u64,
+    series: u64,
     first: u64,
     last: u64,
     /// It was sent behind a later one.
@@ -82,7 +83,7 @@ impl TickTally {
         let mut new = 0;
         for (first, last) in self.run.sent.add(first, last) {
             new += last - first + 1;
-            self.enter(Stretch { run: self.run.number, first, last, late });
+            self.enter(Stretch { run: self.run.number, series, first, last, late });
         }
         self.account.ticks_sent += new;
         self.account.ticks_sent_again += count - new;
@@ -112,8 +113,12 @@ impl TickTally {
         self.continuity.feed(tick);
         let last = tick.sequence;
         let first = last.saturating_sub(u64::from(tick.ticks.max(1)) - 1);
-        let Some(index) = self.under_way.iter().position(|other| other.first <= last && last <= other.last)
-        else {
+        // A pair may still send of the series before; without a number of its series, a tick is of any.
+        let is_of = |other: &Stretch| {
+            (other.first..=other.last).contains(&last) && [0, other.series].contains(&tick.series)
+        };
+        let Some(index) = self.under_way.iter().position(is_of) else {
+            self.account.ticks_duplicated += last - first + 1;
             return;
         };
         let run = self.under_way.get(index).map_or(0, |stretch| stretch.run);
@@ -148,7 +153,6 @@ impl TickTally {
             ticks_not_sent: self.account.ticks_not_sent + self.run.sent.missing(),
             ticks_under_way: self.ticks,
             ticks_announced_missing: self.continuity.announced_missing,
-            ticks_duplicated: self.continuity.duplicated,
             ticks_uncalibrated: self.continuity.uncalibrated,
             restarts: self.continuity.restarts,
             runs: self.run.number,

@@ -25,7 +25,7 @@ pub(crate) fn base_of(base: Option<&Written>) -> toml::Value {
 
 /// Head of the digest of a document's text.
 pub(super) fn digest_of(document: &Written) -> String {
-    document.loaded.digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    format!("{:016x}", u64::from_be_bytes(document.loaded.digest))
 }
 
 /// The origin of a document made from logs by a command; method, ranges and residuals are the fit's to add.

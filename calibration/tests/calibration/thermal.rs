@@ -18,6 +18,7 @@ mod scale;
 mod service;
 mod sparse;
 
+use isotherm_calibration::fits::thermal::bare::bare;
 use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, fit};
 use isotherm_calibration::report::Report;
 use isotherm_calibration::runs::Run;
@@ -39,14 +40,15 @@ fn run(scenario: &Scenario) -> Run {
     simulated_logs::run("simulated", &scenario.unit, events)
 }
 
-/// The shipped document of the fibre-optic unit without accelerometers: scale and axes are those of the simulated instrument.
+/// The shipped document of the fibre-optic unit without accelerometers and without terms that a fit could be worse than: scale and axes are
+/// those of the simulated instrument.
 fn base() -> Document {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/FOG-0001.toml");
     let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     document.accel = None;
     document.origin = None;
     document.note = None;
-    document
+    bare(&document)
 }
 
 fn settings(method: Method) -> Settings {

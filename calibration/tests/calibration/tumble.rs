@@ -420,9 +420,9 @@ fn accelerometers_are_in_what_the_mapping_states() {
     let (sensors, _) = text.split_once("[[file.temperature]]").unwrap();
     let output = |unit: &str, given: Option<&str>| {
         let states = |column: usize| format!("column = {column}, unit = \"raw\"");
-        let stated =
+        let in_unit =
             |text: String, column| text.replace(&states(column), &states(column).replace("raw", unit));
-        let mapping = Mapping::parse(&(5..8).fold(sensors.to_owned(), stated), "mapping.toml").unwrap();
+        let mapping = Mapping::parse(&(5..8).fold(sensors.to_owned(), in_unit), "mapping.toml").unwrap();
         let unit = unit_id("MEMS-0001").unwrap();
         let (paths, mapping) = (vec![log.clone()], Box::new(mapping));
         let files = LogFiles::Text { paths, mapping, unit: unit.clone(), batch_ticks: 64 };

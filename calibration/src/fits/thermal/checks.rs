@@ -232,13 +232,12 @@ pub fn far(
             let Some(at) = far.first().copied().filter(|_| !gyro || document.mode_reversal.is_none()) else {
                 continue;
             };
-            let mut windows: Vec<f64> =
-                far.iter().map(|tick| libm::floor(since_s(*tick) / window_s)).collect();
-            windows.dedup();
-            let few = real(windows.len()) * window_s <= (MOST_FAR * ticks.length_s()).max(window_s);
+            let mut hit: Vec<f64> = far.iter().map(|tick| libm::floor(since_s(*tick) / window_s)).collect();
+            hit.dedup();
+            let few = real(hit.len()) * window_s <= (MOST_FAR * ticks.length_s()).max(window_s);
             let single = few && far.chunk_by(|a, b| a + 1 == *b).all(|row| row.len() <= SINGLE);
             let (count, value, at_s) = (far.len(), scale * readings[at], since_s(at));
-            let words = ThermalKind::Far { count, value, measure, at_s, windows: windows.len(), single };
+            let words = ThermalKind::Far { count, value, measure, at_s, windows: hit.len(), single };
             let to = if single { &mut found.warnings } else { &mut found.refusals };
             to.push(format!("{name}: {kind} {}: {words}", sensor_name(index, ticks.readings.len())));
             all.extend(far.into_iter().filter(|_| single).map(|tick| (ticks.end_ns[tick], gyro, index)));

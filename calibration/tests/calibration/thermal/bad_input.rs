@@ -452,7 +452,7 @@ fn a_run_without_a_moving_temperature_does_not_judge() {
             assert!(verdict.out_of_sample.is_none() && said, "{}", verdict.words());
         }
         let about = report.warnings.iter().filter(|words| words.contains("not judged"));
-        told += &about.map(|words| format!("{words}\n")).collect::<String>();
+        about.for_each(|words| told.extend([words, "\n"]));
     }
     insta::assert_snapshot!(told);
 }
@@ -465,7 +465,7 @@ fn a_frozen_thermometer_is_told() {
     // One that judges is told of.
     let report = judged(frozen(2000)).unwrap().report;
     let about = report.warnings.iter().filter(|words| words.contains("frozen"));
-    told += &about.map(|words| format!("\n{words}")).collect::<String>();
+    about.for_each(|words| told.extend(["\n", words]));
     insta::assert_snapshot!(told);
     // Steps of half a degree are none.
     let coarse = |s: u32| Second { deg_c: (2.0 * usual(s).deg_c).round() / 2.0, ..usual(s) };

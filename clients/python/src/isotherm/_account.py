@@ -66,9 +66,9 @@ class Account:
 
     def _enter(self, tick: Any, series: int) -> None:
         missed, first = int(tick["missed"]), _first(tick)
-        if self.last_sequence is not None and (series != self.last_series or int(tick["flags"]) & _RESTART):
+        if self.last_sequence is not None and int(tick["flags"]) & _RESTART:
             self.restarts += 1
-        elif self.last_sequence is not None:
+        elif self.last_sequence is not None and series == self.last_series:
             expected = min(_MOST, self.last_sequence + 1 + missed)
             self.lost += max(0, first - expected)
             self.duplicated += max(0, expected - first)

@@ -19,7 +19,7 @@ const STATES: [&str; 11] =
 pub(super) struct Serials {
     index: usize,
     question: Question,
-    serials: Vec<String>,
+    cells: Vec<String>,
 }
 
 impl File<'_> {
@@ -50,10 +50,10 @@ impl File<'_> {
     /// The column of serials, where rows are of several units.
     pub(super) fn serials(self) -> Option<Serials> {
         let (index, values) = self.few(&SERIALS).find(|(_, values)| values.len() > 1)?;
-        let serials: Vec<_> = values.into_iter().map(|(value, _)| value).collect();
+        let cells: Vec<_> = values.into_iter().map(|(value, _)| value).collect();
         let (file, column) = (self.name.to_owned(), self.listed(&[index]));
-        let question = Question::Serial { file, column, serials: serials.clone() };
-        Some(Serials { index, question, serials })
+        let question = Question::Serial { file, column, serials: cells.clone() };
+        Some(Serials { index, question, cells })
     }
 }
 
@@ -65,7 +65,7 @@ pub(super) fn select<'h>(
     proposal: &mut Proposal,
 ) -> Result<Option<(usize, &'h str)>, Error> {
     match (serials, hints.serial.as_deref()) {
-        (Some(column), Some(serial)) if column.serials.iter().any(|have| have == serial) => {
+        (Some(column), Some(serial)) if column.cells.iter().any(|have| have == serial) => {
             Ok(Some((column.index, serial)))
         }
         (Some(column), _) => {
