@@ -117,6 +117,16 @@ impl SessionOptions {
         Ok(is("access_control/enabled", "true") || is("mode", "\"client\""))
     }
 
+    /// Whether a session with these options listens or connects over TLS.
+    ///
+    /// # Errors
+    /// As [`Self::to_config`].
+    pub fn uses_tls(&self) -> Result<bool, BusError> {
+        let config = self.to_config()?;
+        let is_tls = |key| endpoints(&config, key).iter().any(|endpoint| endpoint.starts_with("tls/"));
+        Ok(is_tls("listen/endpoints") || is_tls("connect/endpoints"))
+    }
+
     /// The endpoints that a session connects to: the configured ones, and those of the Zenoh configuration.
     ///
     /// # Errors
@@ -308,6 +318,8 @@ mod tests {
         let file = SessionOptions { config: Some("peer.json5".into()), ..nothing };
         assert_eq!(listens(file), Vec::<String>::new());
         assert_eq!(endpoints(&own.to_config().unwrap(), "listen/endpoints"), ["tcp/127.0.0.1:0"]);
+        let tls = SessionOptions { connect: vec!["tls/router:7447".to_owned()], ..own.clone() };
+        assert!(tls.uses_tls().unwrap() && !own.uses_tls().unwrap());
     }
 
     #[test]

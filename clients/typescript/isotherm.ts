@@ -142,9 +142,7 @@ export interface RateReference {
 
 export interface CorrectedBatch {
   unit: string;
-  /** calibration of every tick of the batch */
   revision: Revision;
-  /** smoothed, at the end */
   temperatures: Array<AppliedTemperature>;
   ticks: Array<CorrectedTick>;
 }
@@ -154,7 +152,6 @@ export interface CorrectedBatch2 {
   revision: Revision;
   temperatures: Array<AppliedTemperature>;
   ticks: Array<CorrectedTick>;
-  /** each from its tick up to the next one's */
   sigmas: Array<Sigma>;
 }
 
@@ -162,10 +159,12 @@ export interface CorrectedBatch3 {
   unit: string;
   /** of the gyro batches that it is made of */
   series: number;
+  /** calibration of every tick of the batch */
   revision: Revision;
+  /** smoothed, at the end */
   temperatures: Array<AppliedTemperature>;
   ticks: Array<CorrectedTick>;
-  /** or none */
+  /** each from its tick up to the next one's; or none */
   sigmas: Array<Sigma>;
 }
 

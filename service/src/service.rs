@@ -94,6 +94,11 @@ pub(crate) async fn start_on(
              any name"
         );
     }
+    if settings.zenoh.session.uses_tls()? {
+        tracing::warn!(
+            "over tls/ a connection that carries much both ways may break, or end the service (eclipse-zenoh/zenoh#2557): use              a VPN for streams between machines, tls/ for swaps and commands"
+        );
+    }
     let inbox = Inbox::default();
     let outlets = declare::outlets(session.clone(), settings.congestion);
     let intake = Intake::new(settings.clone(), calibrations.clone(), outlets).reporting_to(inbox.clone());
