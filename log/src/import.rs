@@ -222,18 +222,18 @@ impl fmt::Display for Question {
                 write!(f, "{file} has rows of several units, {serials} in column {column}: of which unit?")
             }
             Self::GyroUnit { columns, unknown, largest } => {
-                let stated = states(unknown.as_ref());
+                let stated = states(unknown.as_ref(), SCALE);
                 write!(f, "what is the unit of the gyros {columns}?{stated} The largest reading is {largest}")
             }
             Self::AccelUnit { columns, unknown, largest } => {
-                let stated = states(unknown.as_ref());
+                let stated = states(unknown.as_ref(), SCALE);
                 write!(
                     f,
                     "what is the unit of the accelerometers {columns}?{stated} The largest reading is {largest}"
                 )
             }
             Self::TimeUnit { column, unknown, step } => {
-                let stated = states(unknown.as_ref());
+                let stated = states(unknown.as_ref(), "");
                 write!(f, "what is the unit of the time {column}?{stated} It usually grows by {step}")
             }
             Self::DateOrder { column, first } => {
@@ -247,12 +247,14 @@ impl fmt::Display for Question {
     }
 }
 
-/// What a header states in vain.
-fn states(unknown: Option<&String>) -> String {
-    unknown.map_or_else(String::new, |text| {
-        format!(" The header states {text:?}, which import does not know: for other units, give the nearest and set `scale` in the mapping.")
-    })
+/// What a header states in vain, and what helps.
+fn states(unknown: Option<&String>, help: &str) -> String {
+    let words = |text| format!(" The header states {text:?}, which import does not know{help}.");
+    unknown.map_or_else(String::new, words)
 }
+
+/// What helps where a mapping takes a scale.
+const SCALE: &str = ": for other units, give the nearest and set `scale` in the mapping";
 
 /// Refuses a log whose form no mapping can describe, in a sentence.
 fn refuse(path: &Path, words: impl Into<String>) -> Error {

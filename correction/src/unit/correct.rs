@@ -183,7 +183,8 @@ impl Corrector {
         &self.thermal
     }
 
-    /// Corrects one tick, with its accelerometers'; readings of `waiting` that fall due before its end take effect first.
+    /// Corrects one tick, with its accelerometers'; readings of `waiting` that fall due before its end take effect first. What is the
+    /// same for a whole run stands in `out`.
     pub(super) fn correct(
         &mut self,
         calibration: &Calibration,
@@ -266,10 +267,8 @@ impl Corrector {
     ) {
         let &Paired { gyro: raw, before: Break { missed, restart }, .. } = tick;
         out.sequence = raw.sequence;
-        out.series = raw.series;
         out.end_time = raw.end_time;
         out.duration = raw.duration;
-        out.ticks = 1;
         out.mode = raw.mode;
         let seen = &mut self.seen;
         seen.sequence = raw.sequence;

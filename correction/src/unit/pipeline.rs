@@ -215,6 +215,10 @@ impl Pipeline {
         let mut untold = run.before.after(core::mem::take(&mut self.unannounced));
         let mut unseen = run.before.after(core::mem::take(&mut self.unseen));
         let mut accels = run.accels.iter();
+        if let Some(active) = &self.active {
+            let out = &mut self.corrected;
+            (out.ticks, out.series, out.revision) = (1, first.series, active.revision);
+        }
         for tick in run.ticks {
             let steps = !tick.follows(self.last_end) && !begins;
             begins = false;
@@ -227,7 +231,6 @@ impl Pipeline {
                     let (counters, out) = (&mut self.counters, &mut self.corrected);
                     active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
                     unseen = Break::default();
-                    out.revision = active.revision;
                     if active.sigma.is_some() {
                         sigma(active, out, turn_on);
                     }
