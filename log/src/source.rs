@@ -14,7 +14,7 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::raw::{Batcher, RawFrame};
 use serde::Serialize;
 
-use crate::diff::{CorrectedLog, Ticks};
+use crate::diff::{CorrectedLog, LogTick, Ticks};
 use crate::error::Error;
 use crate::file::begins_with;
 use crate::mapping::Mapping;
@@ -177,11 +177,12 @@ impl CorrectedCsv {
         while self.ready.is_empty() {
             let Some(Ticks { unit, ticks }) = self.ticks.next_ticks()? else { return Ok(None) };
             self.rows += ticks.len() as u64;
-            for same in ticks.chunk_by(|a, b| a.tick.revision == b.tick.revision) {
+            let of = |tick: &LogTick| (tick.tick.revision, tick.tick.series);
+            for same in ticks.chunk_by(|a, b| of(a) == of(b)) {
                 let Some(last) = same.last() else { continue };
                 let batch = CorrectedBatch {
                     unit: unit.to_string(),
-                    series: 0,
+                    series: last.tick.series,
                     revision: Revision {
                         counter: last.tick.revision,
                         digest: last.digest.unwrap_or_default(),

@@ -359,7 +359,11 @@ fn a_restart_of_the_producer_changes_the_series() {
     for sequence in 0..30 {
         tick(&mut stream, 8, sequence);
     }
-    batches(&mut stream);
+    // Written down in the middle, and read back.
+    let mut stream = UnitStream::from_memory(&stream.memory()).unwrap();
+    let of_frames: Vec<_> =
+        batches(&mut stream).iter().map(|batch| (batch.series, batch.ticks.len())).collect();
+    assert_eq!(of_frames, [(7, 30), (8, 30)]);
     let last = status(&stream).last_tick.unwrap();
     assert_eq!((last.series, last.sequence), (8, 29));
 }

@@ -11,7 +11,7 @@ const SETTLED: Duration = Duration::from_millis(500);
 /// How long a tick that was heard waits for its like.
 const LONGEST_WAIT: Duration = Duration::from_secs(3);
 
-/// A tick by the end of its time and its number: enough to tell it from those of other runs of the producer.
+/// A tick by the end of its time, its number and its series.
 type Id = (i64, u64, u64);
 
 fn id(tick: &CorrectedTick) -> Id {
