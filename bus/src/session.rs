@@ -22,9 +22,10 @@ const CONNECTED_INTERVAL: Duration = Duration::from_millis(5);
 /// Key of the lease (ms).
 const LEASE: &str = "transport/link/tx/lease";
 /// Key of how often a connection is tried again, and the shortest and longest distance of trials (ms). With Zenoh's own 1 s and 4 s an
-/// instance that was restarted would be found seconds after it listens, and a kill of the other one before that loses ticks.
+/// instance that was restarted would be found seconds after it listens, and a kill of the other one before that loses ticks. The halves
+/// of a pair must find each other before a producer finds the one that starts: that one waits for 0.5 s.
 const RETRY: &str = "connect/retry";
-const RETRY_MS: [u32; 2] = [100, 500];
+const RETRY_MS: [u32; 2] = [50, 100];
 /// Key of how long a put that blocks may wait before the connection is closed (µs): the lease ends a connection, not the waiting.
 const LONGEST_PUT: &str = "transport/link/tx/queue/congestion_control/block/wait_before_close";
 
@@ -325,7 +326,7 @@ mod tests {
     #[test]
     fn what_is_lost_is_soon_tried_again_unless_a_configuration_says_how_often() {
         let folder = tempfile::tempdir().unwrap();
-        for (text, longest) in [("{}", 500), ("{connect: {retry: {period_max_ms: 9000}}}", 9000)] {
+        for (text, longest) in [("{}", 100), ("{connect: {retry: {period_max_ms: 9000}}}", 9000)] {
             let file = folder.path().join("zenoh.json5");
             std::fs::write(&file, text).unwrap();
             let options = SessionOptions { config: Some(file), ..SessionOptions::default() };
