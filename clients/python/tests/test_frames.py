@@ -49,7 +49,7 @@ class Frames(unittest.TestCase):
         cases = [
             (frame[:5], "5 bytes, must have 6"),
             (frozen("corrected-kind"), "kind 1, its key promises 4"),
-            (frozen("corrected-version-9"), "version 9, this package knows 1 to 2: update it"),
+            (frozen("corrected-version-9"), "version 9, this package knows 1 to 3: update it"),
             (frozen("corrected-half"), "the checksum is"),
             (frozen("corrected-bit"), "the checksum is"),
             (frozen("corrected-truncated"), "ends too early"),
