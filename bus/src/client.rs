@@ -13,7 +13,7 @@ use zenoh::{Config, Session};
 use crate::certificate::common_name;
 use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
 use crate::error::seconds;
-use crate::session::{close, connected_to, endpoints, set};
+use crate::session::{close, connected_to, endpoints, keep_trying, set};
 use crate::{BusError, SessionOptions, obstacle};
 
 /// Environment variable that says where the service is: one endpoint, or several separated by commas.
@@ -136,6 +136,7 @@ impl ClientOptions {
             listen: self.listen.clone(),
             namespace: self.namespace.clone(),
             lease: None,
+            keeps_trying: false,
         };
         let mut said_by = None;
         let user = file.map_or(Ok(UserKeys::default()), read_user_file)?;
@@ -193,8 +194,7 @@ impl Stated {
             _ if options.config.is_some() => {}
             1 => once(&mut config)?,
             _ => {
-                set(&mut config, "connect/timeout_ms", -1)?;
-                set(&mut config, "connect/exit_on_failure", false)?;
+                keep_trying(&mut config)?;
                 any_of = endpoints(&config, "connect/endpoints");
             }
         }

@@ -59,6 +59,9 @@ pub struct SessionOptions {
     /// where a configuration does not say otherwise. `None`: Zenoh's own 10 s and 5 s.
     #[cfg_attr(feature = "clap", arg(skip))]
     pub lease: Option<Duration>,
+    /// Whether it opens although nothing answers where it connects, and tries for ever; where a configuration file does not say.
+    #[cfg_attr(feature = "clap", arg(skip))]
+    pub keeps_trying: bool,
 }
 
 impl SessionOptions {
@@ -95,6 +98,9 @@ impl SessionOptions {
             });
             set(&mut config, RETRY, retry)?;
         }
+        if self.keeps_trying && self.config.is_none() {
+            keep_trying(&mut config)?;
+        }
         if let Some(namespace) = &self.namespace {
             set(&mut config, "namespace", namespace.as_str())?;
         }
@@ -114,8 +120,8 @@ impl SessionOptions {
     /// As [`Self::to_config`].
     pub fn has_access_control(&self) -> Result<bool, BusError> {
         let config = self.to_config()?;
-        let is = |key, value| config.get_json(key).is_ok_and(|found| found == value);
-        Ok(is("access_control/enabled", "true") || is("mode", "\"client\""))
+        let is_controlled = config.get_json("access_control/enabled").is_ok_and(|found| found == "true");
+        Ok(is_controlled || is_client(&config))
     }
 
     /// Whether a session with these options listens or connects over TLS.
@@ -146,6 +152,12 @@ impl SessionOptions {
             endpoints => format!("a router or peer at {}", endpoints.join(" or ")),
         })
     }
+}
+
+/// Has a session open although nothing answers yet where it connects.
+pub(crate) fn keep_trying(config: &mut Config) -> Result<(), BusError> {
+    set(config, "connect/timeout_ms", -1)?;
+    set(config, "connect/exit_on_failure", false)
 }
 
 /// Whether a key of a configuration is what it is where nobody says anything.
@@ -236,14 +248,24 @@ pub async fn open_config(config: Config) -> Result<Session, BusError> {
     }
 }
 
-/// Waits until a session is connected to every endpoint that its options name; no longer than `limit`.
+/// Waits until a session is connected to every endpoint that its options name, a client to one of them; no longer than `limit`. Whether
+/// it is.
 ///
 /// # Errors
 /// As [`SessionOptions::to_config`].
-pub async fn connected(session: &Session, options: &SessionOptions, limit: Duration) -> Result<(), BusError> {
-    let wanted = endpoints(&options.to_config()?, "connect/endpoints");
-    connected_to(session, &wanted, wanted.len(), limit).await;
-    Ok(())
+pub async fn connected(
+    session: &Session,
+    options: &SessionOptions,
+    limit: Duration,
+) -> Result<bool, BusError> {
+    let config = options.to_config()?;
+    let wanted = endpoints(&config, "connect/endpoints");
+    let least = if is_client(&config) { wanted.len().min(1) } else { wanted.len() };
+    Ok(connected_to(session, &wanted, least, limit).await >= least)
+}
+
+fn is_client(config: &Config) -> bool {
+    config.get_json("mode").is_ok_and(|mode| mode == "\"client\"")
 }
 
 /// Waits until a session is connected to so many of these endpoints; no longer than `limit`. To how many it is.

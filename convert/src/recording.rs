@@ -10,11 +10,11 @@ use isotherm_log::error::Error;
 
 pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
     let partial = conversion.place.partial(&conversion.out)?;
-    // What an earlier run left behind when it was killed.
-    let _ = std::fs::remove_file(partial.writing());
     let options = RecordingOptions {
         compress: conversion.compress,
         json: conversion.json,
+        // What an earlier run left behind when it was killed.
+        overwrite: true,
         ..RecordingOptions::default()
     };
     let mut writer = RecordingWriter::create(partial.writing(), options)?;

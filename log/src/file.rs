@@ -1,5 +1,7 @@
 //! Small files read and written whole, and outputs that must not fall on inputs.
 
+mod alone;
+
 use std::collections::BTreeSet;
 use std::fs::{File, Permissions, canonicalize};
 use std::io::{self, BufWriter, Read, Stdout, Write};
@@ -10,6 +12,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use isotherm_document::file::read_bounded;
+
+pub(crate) use alone::create_alone;
+pub use alone::is_being_written;
 
 use crate::error::Error;
 
@@ -145,7 +150,7 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        if !self.kept {
+        if !self.kept && !is_being_written(&self.writing) {
             // It may never have been created.
             let _ = std::fs::remove_file(&self.writing);
             writing().remove(&self.writing);
@@ -178,8 +183,7 @@ impl Sink {
     /// [`Error::File`].
     pub fn create(path: &Path) -> Result<Self, Error> {
         let partial = Partial::of(path);
-        let file = File::create(partial.writing()).map_err(|source| Error::file(path, "create", source))?;
-        let file = BufWriter::with_capacity(BLOCK, file);
+        let file = BufWriter::with_capacity(BLOCK, create_alone(partial.writing(), true)?);
         let stream = if path.extension().is_some_and(|extension| extension == "gz") {
             Stream::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
         } else {

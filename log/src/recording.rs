@@ -15,7 +15,6 @@
 
 mod documents;
 mod ending;
-mod place;
 mod reader;
 mod record;
 pub mod recover;
@@ -34,7 +33,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 pub use documents::{Documents, JournalAccount};
-pub use place::is_being_written;
 pub use reader::{RecordingReader, RecordingReport};
 pub(crate) use record::chunk_records;
 pub use recover::recover;

@@ -39,16 +39,15 @@ impl RosOptions {
             }
             _ => (connect, listen),
         };
-        let mut config =
-            SessionOptions { config, connect, listen, namespace: None, lease: None }.to_config()?;
+        // A router that is not there yet is waited for, as nodes do.
+        let options =
+            SessionOptions { config, connect, listen, keeps_trying: true, ..SessionOptions::default() };
+        let mut config = options.to_config()?;
         if own {
             set(&mut config, "mode", if router { "router" } else { "peer" })?;
             set(&mut config, "scouting/gossip/enabled", true)?;
             set(&mut config, "transport/link/tx/lease", LEASE_MS)?;
             set(&mut config, "transport/link/tx/keep_alive", KEEP_ALIVE)?;
-            // A router that is not there yet is waited for, as nodes do.
-            set(&mut config, "connect/timeout_ms", -1)?;
-            set(&mut config, "connect/exit_on_failure", false)?;
             set(&mut config, "open/return_conditions/connect_scouted", false)?;
         }
         Ok(config)

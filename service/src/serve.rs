@@ -110,6 +110,8 @@ fn settings(args: &ServeArgs) -> Result<Settings, ServiceError> {
         configured.namespace.clone_from(&given.namespace);
     }
     configured.listen_by_default();
+    // No unit waits for a router or for the other half of a pair.
+    configured.keeps_trying = true;
     settings.check_other().map_err(ServiceError::Other)?;
     Ok(settings)
 }
@@ -140,6 +142,7 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     let start = async {
         let session = open_session(settings.zenoh.session.clone(), &awaited).await?;
         let locators = isotherm_bus::locators(&session);
+        tokio::spawn(tell_connection(session.clone(), settings.zenoh.session.clone()));
         let service = start_on(settings, Calibrations::default(), state, metrics, session).await?;
         Ok::<_, ServiceError>((service, locators))
     };
@@ -185,6 +188,25 @@ async fn open_session(options: SessionOptions, awaited: &str) -> Result<Session,
                 pause = FURTHER_WORDS;
             }
         }
+    }
+}
+
+/// Says that a session is not connected where it is to connect, until it is.
+async fn tell_connection(session: Session, options: SessionOptions) {
+    let (mut pause, start) = (FIRST_WORD, Instant::now());
+    while !session.is_closed() {
+        tokio::time::sleep(pause).await;
+        // Options that make no sense have opened no session.
+        if isotherm_bus::connected(&session, &options, Duration::ZERO).await.unwrap_or(true) {
+            break;
+        }
+        let endpoints = options.connects_to().unwrap_or_default().join(", ");
+        let waited_s = start.elapsed().as_secs();
+        tracing::warn!(
+            waited_s,
+            "not connected to {endpoints}: check the address, or start what is to listen there; tried again"
+        );
+        pause = FURTHER_WORDS;
     }
 }
 

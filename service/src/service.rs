@@ -96,7 +96,8 @@ pub(crate) async fn start_on(
     }
     if settings.zenoh.session.uses_tls()? {
         tracing::warn!(
-            "over tls/ a connection that carries much both ways may break, or end the service (eclipse-zenoh/zenoh#2557): use              a VPN for streams between machines, tls/ for swaps and commands"
+            "over tls/ a connection that carries much both ways may break, or end the service (eclipse-zenoh/zenoh#2557): use \
+             a VPN for streams between machines, tls/ for swaps and commands"
         );
     }
     let inbox = Inbox::default();

@@ -71,10 +71,8 @@ pub struct Table {
     pub time_s: Vec<f64>,
     /// Whether ticks are missing right before the row.
     pub gap_before: Vec<bool>,
-    /// Whether ticks are missing in it.
-    pub gap_inside: Vec<bool>,
-    /// Length of those (s).
-    missed_s: Vec<f64>,
+    /// Length of the ticks that are missing in it (s).
+    pub missed_s: Vec<f64>,
     /// Whether a gyro was at its input limit.
     pub overrange: Vec<bool>,
     /// Length of the ticks that count for the rates, and for the forces (s).
@@ -269,7 +267,6 @@ impl Table {
         self.length_s.push(row.length_s);
         self.time_s.push(begin_s + 0.5 * row.length_s);
         self.gap_before.push(row.gap_before);
-        self.gap_inside.push(row.missed_s > 0.0);
         self.missed_s.push(row.missed_s);
         self.overrange.push(row.overrange);
         let [angle, velocity] = row.sums;

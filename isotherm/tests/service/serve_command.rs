@@ -1,6 +1,7 @@
 //! `isotherm serve` as a process: readiness, signals, exit codes, totals, log.
 
 use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpListener;
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::time::Duration;
 
@@ -118,6 +119,19 @@ async fn a_signal_ends_it_cleanly_with_every_tick_given_out() {
         }
         assert!(consumer.continuity(&unit).is_whole());
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn it_serves_before_what_it_connects_to_is_there_and_finds_it_then() {
+    let free = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).unwrap();
+    let other = format!("tcp/{free}");
+    let served = Served::start(&["--connect", &other]);
+    presence::wait_for_service(&served.session().await, LIMIT).await.unwrap();
+    let options = SessionOptions { listen: vec![other], ..SessionOptions::default() };
+    let later = open(&options).await.unwrap();
+    presence::wait_for_service(&later, LIMIT).await.unwrap();
+    let (code, _, stderr) = served.stop("-TERM");
+    assert_eq!(code, Some(0), "{stderr}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

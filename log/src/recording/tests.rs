@@ -12,6 +12,7 @@ use isotherm_protocol::raw::TemperatureBatch;
 
 use super::*;
 use crate::error::Error;
+use crate::file::is_being_written;
 use crate::message::{Message, Topic};
 use crate::part::{LogFiles, Part};
 use crate::source::LogReport;

@@ -9,8 +9,9 @@ use std::sync::Arc;
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, SCHEMA_ENCODING, ending, place, schema, view};
+use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, SCHEMA_ENCODING, ending, schema, view};
 use crate::error::Error;
+use crate::file::create_alone;
 use crate::message::{Message, Topic};
 
 /// Largest sum of messages in one chunk, before compression (bytes).
@@ -96,7 +97,7 @@ impl RecordingWriter {
     /// # Errors
     /// [`Error::File`], also where it is there already, or is being written by somebody else.
     pub fn create(path: &Path, options: RecordingOptions) -> Result<Self, Error> {
-        let file = Arc::new(place::create(path, options.overwrite)?);
+        let file = Arc::new(create_alone(path, options.overwrite)?);
         let mut writer = options
             .to_library()
             .create(BufWriter::new(Arc::clone(&file)))

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
+use isotherm_log::file::is_being_written;
+use isotherm_log::recording::RecordingOptions;
 use isotherm_log::recording::recover::{Recovery, RecoveryReport};
-use isotherm_log::recording::{RecordingOptions, is_being_written};
 
 use super::{print, show};
 use crate::error::Error;

@@ -4,8 +4,7 @@ use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use isotherm_log::file::refuse_replacing;
-use isotherm_log::recording::is_being_written;
+use isotherm_log::file::{is_being_written, refuse_replacing};
 
 use crate::error::Error;
 

@@ -30,7 +30,7 @@ macro_rules! defaults {
 defaults!(UnitKeys of UnitSettings: in_standby, subtract_drift, reference_delay, uncalibrated, pairing_window, temperature_delay, navigation);
 defaults!(PreLaunchKeys of PreLaunchSettings: duration, place, limits);
 defaults!(LimitsKeys of PreLaunchLimits: static_bias_change_rad_per_s, magnetic_bias_change_rad_per_s, mode_imbalance, time_per_mode, good_share, rest);
-defaults!(SessionKeys of SessionOptions: config, connect, listen, namespace, lease);
+defaults!(SessionKeys of SessionOptions: config, connect, listen, namespace, lease, keeps_trying);
 
 /// Keys of every unit's state machine.
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -159,4 +159,6 @@ pub(super) struct SessionKeys {
     namespace: Option<String>,
     #[serde(skip)]
     lease: Option<Duration>,
+    #[serde(skip)]
+    keeps_trying: bool,
 }

@@ -141,6 +141,7 @@ fn every_key_arrives_where_it_belongs() {
                 listen: vec!["tcp/127.0.0.1:0".to_owned()],
                 namespace: Some("site/a".to_owned()),
                 lease: Some(Duration::from_millis(400)),
+                ..SessionOptions::default()
             },
         },
         ..Settings::default()

@@ -81,7 +81,7 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch
         good_s: good_s[row],
         rate: at(&table.rate_deg_per_h, row).to_vec(),
         force: (force_s[row] > 0.0).then(|| at(&table.force_m_per_s2, row)),
-        broken: table.gap_before[row] || table.gap_inside[row],
+        broken: table.gap_before[row] || table.missed_s[row] > 0.0,
         overrange: table.overrange[row],
     };
     let bins: Vec<Bin> = (0..table.len()).map(bin).collect();

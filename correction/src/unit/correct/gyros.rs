@@ -134,26 +134,28 @@ impl Corrector {
         let sound =
             !(lost | outside) & self.calm.sound[0] & within(&readings, narrow(&calibration.gyro_limits));
         let mut flags = SOUND;
-        if lost {
-            (increments, flags) = ([0.0; N], self.thermal.gyro_footing.lost(time));
-        } else if !sound {
-            let (mut patched, mut counted) = (readings, usable);
-            let patch = (&mut patched, &calibration.gyro_limits, count);
-            let (found, numbers) = self.thermal.gyro_footing.patch(time, patch, &mut counted, counters);
-            (usable, flags) = (counted, found);
-            // A copy: what is looked at lane by lane gets a place in memory.
-            let (scaled, subtrahend) = (scale.angles(patched), subtrahend);
-            let before: [f64; N] = *narrow(&self.last_rates);
-            increments = array::from_fn(|i| {
-                if numbers.contains(i) {
-                    scaled[i] - subtrahend[i] * duration_s
-                } else {
-                    before[i] * duration_s
-                }
-            });
-        }
-        if outside {
-            mark_clamped(&mut flags, clamped);
+        if !sound {
+            if lost {
+                (increments, flags) = ([0.0; N], self.thermal.gyro_footing.lost(time));
+            } else {
+                let (mut patched, mut counted) = (readings, usable);
+                let patch = (&mut patched, &calibration.gyro_limits, count);
+                let (found, numbers) = self.thermal.gyro_footing.patch(time, patch, &mut counted, counters);
+                (usable, flags) = (counted, found);
+                // A copy: what is looked at lane by lane gets a place in memory.
+                let (scaled, subtrahend) = (scale.angles(patched), subtrahend);
+                let before: [f64; N] = *narrow(&self.last_rates);
+                increments = array::from_fn(|i| {
+                    if numbers.contains(i) {
+                        scaled[i] - subtrahend[i] * duration_s
+                    } else {
+                        before[i] * duration_s
+                    }
+                });
+            }
+            if outside {
+                mark_clamped(&mut flags, clamped);
+            }
         }
         // Before the substitution: the angle that it restores is a lump, not a rate.
         let mut rates: [f64; N] = increments.map(|increment| increment / duration_s);

@@ -15,10 +15,12 @@ const SERIALS: [&str; 9] = ["serial", "serialno", "sn", "id", "uid", "device", "
 const STATES: [&str; 11] =
     ["status", "state", "valid", "validity", "ok", "flag", "flags", "quality", "health", "error", "fail"];
 
-/// A column of serials: which, its name, and its cells.
+/// A column of serials: which, its file and name, and its cells.
+#[derive(Clone)]
 pub(super) struct Serials {
     index: usize,
-    question: Question,
+    file: String,
+    name: String,
     cells: Vec<String>,
 }
 
@@ -50,10 +52,8 @@ impl File<'_> {
     /// The column of serials, where rows are of several units.
     pub(super) fn serials(self) -> Option<Serials> {
         let (index, values) = self.few(&SERIALS).find(|(_, values)| values.len() > 1)?;
-        let cells: Vec<_> = values.into_iter().map(|(value, _)| value).collect();
-        let (file, column) = (self.name.to_owned(), self.listed(&[index]));
-        let question = Question::Serial { file, column, serials: cells.clone() };
-        Some(Serials { index, question, cells })
+        let cells = values.into_iter().map(|(value, _)| value).collect();
+        Some(Serials { index, file: self.name.to_owned(), name: self.listed(&[index]), cells })
     }
 }
 
@@ -69,7 +69,8 @@ pub(super) fn select<'h>(
             Ok(Some((column.index, serial)))
         }
         (Some(column), _) => {
-            proposal.open.push(column.question.clone());
+            let Serials { file, name, cells, .. } = column.clone();
+            proposal.open.push(Question::Serial { file, column: name, serials: cells });
             Ok(None)
         }
         (None, Some(_)) => Err(refuse(path, "has no column with several serials: leave --serial out")),

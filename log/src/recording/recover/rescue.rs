@@ -11,12 +11,11 @@ use mcap::{McapError, Writer};
 
 use super::RecoveryReport;
 use crate::error::Error;
+use crate::file::create_alone;
 use crate::message::Topic;
 use crate::recording::view;
 use crate::recording::writer::{declare, declare_view, failed};
-use crate::recording::{
-    Attachment, CHANNELS, Documents, MESSAGE_ENCODING, METADATA, RecordingOptions, place,
-};
+use crate::recording::{Attachment, CHANNELS, Documents, MESSAGE_ENCODING, METADATA, RecordingOptions};
 
 /// A schema: its name, encoding and text.
 type Schema = (String, String, Vec<u8>);
@@ -80,7 +79,7 @@ impl<'a> Rescue<'a> {
         profile: &str,
         definitions: &'a mut Definitions,
     ) -> Result<Self, Error> {
-        let file = Arc::new(place::create(path, options.overwrite)?);
+        let file = Arc::new(create_alone(path, options.overwrite)?);
         let buffered = BufWriter::new(Arc::clone(&file));
         let writer = options.to_library().profile(profile).create(buffered);
         let writer = writer.map_err(|source| failed(path, source))?;

@@ -5,7 +5,7 @@ use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use isotherm_log::file::{self, refuse_overwriting, refuse_replacing};
+use isotherm_log::file::{self, Partial, refuse_overwriting, refuse_replacing};
 use isotherm_log::offline::rows::write_header;
 use isotherm_log::offline::{Form, Made};
 use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
@@ -32,7 +32,7 @@ pub(super) enum Sink {
     /// A file for each unit, by its place.
     Files(Vec<file::Sink>),
     /// A recording.
-    Recording { writer: Box<RecordingWriter>, attached: BTreeSet<Digest>, received_ns: u64 },
+    Recording { writer: Box<RecordingWriter>, partial: Partial, attached: BTreeSet<Digest>, received_ns: u64 },
 }
 
 impl Sink {
@@ -48,10 +48,11 @@ impl Sink {
                 return Err(Error::Usage("--format is for files other than FILE.mcap".to_owned()));
             }
             refuse_overwriting(out, &inputs)?;
-            let options =
-                RecordingOptions { json: true, overwrite: *overwrite, ..RecordingOptions::default() };
-            let writer = Box::new(RecordingWriter::create(out, options)?);
-            return Ok(Self::Recording { writer, attached: BTreeSet::new(), received_ns: 0 });
+            refuse_replacing(out, *overwrite)?;
+            let partial = Partial::of(out);
+            let options = RecordingOptions { json: true, overwrite: true, ..RecordingOptions::default() };
+            let writer = Box::new(RecordingWriter::create(partial.writing(), options)?);
+            return Ok(Self::Recording { writer, partial, attached: BTreeSet::new(), received_ns: 0 });
         }
         let format = format.unwrap_or_default();
         let folder = out.is_dir() || out.as_os_str().to_string_lossy().ends_with('/');
@@ -98,7 +99,7 @@ impl Sink {
 
     /// Puts a document beside the ticks, once.
     pub(super) fn document(&mut self, bytes: Vec<u8>) -> Result<(), Error> {
-        if let Self::Recording { writer, attached, received_ns } = self
+        if let Self::Recording { writer, attached, received_ns, .. } = self
             && attached.insert(Digest::of(&bytes))
         {
             let attachment: Attachment = Documents::attachment(bytes, *received_ns);
@@ -139,7 +140,7 @@ impl Sink {
         match self {
             Self::None => Ok(()),
             Self::Files(files) => files.into_iter().try_for_each(|file| Ok(file.finish()?.keep()?)),
-            Self::Recording { mut writer, .. } => {
+            Self::Recording { mut writer, partial, .. } => {
                 let inputs: Vec<_> = inputs.iter().map(|path| path.display().to_string()).collect();
                 let values = [
                     ("made_by", concat!("isotherm-replay correct ", env!("CARGO_PKG_VERSION")).to_owned()),
@@ -148,7 +149,8 @@ impl Sink {
                 let values: BTreeMap<_, _> =
                     values.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
                 writer.metadata(&Metadata { name: METADATA.to_owned(), values })?;
-                Ok(writer.finish()?)
+                writer.finish()?;
+                Ok(partial.keep()?)
             }
         }
     }
