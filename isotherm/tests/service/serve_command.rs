@@ -221,7 +221,7 @@ async fn a_hangup_has_a_daemon_read_its_documents_again() {
 
 #[test]
 fn a_client_without_its_router_says_what_it_waits_for_and_can_be_stopped() {
-    let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let zenoh = folder.path().join("client.json5");
     let shipped = include_str!("../../../config/zenoh/client.json5");
