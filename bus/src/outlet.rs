@@ -66,6 +66,8 @@ pub struct Account {
     pub ticks_announced_missing: u64,
     /// Ticks that came back more than once.
     pub ticks_duplicated: u64,
+    /// Ticks of a series that was not sent here: somebody else plays the unit.
+    pub ticks_of_others: u64,
     /// Ticks that came back as they were, because the unit has no calibration.
     pub ticks_uncalibrated: u64,
     /// Times that what came back began anew.

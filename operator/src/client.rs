@@ -204,10 +204,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, ConsoleError> {
     read_bounded(path).map_err(|source| ConsoleError::Read { path: path.to_owned(), source })
 }
 
-/// Who asks: what was said, or the name of the user.
+/// Who asks: what was said, or the name of the user as far as it may be one.
 pub(super) fn by(given: Option<&str>) -> String {
-    let by = given.map_or_else(user, ToOwned::to_owned);
-    by.chars().filter(|c| !is_unfit(*c)).take(isotherm_protocol::control::MAX_BY).collect()
+    let named =
+        || user().chars().filter(|c| !is_unfit(*c)).take(isotherm_protocol::control::MAX_BY).collect();
+    given.map_or_else(named, ToOwned::to_owned)
 }
 
 /// Name of the user: as the session says, else as the system knows it, as for a job of cron; its number where the system

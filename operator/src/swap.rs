@@ -202,12 +202,14 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
     // A service before 0.2 says the proposed digest in the place of the one in force.
     let digest = short(reply.proposed.as_ref().unwrap_or(&reply.digest));
     let line = match reply.outcome {
-        SwapOutcome::Refused => format!(
-            "{}: refused with {}; revision {} stays in force\n",
-            reply.unit,
-            of(reply.problems.len(), "problem"),
-            reply.revision
-        ),
+        SwapOutcome::Refused => {
+            let problems = of(reply.problems.len(), "problem");
+            let stays = match reply.revision {
+                0 => "the unit has no calibration".to_owned(),
+                revision => format!("revision {revision} stays in force"),
+            };
+            format!("{}: refused with {problems}; {stays}\n", reply.unit)
+        }
         SwapOutcome::Unchanged => {
             format!("{}: unchanged: revision {} ({digest}) is this document\n", reply.unit, reply.revision)
         }

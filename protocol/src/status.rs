@@ -33,6 +33,8 @@ use crate::version::{self, Versions};
 pub(crate) const MAX_ENTRIES: usize = 256;
 /// Most kinds of fault in a status.
 pub const MAX_FAULTS: usize = 32;
+/// Kind of the fault that temperatures come of channels which the calibration does not have.
+pub const UNKNOWN_CHANNEL: &str = "unknown_temperature_channel";
 /// Most sensors of both kinds together.
 const MAX_ALL_SENSORS: usize = 2 * isotherm_correction::sample::MAX_SENSORS;
 

@@ -143,9 +143,9 @@ pub async fn play(
             ended = run(&opened, &tried, options, &mut player, watch) => ended,
         };
         let mut report = player.report(ended.is_err());
-        if report.units.iter().any(UnitReport::is_mixed) {
-            let instances = pair_reports(&opened, options.wait).await.unwrap_or_default();
-            report.units.iter_mut().for_each(|unit| unit.note_instances(&instances));
+        if report.units.iter().any(UnitReport::is_doubled) {
+            let reports = pair_reports(&opened, options.wait).await.unwrap_or_default();
+            report.units.iter_mut().for_each(|unit| unit.note_services(&reports));
         }
         if ended.is_ok() && options.acknowledge != Acknowledge::No {
             silence::note_unknown_channels(&opened, player.channels(), &mut report).await;

@@ -30,7 +30,7 @@ use crate::ServiceError;
 use crate::config::{PairSettings, Settings};
 use crate::receive::intake::{Intake, lock};
 use crate::receive::unit::{Footing, Standing, UnitActor};
-pub(crate) use ask::{Asker, Questions};
+pub(crate) use ask::{ASKS, Asker, Questions};
 use elsewhere::Elsewhere;
 pub(crate) use watch::Watch;
 

@@ -1,6 +1,6 @@
 //! The account of one unit's gyro ticks: sent, under way, come back, passed over.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use isotherm_protocol::corrected::CorrectedTick;
 
@@ -21,6 +21,8 @@ pub(super) struct TickTally {
     /// Ticks in it.
     ticks: u64,
     run: Run,
+    /// Every series that was sent.
+    series: BTreeSet<u64>,
     /// Run and number of the last tick that came back and had been under way.
     back: Option<(u64, u64)>,
     continuity: Continuity,
@@ -72,6 +74,7 @@ impl TickTally {
         let anew = newest.is_some_and(|newest| last.saturating_add(ANEW) < newest);
         if self.run.series.is_none_or(|run| run < series) || (self.run.series == Some(series) && anew) {
             self.account.ticks_not_sent += self.run.sent.missing();
+            self.series.insert(series);
             self.run = Run { number: self.run.number + 1, series: Some(series), sent: Intervals::default() };
         } else if self.run.series != Some(series) {
             // A straggler of a series that is over: the service takes it no more.
@@ -110,9 +113,14 @@ impl TickTally {
 
     /// Enters a tick that came back.
     pub(super) fn came_back(&mut self, tick: &CorrectedTick) {
-        self.continuity.feed(tick);
         let last = tick.sequence;
         let first = last.saturating_sub(u64::from(tick.ticks.max(1)) - 1);
+        if tick.series != 0 && !self.series.contains(&tick.series) {
+            // What was sent before this one began may still come.
+            self.account.ticks_of_others += if self.back.is_some() { last - first + 1 } else { 0 };
+            return;
+        }
+        self.continuity.feed(tick);
         // A pair may still send of the series before; without a number of its series, a tick is of any.
         let is_of = |other: &Stretch| {
             (other.first..=other.last).contains(&last) && [0, other.series].contains(&tick.series)
@@ -195,6 +203,19 @@ mod tests {
         assert_eq!(ticks_sent, sum, "every tick that was sent is somewhere");
         let rest = [account.ticks_not_sent, account.ticks_under_way];
         [ticks_sent, ticks_sent_again, ticks_back, ticks_late, ticks_lost, rest[0], rest[1]]
+    }
+
+    #[test]
+    fn what_another_one_sent_is_no_tick_of_this_one() {
+        let mut tally = TickTally::default();
+        let of = |series, sequence| CorrectedTick { series, ..tick(sequence, 1) };
+        tally.sent(GyroTicks { series: 7, first: 0, count: 4 });
+        for (series, sequence) in [(5, 900), (7, 0), (5, 901), (7, 1), (9, 3), (7, 1)] {
+            tally.came_back(&of(series, sequence));
+        }
+        let account = tally.account();
+        assert_eq!((account.ticks_back, account.ticks_of_others, account.ticks_duplicated), (2, 2, 1));
+        assert_eq!((account.ticks_lost, account.restarts), (0, 0));
     }
 
     #[test]

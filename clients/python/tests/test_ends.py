@@ -86,6 +86,18 @@ class Ends(unittest.TestCase):
             self.assertEqual(producer.sent, 512)
         self.assertEqual(self.service.numbers(576), list(range(576)))
 
+    def test_what_nobody_hears_is_counted_and_told(self) -> None:
+        with self.bus(LIMIT_S).producer(UNIT, batch_ticks=1) as producer:
+            give(producer, 0)
+            self.service.session.close()
+            deadline = time.monotonic() + LIMIT_S
+            with self.assertLogs("isotherm", "WARNING") as logs:
+                while producer.unheard < 10:
+                    self.assertLess(time.monotonic(), deadline)
+                    give(producer, producer.sent)
+            self.assertRegex(logs.output[0], f"{UNIT}: nobody subscribes: gyro ticks from {producer.sent - 10} on are lost")
+            self.assertEqual(len(logs.output), 1)
+
     def test_what_is_never_sent_is_named(self) -> None:
         producer = self.bus(1.0).producer(UNIT, batch_ticks=256, max_in_flight=512)
         give(producer, 0, 1)

@@ -1,5 +1,6 @@
 //! What playing came to.
 
+use std::collections::BTreeSet;
 use std::ops::Add;
 use std::time::Duration;
 
@@ -129,11 +130,12 @@ pub struct UnitReport {
     pub returned: Returned,
     /// Runs sent: series, or what began anew in one.
     pub runs: Option<u64>,
-    /// Times that the unit's corrected stream began anew; of each instance more than once a run only where somebody
-    /// else plays the unit.
+    /// Times that the unit's corrected stream began anew.
     pub restarts: Option<u64>,
-    /// Instances of one pair that have the unit, each of which may publish a tick; looked for where ticks or restarts are too many.
-    pub instances: Option<u64>,
+    /// Corrected ticks of a series that was not sent here: somebody else plays the unit.
+    pub ticks_of_others: Option<u64>,
+    /// Pairs and single services that have the unit, of which there is to be one; looked for where ticks came twice.
+    pub services: Option<u64>,
     /// Temperature channels sent that the unit's calibration does not have.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unknown_channels: Vec<String>,
@@ -150,16 +152,22 @@ impl UnitReport {
             returned: account.as_ref().map(Returned::from).unwrap_or_default(),
             runs: told(|account| account.runs),
             restarts: told(|account| account.restarts),
-            instances: None,
+            ticks_of_others: told(|account| account.ticks_of_others),
+            services: None,
             unknown_channels: Vec::new(),
         }
     }
 
-    /// Notes how many instances have the unit, where those that have it are a pair.
-    pub(super) fn note_instances(&mut self, reports: &[PairReport]) {
-        let having: Vec<_> = reports.iter().filter(|report| report.role(&self.unit).is_some()).collect();
-        let are_pair = having.chunk_by(|a, b| a.member.group == b.member.group).count() == 1;
-        self.instances = are_pair.then_some(having.len() as u64);
+    /// Notes how many pairs and single services have the unit.
+    pub(super) fn note_services(&mut self, reports: &[PairReport]) {
+        let having = reports.iter().filter(|report| report.role(&self.unit).is_some());
+        let groups: BTreeSet<_> = having.map(|report| &report.member.group).collect();
+        self.services = Some(groups.len() as u64);
+    }
+
+    /// Whether ticks came back more than once: the instances of a pair may send a tick twice.
+    pub(super) fn is_doubled(&self) -> bool {
+        self.returned.ticks_duplicated.is_some_and(|ticks| ticks > 0)
     }
 
     /// What did not come back by the end counts as lost.
@@ -173,11 +181,8 @@ impl UnitReport {
     /// Whether what came back is not what was sent: somebody else plays the unit, or services answer that are no pair.
     #[must_use]
     pub fn is_mixed(&self) -> bool {
-        let instances = self.instances.unwrap_or(1);
-        // Each says of each run that it began anew, of the first one where the unit was played before; the very first is not counted.
-        let own = (self.runs.unwrap_or(0) * instances).saturating_sub(1);
-        self.restarts.is_some_and(|restarts| restarts > own)
-            || (instances < 2 && self.returned.ticks_duplicated.is_some_and(|ticks| ticks > 0))
+        self.ticks_of_others.is_some_and(|ticks| ticks > 0)
+            || (self.is_doubled() && self.services.is_some_and(|services| services > 1))
     }
 }
 
@@ -278,26 +283,22 @@ mod tests {
             let (takes, passed_over, others, addresses) = Default::default();
             PairReport { member, takes, units: vec![unit], passed_over, others, addresses }
         };
-        let (one, pair, strangers) = (
-            [report("a")].to_vec(),
-            [report("a"), report("a")].to_vec(),
-            [report("a"), report("b")].to_vec(),
-        );
-        // Of two runs: restarts and duplicated ticks.
-        for (reports, restarts, duplicated, is_mixed) in [
-            (&one, 1, 0, false),
-            (&one, 1, 5, true),
-            (&one, 2, 0, true),
-            (&pair, 3, 500, false),
-            (&pair, 4, 500, true),
-            (&strangers, 1, 500, true),
+        for (groups, duplicated, of_others, is_mixed) in [
+            ("a", 0, 0, false),
+            ("a", 0, 1, true),
+            ("a", 500, 0, false),
+            ("aa", 500, 0, false),
+            ("aa", 500, 1, true),
+            ("ab", 0, 0, false),
+            ("ab", 500, 0, true),
         ] {
+            let reports: Vec<_> = groups.chars().map(|group| report(&group.to_string())).collect();
             let returned = Returned { ticks_duplicated: Some(duplicated), ..Returned::default() };
-            let (runs, restarts) = (Some(2), Some(restarts));
+            let ticks_of_others = Some(of_others);
             let mut unit =
-                UnitReport { unit: "U".to_owned(), runs, restarts, returned, ..UnitReport::default() };
-            unit.note_instances(reports);
-            assert_eq!(unit.is_mixed(), is_mixed, "{} reports, {restarts:?}, {duplicated}", reports.len());
+                UnitReport { unit: "U".to_owned(), ticks_of_others, returned, ..UnitReport::default() };
+            unit.note_services(&reports);
+            assert_eq!(unit.is_mixed(), is_mixed, "{groups}, {duplicated}, {of_others}");
         }
     }
 }

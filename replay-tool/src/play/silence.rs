@@ -10,7 +10,7 @@ use isotherm_bus::presence;
 use isotherm_correction::operation;
 use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::status::{Output, Status};
+use isotherm_protocol::status::{Output, Status, UNKNOWN_CHANNEL};
 use tokio::time::Instant;
 use zenoh::Session;
 
@@ -105,7 +105,9 @@ fn words(unit: &UnitId, ticks: u64, waited: Duration, status: Option<&Status>) -
              give it one, or play with --no-acknowledge"
         );
     }
-    match status.faults.iter().max_by_key(|fault| fault.last_unix_ms) {
+    // A temperature that is not used keeps no tick from coming back.
+    let causes = status.faults.iter().filter(|fault| fault.kind != UNKNOWN_CHANNEL);
+    match causes.max_by_key(|fault| fault.last_unix_ms) {
         Some(fault) => format!("{quiet}: {}", fault.first),
         None => {
             format!("{quiet}; see the service's log and the unit's status, or play with --no-acknowledge")
@@ -130,13 +132,19 @@ mod tests {
             first: "the producer sends counts".to_owned(),
             last_unix_ms: 0,
         };
+        let unused = Fault {
+            kind: UNKNOWN_CHANNEL.to_owned(),
+            first: "readings of board arrive".to_owned(),
+            last_unix_ms: 1,
+            ..refused.clone()
+        };
         let table = [
             None,
             Some(status(State::Standby, Output::Calibrated)),
             Some(status(State::SelfTest, Output::Calibrated)),
             Some(status(running, Output::Held)),
             Some(status(running, Output::Calibrated)),
-            Some(Status { faults: vec![refused], ..status(running, Output::Calibrated) }),
+            Some(Status { faults: vec![refused, unused], ..status(running, Output::Calibrated) }),
         ];
         insta::assert_snapshot!(table.map(|status| words(&unit, 300, QUIET, status.as_ref())).join("\n"));
     }

@@ -78,7 +78,7 @@ impl Worker {
             );
             // A unit must be stopped with a full disk too: the command stands, and whoever gave it is told.
             if let Err(error) = self.append(Some(unit), by, AuditEvent::Command(record)) {
-                let words = format!("it is not in the audit file: {error}");
+                let words = format!("it is not in the audit file, and a restart forgets it: {error}");
                 reason = Some(reason.map_or(words.clone(), |reason| format!("{reason}; {words}")));
             }
         }

@@ -107,9 +107,10 @@ impl Folder {
         self.naming.get(unit).into_iter().flatten().cloned().collect()
     }
 
-    /// The first file whose document names a unit.
+    /// The first file whose document names a unit, or did while it was valid.
     pub(super) fn first_naming(&self, unit: &UnitId) -> Option<&Path> {
-        self.naming.get(unit)?.first().map(PathBuf::as_path)
+        let names = |file: &File| [&file.unit, &file.hint].contains(&&Some(unit.clone()));
+        self.files.iter().find(|(_, file)| names(file)).map(|(path, _)| path.as_path())
     }
 
     /// Enters a file that cannot be read; the problem.

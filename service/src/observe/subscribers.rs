@@ -70,8 +70,8 @@ impl Subscribers {
 
 fn words(behind: &Behind) -> String {
     format!(
-        "subscriber {} at {} has not read everything within {} s; until it catches up, ticks are dropped for it: \
-         check its sequence numbers, its load and its link",
+        "subscriber {} at {} has not read everything within {} s: until it catches up ticks are dropped for it, or \
+         with `congestion = \"block\"` its connection is closed; check its sequence numbers, its load and its link",
         behind.session,
         behind.at,
         LIMIT.as_secs()

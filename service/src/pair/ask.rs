@@ -28,6 +28,8 @@ const NEXT_MEMORY: Duration = Duration::from_millis(500);
 /// How long after an entry of the journal histories are asked for: by then what follows from it is in the audit file, as a rule; and
 /// once more, for the first tick of a calibration.
 const DELAYS: [Duration; 2] = [Duration::from_millis(200), Duration::from_millis(1500)];
+/// The parameter that says which instance asks for a memory.
+pub(crate) const ASKS: &str = "instance";
 /// Most entries of a history that are asked for.
 const ENTRIES: u32 = 1000;
 
@@ -172,13 +174,15 @@ impl Asker {
         units.filter_map(|unit| UnitId::new(&unit.unit).ok()).collect()
     }
 
-    /// Has units go on from the memory of the instance that speaks for them, each as it comes.
+    /// Has units go on from the memory of the instance that speaks for them, each as it comes. It says who asks: an instance that is
+    /// followed and asks does not speak.
     async fn memories(self, mut units: BTreeSet<UnitId>) {
         let all = units.len() > 8;
-        let selectors: Vec<_> =
+        let keys: Vec<_> =
             if all { vec![key::ALL_JOURNALS.to_owned()] } else { units.iter().map(key::journal).collect() };
         let mut joiner = Joiner::new();
-        for selector in selectors {
+        for key in keys {
+            let selector = format!("{key}?{ASKS}={}", self.pair.me().instance);
             let mut replies = match ask_each(&self.session, &selector, LIMIT).await {
                 Ok(replies) => replies,
                 Err(error) => {

@@ -10,7 +10,7 @@ use isotherm_bus::close;
 use isotherm_protocol::history::AuditEvent;
 use isotherm_tests::bench::LIMIT;
 use isotherm_tests::operator::audit;
-use isotherm_tests::pair::{until_compared, until_paired};
+use isotherm_tests::pair::{until_compared, until_paired, until_speaks};
 use isotherm_tests::proxy::Fault;
 use zenoh::qos::CongestionControl;
 
@@ -81,6 +81,24 @@ async fn of_two_active_services_either_may_be_killed_without_a_pause() {
     // Both publish: a subscriber that takes the first of each tick drops the others, and counts them.
     let doubled = stand.end().await;
     assert!(doubled > 100, "{doubled}");
+}
+
+/// Of a unit that sends nothing no tick is late: that nobody publishes it must be found without one.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_unit_that_sends_nothing_is_published_after_its_instance_stood_still() {
+    let mut stand = Stand::start(1, &configuration("")).await;
+    until_compared(&stand.session, 1, 150).await;
+    stand.judge().await;
+    for _ in 0..2 {
+        let speaking = stand.speaker().await;
+        stand.pair.signal(speaking, "STOP");
+        // For so long that the other may have taken over, and too short for the lease.
+        tokio::time::sleep(LEASE * 4 / 5).await;
+        stand.pair.signal(speaking, "CONT");
+        until_speaks(&stand.session, 1 - speaking, 1).await;
+        until_paired(&stand.session, 1).await;
+    }
+    close(stand.session, LIMIT).await.unwrap();
 }
 
 /// A source that publishes with `Block` is held by a stopped service no longer than by the lease of both.

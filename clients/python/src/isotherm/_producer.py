@@ -32,8 +32,9 @@ class Producer:
     """Publishes the raw ticks of one unit; use it in a `with` statement, which flushes and closes at its end.
 
     Hand over what happened in the order of time: at equal times temperatures, then accelerometer, then gyro ticks. A gyro batch goes
-    out when it has `batch_ticks` (1…4096); what was handed over before goes out first. Congestion blocks: nothing is dropped. With
-    `max_in_flight`, `gyro` waits while more ticks than that have not come back corrected (at least two batches and 256). If nothing
+    out when it has `batch_ticks` (1…4096); what was handed over before goes out first. Congestion blocks. What is published while nobody
+    subscribes is lost: `unheard` counts it, and a warning is logged. What is on its way when a connection breaks is lost uncounted. With
+    `max_in_flight`, nothing is lost unseen: `gyro` waits while more ticks than that have not come back corrected (at least two batches and 256). If nothing
     comes back, `TimeoutError` names the ticks that were sent; these are not waited for any more. A tick is taken whatever is raised:
     what could not be sent goes with the next batch. Only a batch that cannot be encoded is given up (`Refused` names it).
     `series` is the number of this run (default: the time now): sequence and clock may start anywhere.
@@ -59,6 +60,9 @@ class Producer:
         self.series = time.time_ns() if series is None else series
         #: Gyro ticks published.
         self.sent = 0
+        #: Of these, published while nobody subscribed.
+        self.unheard = 0
+        self._is_heard = True
         self.closed = False
         self._session = session
         self._batch_ticks = batch_ticks
@@ -181,10 +185,21 @@ class Producer:
                 if self._first_sent is None:
                     self._first_sent, self._last_back = first, first - 1
                 self._last_sent = first + count - 1
+            self._note_heard(first, count)
             self._publishers[stream].put(frame)
             self.sent += count
         else:
             self._publishers[stream].put(frame)
+
+    def _note_heard(self, first: int, count: int) -> None:
+        is_heard = self._publishers["gyro"].matching_status.matching
+        if not is_heard:
+            self.unheard += count
+            if self._is_heard:
+                _LOG.warning("%s: nobody subscribes: gyro ticks from %d on are lost until a service is connected", self.unit, first)
+        elif not self._is_heard:
+            _LOG.warning("%s: a service subscribes again, from gyro tick %d on", self.unit, first)
+        self._is_heard = is_heard
 
     def drain(self) -> None:
         """Flushes, and waits until every tick has come back; only with `max_in_flight`.

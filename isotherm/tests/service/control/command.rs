@@ -116,6 +116,10 @@ async fn a_unit_that_sends_no_more_can_be_forgotten() {
     let reply = stand.command(UNIT, forget).await;
     assert!(!reply.accepted && reply.reason.unwrap().contains("a.toml"));
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 1.5), &SwapOptions::default()).await, 2);
+    folders.put("a.toml", &document(UNIT, 1.0).replace("schema", "scheme"));
+    while Client::on(stand.session.clone(), LIMIT).services().await.unwrap()[0].bad_documents.is_empty() {}
+    let reply = stand.command(UNIT, forget).await;
+    assert!(!reply.accepted && reply.reason.unwrap().contains("a.toml"), "a bad file names it, too");
     std::fs::remove_file(file).unwrap();
     let deadline = tokio::time::Instant::now() + LIMIT;
     while !stand.command(UNIT, forget).await.accepted {

@@ -7,8 +7,8 @@ use super::{Journal, Store, StoreError};
 
 /// How often it is tried where nothing else is written.
 const INTERVAL: Duration = Duration::from_secs(2);
-/// What is written for a trial: enough to need a block of the disk.
-const TRIAL: [u8; 4096] = [0; 4096];
+/// What is written for a trial: as much as a large document and its entries need.
+static TRIAL: [u8; 65536] = [0; 65536];
 
 impl Store {
     /// Why nothing can be written: the last write failed, as on a full disk.

@@ -1,5 +1,7 @@
 //! Answers to queries.
 
+use std::time::Instant;
+
 use isotherm_protocol::journal::split;
 use isotherm_protocol::{codec, key};
 use zenoh::Wait;
@@ -8,6 +10,7 @@ use zenoh::query::Query;
 
 use super::{Asked, Look, Work};
 use crate::control::is_asked;
+use crate::pair::ASKS;
 
 impl Work {
     /// Replies with everything that the query's key takes in, of what is asked for.
@@ -53,9 +56,16 @@ impl Work {
     /// Replies with the memory of units, in parts; one unit behind the other, so that only one memory is there at a time.
     fn answer_memory(&mut self, query: &Query) {
         let instance = self.instance.name();
+        let asks = query.parameters().get(ASKS);
+        let standing = self.pair.standing();
         let units = self.intake.each_unit(|actor| {
-            let unit = actor.id();
-            (actor.speaks() && is_asked(query, &key::journal(unit))).then(|| unit.clone())
+            if !is_asked(query, &key::journal(actor.id())) {
+                return None;
+            }
+            if let Some(asks) = asks {
+                actor.is_asked_by(asks, Instant::now(), &standing);
+            }
+            actor.speaks().then(|| actor.id().clone())
         });
         for unit in units.into_iter().flatten() {
             // A unit that has just started anew is asked once more by whoever misses its answer.

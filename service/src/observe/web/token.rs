@@ -106,7 +106,14 @@ pub(super) fn of_service(settings: &Settings) -> Result<String, ServiceError> {
     let refused = |source| ServiceError::Token { path: file.clone(), source };
     if !file.try_exists().map_err(refused)? {
         let token = made().map_err(refused)?;
-        create(&file, &format!("{token}\n"), 0o600).map_err(refused)?;
+        if let Err(error) = create(&file, &format!("{token}\n"), 0o600) {
+            tracing::error!(
+                "the token of the console cannot be written to {}: {error}; until the service ends: open /#token={token} at \
+                 the address of the metrics",
+                file.display()
+            );
+            return Ok(token);
+        }
     }
     let token = read(&file).map_err(refused)?;
     let others = fs::metadata(&file).map_err(refused)?.permissions().mode() & 0o077;

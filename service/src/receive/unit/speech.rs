@@ -267,6 +267,22 @@ impl UnitActor {
         self.look();
     }
 
+    /// Another instance asks for what the one that speaks knows. If that is the one that is followed here, nobody speaks, and of a unit
+    /// without ticks nobody would miss it: this one speaks. So does the first of two that ask each other.
+    pub(crate) fn is_asked_by(&mut self, instance: &str, now: Instant, standing: &Standing) {
+        let Some(following) = &self.speech.following else { return };
+        let nobody_speaks = if following.follower.has_joined() {
+            following.follower.instance().is_some_and(|followed| *followed == *instance)
+        } else {
+            let listens = now.saturating_duration_since(following.listens);
+            !standing.yields && listens >= LONELY && !following.kept.was_heard_since(now - LONELY)
+        };
+        if nobody_speaks {
+            tracing::warn!(unit = %self.stream.id(), "no instance publishes: this one does from now on");
+            self.speak(now, standing.takeover);
+        }
+    }
+
     /// An instance has come. What it did while there was no connection to it came here in no journal: its memory is taken anew. Instances
     /// that speak find out about one another by what the journal says that each knows.
     pub(crate) fn introduce(&mut self, instance: &str) {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::unit::Unit;
 use isotherm_protocol::raw::read_temperatures;
-use isotherm_protocol::status::Fault;
+use isotherm_protocol::status::{Fault, UNKNOWN_CHANNEL};
 
 use crate::receive::fault::standing;
 
@@ -56,7 +56,7 @@ impl UnknownChannels {
             unknown.join(", "),
             silent.join(", ")
         );
-        Some(standing("unknown_temperature_channel", unit.counters().temperature_unknown_channel, words))
+        Some(standing(UNKNOWN_CHANNEL, unit.counters().temperature_unknown_channel, words))
     }
 }
 

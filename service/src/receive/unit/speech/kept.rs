@@ -157,6 +157,11 @@ impl Kept {
         })
     }
 
+    /// Whether the other instance was heard since a time.
+    pub(super) fn was_heard_since(&self, time: Instant) -> bool {
+        self.last_heard.is_some() && self.heard_at.is_some_and(|heard_at| heard_at >= time)
+    }
+
     /// The oldest frame that waits to be heard.
     fn oldest_waiting(&self) -> Option<&Frame> {
         self.frames.iter().rev().take_while(|frame| !frame.heard).last()
@@ -204,10 +209,12 @@ impl Kept {
         settled
     }
 
-    /// The frames that are to be published and were not yet: those that were not heard, and those that were heard within the last
-    /// `overlap`. What the other published otherwise is not said again.
+    /// The frames that are to be published and were not yet: those that were not heard, and the last ones that were, as far as twice the
+    /// `overlap` back. What the other published before is not said again.
     pub(super) fn due(&mut self, now: Instant, overlap: Duration) -> Vec<Vec<u8>> {
-        let recent = |frame: &Frame| now.saturating_duration_since(frame.at) <= overlap * 2;
+        // However long ago it was heard: where the processors are busy, what it sent may reach subscribers later than what is sent now.
+        let heard_at = self.heard_at.unwrap_or(now);
+        let recent = |frame: &Frame| heard_at.saturating_duration_since(frame.at) <= overlap * 2;
         let is_due = |frame: &Frame| !frame.out && (!frame.heard || (recent(frame) && self.agrees(frame)));
         let due: Vec<_> = self.frames.iter().map(is_due).collect();
         let frames = self.frames.iter_mut().zip(due).filter(|(_, due)| *due);
@@ -305,6 +312,17 @@ mod tests {
         kept.replace((2..7).map(frame).collect(), Some(kept.made() - 4), late);
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [6]);
         assert!(kept.due(late, TAKEOVER).is_empty());
+    }
+
+    #[test]
+    fn what_was_heard_last_is_due_however_late_the_takeover_is() {
+        let (mut kept, start) = (Kept::default(), Instant::now());
+        for sequence in 0..3 {
+            let at = start + TAKEOVER * 3 * u32::try_from(sequence).unwrap();
+            kept.computed(frame(sequence), at);
+            kept.heard(batch(sequence), at);
+        }
+        assert_eq!(sequences(&kept.due(start + TAKEOVER * 20, TAKEOVER)), [2]);
     }
 
     #[test]

@@ -134,6 +134,33 @@ fn one_that_yields_to_an_instance_that_stands_by_says_nothing_in_its_place() {
 }
 
 #[test]
+fn a_unit_without_ticks_is_published_by_whoever_is_asked_by_the_instance_that_published_it() {
+    for (asks, speaks) in [("other", true), ("third", false)] {
+        let (mut other, ..) = deserted();
+        other.journal_to(Journal { instance: "other".into(), outlet: Arc::new(|_, _| Ok(())) });
+        let (mut actor, _, start) = deserted();
+        let standing = Standing { yields: true, alone_since: None, deserted: false, ..lost(start) };
+        actor.follow(start + ms(20), Footing::Nothing);
+        actor.hear_journal(other.memory("other"), start + ms(20), &standing);
+        let later = start + ms(5000);
+        assert!(!actor.watch_speech(later, &standing).spoke, "it stands by");
+        actor.is_asked_by(asks, later, &standing);
+        assert_eq!(actor.speaks(), speaks);
+    }
+}
+
+#[test]
+fn of_two_that_ask_each_other_the_first_speaks() {
+    for (yields, after, speaks) in [(false, 2000, true), (false, 1000, false), (true, 2000, false)] {
+        let (mut actor, _, start) = deserted();
+        let standing = Standing { yields, alone_since: None, deserted: false, ..lost(start) };
+        actor.follow(start, Footing::Nothing);
+        actor.is_asked_by("other", start + ms(after), &standing);
+        assert_eq!(actor.speaks(), speaks);
+    }
+}
+
+#[test]
 fn what_the_other_was_ordered_holds_for_one_that_has_just_yielded_too() {
     let (mut actor, sink, start) = deserted();
     let standing = Standing { alone_since: None, deserted: false, ..lost(start) };
