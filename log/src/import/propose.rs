@@ -6,7 +6,7 @@ mod time;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::figures::{Figures, usual_size};
+use super::figures::{Column, Figures, usual_size};
 use super::layout::{self, Found};
 use super::names::{Kind, Meaning, kind_by_unit, meaning};
 use super::written::{FileText, Sensors, Temperature, name_line};
@@ -128,7 +128,9 @@ impl<'a> File<'a> {
             let columns = axes.map(|axis| axis.map(|(index, _)| index));
             let units = self.sensor_units(axes, kind, proposal);
             let there: Vec<usize> = columns.into_iter().flatten().collect();
-            let may_be_empty = there.iter().all(|column| self.is_in_some_rows(*column));
+            let may_be_empty = there
+                .iter()
+                .all(|column| self.figures.columns.get(*column).is_some_and(Column::is_in_some_rows));
             let mut said: Vec<_> = units
                 .iter()
                 .map(|(unit, scale)| scale.map_or_else(String::new, |scale| format!("{scale:?} ")) + unit)
@@ -354,15 +356,6 @@ impl<'a> File<'a> {
             found.push(Temperature { channel, column: *index, unit, may_be_empty });
         }
         found
-    }
-
-    /// Whether a column has a rhythm of its own. An empty cell now and then is a reading that is missing: its row is passed over, and
-    /// leaves a gap in every sensor's ticks.
-    fn is_in_some_rows(self, column: usize) -> bool {
-        self.figures
-            .columns
-            .get(column)
-            .is_some_and(|column| column.empty * 10 > column.numbers + column.other)
     }
 
     fn ask_columns(self) -> Question {
