@@ -72,7 +72,9 @@ pub(super) fn select<'h>(
         let cells = cells.join(", ");
         return Err(refuse(
             path,
-            format!("has a row for each sensor ({cells} in column {name}); needs one row per tick, with a column for each sensor's axis"),
+            format!(
+                "has a row for each sensor ({cells} in column {name}): make one row per tick of it, with a column for each sensor's axis"
+            ),
         ));
     }
     match (serials, hints.serial.as_deref()) {
