@@ -67,6 +67,9 @@ pub enum Error {
         /// The file.
         path: String,
     },
+    /// A log without a tick to plot.
+    #[error("the log has nothing to draw: no raw and no corrected ticks of the chosen units")]
+    NothingDrawn,
     /// What was given does not go together.
     #[error("{0}")]
     Usage(String),

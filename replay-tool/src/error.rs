@@ -45,11 +45,11 @@ pub enum Error {
         /// Of which unit, and why.
         words: String,
     },
-    /// A log without a message to play.
+    /// A log without a message to play or to correct.
     #[error(
-        "nothing was played: there is no raw message of these units, topics and times; `isotherm-replay list LOG` shows what there is"
+        "nothing was {0}: there is no raw message of these units, topics and times; `isotherm-replay list LOG` shows what there is"
     )]
-    NothingPlayed,
+    Nothing(&'static str),
     /// The asynchronous runtime does not start.
     #[error("cannot start the runtime: {source}")]
     Runtime {

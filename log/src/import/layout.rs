@@ -138,7 +138,7 @@ fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -
                 *sum += share;
             }
             // A comment between rows ends no run.
-            None if COMMENTS.iter().any(|prefix| line.trim_start().starts_with(prefix)) => {}
+            None if comments(delimiter).any(|prefix| line.trim_start().starts_with(prefix)) => {}
             None => close(&mut run),
         }
     }
@@ -191,7 +191,7 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
     let preamble: Vec<String> =
         before.iter().take(header_at.unwrap_or(before.len())).map(|line| (*line).clone()).collect();
     let header_line = header_at.map(|at| before[at].clone());
-    let comment = comment(lines, header_line.as_deref());
+    let comment = comment(lines, header_line.as_deref(), delimiter);
     let skipped = |upto: usize| {
         let is_comment = |line: &str| comment.is_some_and(|prefix| line.trim_start().starts_with(prefix));
         before.iter().take(upto).filter(|line| !is_comment(line)).count()
@@ -267,9 +267,16 @@ fn odd_rows(rows: &[String], delimiter: Delimiter, mark: u8) -> usize {
     front.iter().rposition(odd).map_or(0, |last| last + 1)
 }
 
+/// Prefixes that comments may have: a line that begins with the delimiter is a row whose first cell is empty.
+fn comments(delimiter: Delimiter) -> impl Iterator<Item = &'static str> {
+    let splits =
+        move |prefix: &str| matches!(delimiter, Delimiter::Character(byte) if prefix.as_bytes() == [byte]);
+    COMMENTS.into_iter().filter(move |prefix| !splits(prefix))
+}
+
 /// The prefix of lines that are passed over: one that a line other than the header has, and the header has not.
-fn comment(lines: &[String], header: Option<&str>) -> Option<&'static str> {
-    COMMENTS.into_iter().find(|prefix| {
+fn comment(lines: &[String], header: Option<&str>, delimiter: Delimiter) -> Option<&'static str> {
+    comments(delimiter).find(|prefix| {
         lines.iter().any(|line| line.trim_start().starts_with(prefix))
             && !header.is_some_and(|header| header.trim_start().starts_with(prefix))
     })

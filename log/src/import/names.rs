@@ -89,17 +89,22 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     let mut parts = parts(bare);
     let stated = own.or(of_row.map(|text| text.trim_matches(['(', ')', '[', ']'])));
     let stated = stated.filter(|text| text.chars().any(|c| c.is_alphabetic() || "°\"″%".contains(c)));
-    // "T_case_degC": the unit is the name's end.
-    let degrees = match parts.as_slice() {
-        [_, .., deg, scale] if stated.is_none() && deg == "deg" && (scale == "c" || scale == "f") => {
-            Some(format!("deg{scale}"))
+    // "T_case_degC", "temp_dC", "T_block_K": the unit is the name's end.
+    let is_scale = |text: &str| matches!(text, "c" | "f" | "k");
+    let at_end = match parts.as_slice() {
+        _ if stated.is_some() => None,
+        [_, .., deg, scale] if deg == "deg" && is_scale(scale) => Some((2, format!("deg{scale}"))),
+        [_, .., part, c] if (part == "d" || part == "m") && bare.ends_with(&format!("{part}C")) => {
+            Some((2, format!("{part}{}", c.to_uppercase())))
         }
+        [t, .., scale] if t == "t" && bare.starts_with('T') && is_scale(scale) => Some((1, scale.clone())),
         _ => None,
     };
-    parts.truncate(parts.len() - 2 * usize::from(degrees.is_some()));
-    let stated = stated.or(degrees.as_deref());
+    let (of_end, at_end) = at_end.unzip();
+    parts.truncate(parts.len() - of_end.unwrap_or(0));
+    let stated = stated.or(at_end.as_deref());
     let by_unit = stated.and_then(kind_of);
-    let axis = take_axis(&mut parts, matches!(by_unit, Some(Kind::Gyro | Kind::Accel)));
+    let axis = take_axis(&mut parts, by_unit);
     let has = |words: &[&str]| parts.iter().any(|part| words.contains(&part.as_str()));
     let pair = |first: &str, second: &str| {
         parts.windows(2).any(|pair| pair[0] == first && pair[1].starts_with(second))
@@ -111,7 +116,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         || has(&["dtheta", "deltang", "dang", "deltaangle"])
         || pair("delta", "theta");
     let velocity =
-        pair("delta", "vel") || pair("vel", "inc") || has(&["dvel", "deltvel", "deltavel", "velinc"]);
+        pair("delta", "vel") || pair("vel", "inc") || has(&["dv", "dvel", "deltvel", "deltavel", "velinc"]);
     // In steps of 100 µs, which no mapping has: Xsens counts its packets beside it.
     let fine = has(&["fine"]);
     let (kind, increment) = if fine {
@@ -180,7 +185,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
         // Each axis may have its own unit; readings without one are others.
         stem += " unit";
     }
-    let axis = axis.filter(|_| kind != Kind::Time);
+    let axis = axis.filter(|axis| is_sensor(Some(kind)) || *axis < 3 && kind != Kind::Time);
     let scale = found.map(|(_, scale)| scale).filter(|scale| (scale - 1.0).abs() > f64::EPSILON);
     let unit = found.map(|(unit, _)| unit);
     Some(Meaning { kind, axis, stem, increment, unit, scale, unknown, rank })
@@ -196,10 +201,20 @@ pub(super) fn kind_by_unit(name: &str, of_row: Option<&str>) -> Option<Kind> {
     kind_of(bracketed(name).1.or(of_row)?)
 }
 
-/// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word, or the second of two where
-/// the unit is one `of_sensors`.
-fn take_axis(parts: &mut Vec<String>, of_sensors: bool) -> Option<usize> {
+fn is_sensor(kind: Option<Kind>) -> bool {
+    matches!(kind, Some(Kind::Gyro | Kind::Accel))
+}
+
+/// Takes the axis out of a name: a part x, y, z, or 0, 1, 2 at its end, or the last letter of a known word. Where the unit is one of
+/// sensors, a number may be 3, for those that count from 1, and the axis the second of any two letters; of rates, p, q, r alone.
+fn take_axis(parts: &mut Vec<String>, by_unit: Option<Kind>) -> Option<usize> {
     let letter = |text: &str| ["x", "y", "z"].iter().position(|axis| *axis == text);
+    if let ([one], Some(Kind::Gyro)) = (parts.as_mut_slice(), by_unit)
+        && let Some(axis) = ["p", "q", "r"].iter().position(|axis| axis == one)
+    {
+        "rate".clone_into(one);
+        return Some(axis);
+    }
     if parts.iter().any(|part| part == "rate" || part == "gyro")
         && let Some(at) = parts.iter().position(|part| ["roll", "pitch", "yaw"].contains(&part.as_str()))
     {
@@ -215,7 +230,7 @@ fn take_axis(parts: &mut Vec<String>, of_sensors: bool) -> Option<usize> {
         parts.iter().rev().nth(1).is_some_and(|before| ["s", "ms", "mps"].contains(&before.as_str()));
     if let Some(index) = last.parse::<usize>().ok().filter(|_| !squared) {
         parts.pop();
-        return Some(index).filter(|index| *index < 3);
+        return Some(index).filter(|index| *index < 3 + usize::from(is_sensor(by_unit)));
     }
     for part in parts.iter_mut() {
         let Some((at, _)) = part.char_indices().last() else { continue };
@@ -223,8 +238,8 @@ fn take_axis(parts: &mut Vec<String>, of_sensors: bool) -> Option<usize> {
         if letter(end).is_some()
             && (GYROS.contains(&stem)
                 || ACCELS.contains(&stem)
-                || of_sensors && stem.chars().count() == 1
-                || ["dtheta", "dvel", "deltang"].contains(&stem))
+                || is_sensor(by_unit) && stem.chars().count() == 1
+                || ["dtheta", "dv", "dvel", "deltang"].contains(&stem))
         {
             let axis = letter(end);
             *part = stem.to_owned();
@@ -242,13 +257,19 @@ mod tests {
     #[test]
     fn names_of_many_makers_say_what_they_hold() {
         type Case = (&'static str, Option<&'static str>, Option<(Kind, Option<usize>, Option<&'static str>)>);
-        let cases: [Case; 72] = [
+        let cases: [Case; 78] = [
             ("nx(g)", None, Some((Accel, Some(0), Some("g")))),
             ("wz(dps)", None, Some((Gyro, Some(2), Some("deg_per_s")))),
             ("tboard (°C)", None, Some((Temperature, None, Some("deg_c")))),
             ("fx_g", None, Some((Accel, Some(0), Some("g")))),
             ("omega_y_dps", None, Some((Gyro, Some(1), Some("deg_per_s")))),
             ("T_case_degC", None, Some((Temperature, None, Some("deg_c")))),
+            ("T_block_K", None, Some((Temperature, None, Some("kelvin")))),
+            ("temp_dC", None, Some((Temperature, None, None))),
+            ("dv_x [m/s]", None, Some((Accel, Some(0), Some("m_per_s")))),
+            ("dvz", None, Some((Accel, Some(2), None))),
+            ("q [deg/s]", None, Some((Gyro, Some(1), Some("deg_per_s")))),
+            ("q", None, None),
             ("Acceleration Z / g", None, Some((Accel, Some(2), Some("g")))),
             ("Temperature / °C", None, Some((Temperature, None, Some("deg_c")))),
             ("Drehrate Nick [°/s]", None, Some((Gyro, Some(1), Some("deg_per_s")))),

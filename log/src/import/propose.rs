@@ -6,7 +6,7 @@ mod time;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::figures::{Figures, usual_size};
+use super::figures::{Column, Figures, usual_size};
 use super::layout::{self, Found};
 use super::names::{Kind, Meaning, kind_by_unit, meaning};
 use super::written::{FileText, Sensors, Temperature, name_line};
@@ -117,7 +117,8 @@ impl<'a> File<'a> {
         ));
         let meanings = self.meanings();
         let groups = [Kind::Gyro, Kind::Accel].map(|kind| Self::group(&meanings, kind));
-        if groups.iter().all(Option::is_none) {
+        let of_temperatures = named && meanings.iter().any(|(_, meaning)| meaning.kind == Kind::Temperature);
+        if groups.iter().all(Option::is_none) && !of_temperatures {
             proposal.open.push(self.ask_columns());
         }
         let counter = self.counter(&meanings, proposal);
@@ -128,7 +129,9 @@ impl<'a> File<'a> {
             let columns = axes.map(|axis| axis.map(|(index, _)| index));
             let units = self.sensor_units(axes, kind, proposal);
             let there: Vec<usize> = columns.into_iter().flatten().collect();
-            let may_be_empty = there.iter().all(|column| self.is_in_some_rows(*column));
+            let may_be_empty = there
+                .iter()
+                .all(|column| self.figures.columns.get(*column).is_some_and(Column::is_in_some_rows));
             let mut said: Vec<_> = units
                 .iter()
                 .map(|(unit, scale)| scale.map_or_else(String::new, |scale| format!("{scale:?} ")) + unit)
@@ -144,7 +147,15 @@ impl<'a> File<'a> {
                 lacks => format!(" as {}; 0 for {lacks}, which the log does not have", axes(true)),
             };
             proposal.notes.push(format!("{kind}: {} in {}{as_axes}", self.listed(&there), said.join(", ")));
-            sensors.push(Sensors { kind, columns, units, counter, may_be_empty });
+            let is_minus = |index: &usize| {
+                self.names().get(*index).is_some_and(|name| name.trim_start().starts_with(['-', '−']))
+            };
+            let turned = columns.map(|column| column.is_some_and(|index| is_minus(&index)));
+            let minus: Vec<usize> = there.into_iter().filter(is_minus).collect();
+            if !minus.is_empty() {
+                proposal.notes.push(format!("{kind}: sign = -1 for {}, as named", self.listed(&minus)));
+            }
+            sensors.push(Sensors { kind, columns, units, turned, counter, may_be_empty });
         }
         let temperatures = self.temperatures(&meanings, proposal);
         let of_sensors = sensors.iter().flat_map(|it| it.columns).flatten();
@@ -231,14 +242,19 @@ impl<'a> File<'a> {
 
     /// The columns of a kind, x, y and z, of the best of those that the log has; of gyros one or two are better than none.
     fn group(meanings: &Meanings, kind: Kind) -> Option<Axes<'_>> {
-        let mut groups: BTreeMap<&str, Axes<'_>> = BTreeMap::new();
+        let mut groups: BTreeMap<&str, [Option<(usize, &Meaning)>; 4]> = BTreeMap::new();
         for (index, meaning) in meanings.iter().filter(|(_, meaning)| meaning.kind == kind) {
             let axis = meaning.axis.unwrap_or(0);
             groups.entry(&meaning.stem).or_default()[axis].get_or_insert((*index, meaning));
         }
+        // Some count from 1.
+        let groups = groups.into_values().map(|[x, y, z, fourth]| match (x, fourth) {
+            (None, Some(_)) => [y, z, fourth],
+            _ => [x, y, z],
+        });
         let lacking = |axes: &Axes<'_>| axes.iter().filter(|axis| axis.is_none()).count();
         let rank = |axes: &Axes<'_>| axes.iter().flatten().map(|(_, meaning)| meaning.rank).min();
-        let taken = groups.into_values().filter(|axes| kind == Kind::Gyro || lacking(axes) == 0);
+        let taken = groups.filter(|axes| kind == Kind::Gyro || lacking(axes) == 0);
         taken.min_by_key(|axes| {
             (lacking(axes), rank(axes), axes.iter().flatten().next().map(|(index, _)| *index))
         })
@@ -354,15 +370,6 @@ impl<'a> File<'a> {
             found.push(Temperature { channel, column: *index, unit, may_be_empty });
         }
         found
-    }
-
-    /// Whether a column has a rhythm of its own. An empty cell now and then is a reading that is missing: its row is passed over, and
-    /// leaves a gap in every sensor's ticks.
-    fn is_in_some_rows(self, column: usize) -> bool {
-        self.figures
-            .columns
-            .get(column)
-            .is_some_and(|column| column.empty * 10 > column.numbers + column.other)
     }
 
     fn ask_columns(self) -> Question {

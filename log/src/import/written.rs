@@ -13,6 +13,8 @@ pub(super) struct Sensors {
     pub(super) columns: [Option<usize>; 3],
     /// Of each; and how much of the unit a reading of 1 is, where it is not one.
     pub(super) units: [(String, Option<f64>); 3],
+    /// Whose name begins with a minus: the other way round.
+    pub(super) turned: [bool; 3],
     pub(super) counter: Option<usize>,
     pub(super) may_be_empty: bool,
 }
@@ -120,12 +122,15 @@ impl FileText<'_> {
                 line(format_args!("may_be_empty = true"));
             }
             line(format_args!("sensors = ["));
-            for (column, (unit, scale)) in sensors.columns.iter().zip(&sensors.units) {
+            for ((column, (unit, scale)), turned) in
+                sensors.columns.iter().zip(&sensors.units).zip(sensors.turned)
+            {
+                let sign = if turned { ", sign = -1" } else { "" };
                 let scale = scale.map_or_else(String::new, |scale| format!(", scale = {scale:?}"));
                 let source = column.map_or("constant = 0.0".to_owned(), |column| {
                     format!("column = {}", self.column(column))
                 });
-                line(format_args!("    {{ {source}, unit = \"{unit}\"{scale} }},"));
+                line(format_args!("    {{ {source}, unit = \"{unit}\"{sign}{scale} }},"));
             }
             line(format_args!("]"));
         }

@@ -9,6 +9,8 @@ use serde::Serialize;
 /// What a unit on the ground does not read over a whole log (m/s², °/s).
 const FORCES: std::ops::RangeInclusive<f64> = 5.0..=15.0;
 const MOST_RATE: f64 = 100.0;
+/// One of so many outputs may have no fresh temperature.
+const STALE: u64 = 20;
 
 /// Sums over corrected ticks.
 #[derive(Debug, Clone, Default)]
@@ -154,7 +156,7 @@ fn size(vector: [f64; 3]) -> f64 {
 }
 
 impl Summary {
-    /// What looks like a wrong unit or scale, in words.
+    /// What looks like a wrong unit or scale, or like temperatures of another time, in words.
     #[must_use]
     pub fn doubts(&self) -> Vec<String> {
         let (rate, force) = (size(self.mean_rate_deg_per_h) / 3600.0, self.mean_force_m_per_s2);
@@ -165,6 +167,14 @@ impl Summary {
         let force = (force > 0.0 && !FORCES.contains(&force)).then(|| {
             format!("the mean specific force of the whole log is {force:.3} m/s², far from gravity: {check}")
         });
-        rate.into_iter().chain(force).collect()
+        let stale = self.sensor_flags.get("STALE_TEMPERATURE").copied().unwrap_or(0);
+        let stale = (stale > self.outputs / STALE).then(|| {
+            format!(
+                "{stale} of {} outputs have no fresh temperature (STALE_TEMPERATURE): check that the log's temperatures begin and end \
+                 with its gyros, on one clock (`isotherm-replay info LOG` shows it)",
+                self.outputs
+            )
+        });
+        [rate, force, stale].into_iter().flatten().collect()
     }
 }

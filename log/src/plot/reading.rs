@@ -254,11 +254,7 @@ impl Plot {
             }
         }
         let units: Vec<_> = self.units.into_iter().collect();
-        let page = layout::page(units, &summary).ok_or_else(|| {
-            Error::Usage(
-                "the log has nothing to draw: no raw and no corrected ticks of the chosen units".to_owned(),
-            )
-        })?;
+        let page = layout::page(units, &summary).ok_or(Error::NothingDrawn)?;
         Ok((page, summary))
     }
 

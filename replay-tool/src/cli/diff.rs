@@ -28,7 +28,7 @@ use crate::error::Error;
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out a.csv\n  \
     isotherm-replay correct mems.csv --calibration config/calibration/MEMS-0001.toml --out b.csv\n  \
     isotherm-replay diff a.csv b.csv\n\n\
-    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are matched by sequence number and end, and compared to the bit unless a tolerance is given.\n\n\
+    A log is a recording (MCAP) with corrected ticks, or a CSV or wire file of `isotherm-replay correct`. Ticks are matched by sequence number and end, else by either of them, and compared to the bit unless a tolerance is given.\n\n\
     Exit codes: 0 identical, or within the tolerance; 1 different, or one cannot be read; 2 usage.")]
 pub(super) struct DiffArgs {
     /// The first log

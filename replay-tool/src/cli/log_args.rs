@@ -68,6 +68,20 @@ impl LogArgs {
         Ok(units.collect::<Result<_, _>>()?)
     }
 
+    /// Refuses to correct a text log of one unit by the document of another.
+    ///
+    /// # Errors
+    /// Where `--unit` is another unit than the document's.
+    pub(crate) fn refuse_document_of_another(&self, document: &str) -> Result<(), Error> {
+        match self.unit.iter().find(|given| *given != document) {
+            Some(given) if !self.is_recording()? => Err(Error::Usage(format!(
+                "--unit is {given}, --calibration is for unit {document}: give the document of {given}, or leave --unit out to correct the \
+                 log as one of {document}"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// The part of the log's time and units.
     ///
     /// # Errors

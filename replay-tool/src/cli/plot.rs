@@ -138,7 +138,11 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     for log in std::iter::once(&args.log).chain(&other) {
         let messages = match corrected(log, unnamed.as_ref())? {
             Some(messages) => messages,
-            None => log.messages(BATCH, unnamed.as_ref())?,
+            None => {
+                let document = calibration.as_ref().map(|parsed| parsed.document.unit.as_str());
+                document.map_or(Ok(()), |unit| log.refuse_document_of_another(unit))?;
+                log.messages(BATCH, unnamed.as_ref())?
+            }
         };
         bar.get_or_insert_with(|| Bar::over_log(messages.progress().watch()));
         let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();

@@ -65,6 +65,7 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
         let Some(loaded) = loaded else {
             return Err(Error::Usage("a text log needs --calibration FILE".to_owned()));
         };
+        args.log.refuse_document_of_another(loaded.unit.as_str())?;
         let messages = args.log.messages(1, Some(&loaded.unit))?;
         return Ok(Stepper::new(
             messages,

@@ -210,10 +210,19 @@ fn a_recording_of_raw_messages_is_corrected_with_a_document_as_its_text_is() {
 fn what_does_not_go_together_is_refused() {
     let folder = simulated();
     fs::write(folder.path().join("other.toml"), document().replace("MEMS-0001", "MEMS-0002")).unwrap();
+    let header = fs::read_to_string(folder.path().join("mems.csv")).unwrap();
+    fs::write(folder.path().join("empty.csv"), header.lines().next().unwrap()).unwrap();
     let text = ["mems.csv", "--mapping", "mems.mapping.toml"];
     let refused = [
         &["correct", text[0], text[1], text[2]][..],
         &["correct", text[0], text[1], text[2], "--calibration", "mems.toml", "--ignore-swaps"],
+        &["correct", "mems.csv", "--calibration", "mems.toml", "--unit", "MEMS-0002"],
+        &["correct", "mems.csv", "--calibration", "mems.toml", "--unit", "MEMS-0002", "--out", "other.mcap"],
+        &["plot", "mems.csv", "--calibration", "mems.toml", "--unit", "MEMS-0002", "--out", "other.html"],
+        &["step", "mems.csv", "--calibration", "mems.toml", "--unit", "MEMS-0002"],
+        &["correct", "empty.csv", "--mapping", text[2], "--calibration", "mems.toml", "--out", "none.csv"],
+        &["correct", "empty.csv", "--mapping", text[2], "--calibration", "mems.toml", "--out", "none.mcap"],
+        &["plot", "empty.csv", "--mapping", text[2], "--calibration", "mems.toml", "--out", "none.html"],
         &["correct", "raw.mcap", "--calibration", "other.toml"],
         &["correct", "raw.mcap", "--calibration", "mems.toml", "--calibration", "mems.toml"],
         &["correct", "raw.mcap", "--mapping", "mems.mapping.toml"],
@@ -223,6 +232,9 @@ fn what_does_not_go_together_is_refused() {
         &["step", "raw.mcap", "--calibration", "other.toml"],
     ];
     insta::assert_snapshot!(refused.map(|args| told(folder.path(), args)).concat());
+    for name in ["none.csv", "none.mcap", "none.html"] {
+        assert!(!folder.path().join(name).exists(), "{name}");
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::common::{check, replay, root, stderr, stdout, told};
-use super::imports::{Expected, TEN_MS, import, log, noise};
+use super::imports::{Expected, ROWS, TEN_MS, import, log, noise};
 
 /// Writes a log into a folder, and says what `import` says of it on standard error.
 fn imported(folder: &Path, name: &str, text: &str, options: &[&str]) -> String {
@@ -159,4 +159,82 @@ fn a_log_that_is_read_in_a_wrong_unit_is_doubted() {
         stderr(&replay(path, &["correct", "rest.csv", "--mapping", mapping, "--calibration", document]))
     };
     insta::assert_snapshot!(format!("{}---\n{}", corrected("rest.mapping.toml"), corrected("wrong.toml")));
+}
+
+#[test]
+fn a_row_that_begins_with_the_delimiter_is_no_comment() {
+    let table = |lacks: usize| {
+        log("t;gx;gy;gz\n;°/h;°/h;°/h\n", |row| {
+            let time = format!("{},{:02}", row / 100, row % 100);
+            format!("{};{row},5;1,5;0,1", if row == lacks { "" } else { &time })
+        })
+    };
+    let parts = ["drop_rows = 1", "{ column = \"gx\", unit = \"deg_per_h\" }"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 0 };
+    let (mapping, _) = import("units.csv", table(ROWS).as_bytes(), &[], &expected);
+    assert!(!mapping.contains("comment"), "{mapping}");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("lacks.csv"), table(99)).unwrap();
+    let output = replay(folder.path(), &["import", "lacks.csv", "--no-plot", "--json"]);
+    check(&output, 3);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(report["info"]["reading"]["skipped_rows"], 1, "{report}");
+}
+
+#[test]
+fn increments_signs_and_tenths_are_taken_as_the_header_states_them() {
+    let front =
+        "t [s],-gyro_1 [deg/s],gyro_2 [deg/s],gyro_3 [deg/s],dv_x [mm/s],dv_y [mm/s],dv_z [mm/s],temp_dC\n";
+    let text = log(front, |row| {
+        let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+        format!("{time:.2},{:.3},1.5,0.1,0.1,-0.2,98.{},25{}", noise(row, 9), row % 10, row % 10)
+    });
+    let parts = [
+        "    { column = \"-gyro_1 [deg/s]\", unit = \"deg_per_s\", sign = -1 },\n    { column = \"gyro_2 [deg/s]\", unit = \"deg_per_s\" },\n    { column = \"gyro_3",
+        "gyro: sign = -1 for -gyro_1 [deg/s], as named",
+        "{ column = \"dv_z [mm/s]\", unit = \"m_per_s\", scale = 0.001 }",
+        "channel = \"imu\"\ncolumn = \"temp_dC\"\nunit = \"raw\"",
+        "the header states \"dC\"",
+    ];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 1 };
+    import("bench.csv", text.as_bytes(), &[], &expected);
+
+    let rows = log("time,sensor,x,y,z\n", |row| {
+        let sensor = ["gyro", "acc"][row % 2];
+        format!("{}.5,{sensor},{:.3},1.5,0.1", row / 2, noise(row, 10))
+    });
+    let bare = text.replace(" [mm/s]", "");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    insta::assert_snapshot!(imported(path, "rows.csv", &rows, &[]) + &imported(path, "bare.csv", &bare, &[]));
+}
+
+#[test]
+fn temperatures_of_a_second_file_are_read_and_doubted_where_their_clock_is_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let seconds = |row: usize, step: f64| f64::from(u32::try_from(row).unwrap()) * step;
+    let gyros = log("time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n", |row| {
+        format!("{:.2},{:.3},1.5,0.1,0.001,0.002,1.000", seconds(row, 0.01), noise(row, 11))
+    });
+    std::fs::write(path.join("imu.csv"), gyros).unwrap();
+    let imported = |begin: f64, header: &str| {
+        let temperatures = log(&format!("time_s,{header}\n"), |row| {
+            format!("{:.1},298.1{}", begin + seconds(row, 0.1), row % 10)
+        });
+        let until = temperatures.lines().take(51).collect::<Vec<_>>().join("\n");
+        std::fs::write(path.join("temp.csv"), until).unwrap();
+        let output = replay(path, &["import", "imu.csv", "temp.csv", "--no-plot", "--overwrite"]);
+        check(&output, 0);
+        let document = root().join("config/calibration/chamber-mems.toml").canonicalize().unwrap();
+        let mapping = std::fs::read_to_string(path.join("imu.mapping.toml")).unwrap();
+        std::fs::write(path.join("imu.mapping.toml"), mapping.replace("\"t_block\"", "\"imu\"")).unwrap();
+        let args = ["correct", "imu.csv", "temp.csv", "--calibration", document.to_str().unwrap()];
+        let said = stderr(&replay(path, &args));
+        let text = stdout(&output);
+        let apart = text.lines().filter(|line| line.contains(" the gyros"));
+        apart.map(|line| format!("{line}\n")).collect::<String>() + &said
+    };
+    let same = imported(0.0, "T_block_K");
+    insta::assert_snapshot!(format!("{same}---\n{}", imported(1000.0, "Temperature [K]")));
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::super::names::meaning;
+use super::super::names::{Kind, meaning};
 use super::super::words::parts;
 use super::super::{Hints, Proposal, Question, refuse};
 use super::File;
@@ -64,6 +64,19 @@ pub(super) fn select<'h>(
     hints: &'h Hints,
     proposal: &mut Proposal,
 ) -> Result<Option<(usize, &'h str)>, Error> {
+    // A sensor's name of one letter may be a unit's as well.
+    let of_kind = |cell: &String| Some(meaning(&format!("{cell} x"), None).filter(|_| cell.len() > 1)?.kind);
+    let has = |column: &Serials, kind| column.cells.iter().any(|cell| of_kind(cell) == Some(kind));
+    if let Some(column) = serials.filter(|column| has(column, Kind::Gyro) && has(column, Kind::Accel)) {
+        let Serials { name, cells, .. } = column;
+        let cells = cells.join(", ");
+        return Err(refuse(
+            path,
+            format!(
+                "has a row for each sensor ({cells} in column {name}): make one row per tick of it, with a column for each sensor's axis"
+            ),
+        ));
+    }
     match (serials, hints.serial.as_deref()) {
         (Some(column), Some(serial)) if column.cells.iter().any(|have| have == serial) => {
             Ok(Some((column.index, serial)))

@@ -57,8 +57,9 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
 pub(super) fn run_text(args: &CorrectArgs, calibration: &Path) -> Result<Exit, Error> {
     let loaded = load_calibration(calibration)?;
     loaded.warnings.iter().for_each(|warning| show::warn(&warning.to_string()));
+    args.log.refuse_document_of_another(loaded.unit.as_str())?;
     let files = args.log.files(TEXT_BATCH, Some(&loaded.unit))?;
-    let id = args.log.units()?.pop_first().unwrap_or_else(|| loaded.unit.clone());
+    let id = loaded.unit.clone();
     let basis = Basis::Given { settings: args.settings()?, calibration: Some(loaded) };
     let plans = vec![UnitPlan { id, basis, compare: false }];
     make(args, &files, &mut args.log.part()?, plans, &[calibration])
@@ -100,6 +101,10 @@ fn make(
     });
     bar.iter().for_each(Bar::finish);
     let (units, log) = result?;
+    let is_empty = units.iter().all(|unit| unit.summary.ticks == 0 && !unit.lost_data());
+    if is_empty && matches!(files, LogFiles::Text { .. }) && !log.lost_data() {
+        return Err(Error::Nothing("corrected"));
+    }
     sink.finish(&args.log.log)?;
     let report = Report::new(&units, &log);
     report.warn();

@@ -55,6 +55,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         return super::recording::run_text(args, calibration);
     }
     let loaded = load_calibration(calibration)?;
+    args.log.refuse_document_of_another(loaded.unit.as_str())?;
     for warning in &loaded.warnings {
         show::warn(&warning.to_string());
     }
@@ -74,6 +75,9 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         bar.step_saying(|| Some(format!("{} ticks", sums.ticks())));
     }
     unit.finish();
+    if unit.unit().counters().gyro_ticks_in == 0 && !events.inner().report().lost_data() {
+        return Err(Error::Nothing("corrected"));
+    }
     sink.write(take(&mut unit, &mut sums, form))?;
     sink.finish(&inputs)?;
     bar.finish();

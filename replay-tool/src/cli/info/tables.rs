@@ -15,6 +15,8 @@ use crate::cli::show;
 
 /// Most swaps, commands, states or revisions that are listed; JSON has more.
 const LISTED: usize = 20;
+/// Intervals of a stream by which it may begin or end elsewhere than the gyros.
+const INTERVALS: u64 = 5;
 
 /// Everything.
 pub(in crate::cli) fn of(info: &LogInfo) -> String {
@@ -118,10 +120,28 @@ fn topics(topics: &[TopicInfo]) -> String {
         ]
     };
     let mut text = show::grid(HEAD, topics.iter().map(row), 1..);
+    let gyro = topics.iter().find(|topic| topic.key.ends_with("/raw/gyro"));
     for topic in topics {
         topic_details(&mut text, topic);
+        let beside = gyro.filter(|_| topic.key.contains("/raw/"));
+        beside.into_iter().for_each(|gyro| apart(&mut text, topic, gyro));
     }
     text
+}
+
+/// Where a raw stream begins or ends some of its intervals before or after the gyros: another clock, or another part of the time.
+fn apart(text: &mut String, topic: &TopicInfo, gyro: &TopicInfo) {
+    let Some(intervals) = topic.intervals else { return };
+    for (does, own, of_gyro) in
+        [("begins", topic.first_ns, gyro.first_ns), ("ends", topic.last_ns, gyro.last_ns)]
+    {
+        let (Some(own), Some(of_gyro)) = (own, of_gyro) else { continue };
+        let apart = own.abs_diff(of_gyro);
+        if apart > intervals.p50_ns.saturating_mul(INTERVALS) {
+            let side = if own < of_gyro { "before" } else { "after" };
+            let _ = writeln!(text, "{}: {does} {} {side} the gyros", topic.key, seconds(apart));
+        }
+    }
 }
 
 /// What of a topic is worth a sentence.
