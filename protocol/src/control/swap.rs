@@ -236,7 +236,7 @@ pub struct DocumentChange {
 /// One quantity of the correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionChange {
-    /// What it is, such as "gyro x bias" or "angular rate about z".
+    /// What it is, such as "gyro x bias" or "angular rate bias about z".
     pub quantity: String,
     /// Unit of measure.
     pub unit: String,

@@ -89,11 +89,11 @@ fn stated(document: &Document, steady: &Steady) -> Vec<Quantity> {
     let axes = || ["x", "y", "z"].into_iter();
     let rates = axes().zip(steady.gyro_rate_in_case);
     all.extend(
-        rates.map(|(axis, rate)| number(format!("angular rate about {axis}"), "°/h", deg_per_h(rate))),
+        rates.map(|(axis, rate)| number(format!("angular rate bias about {axis}"), "°/h", deg_per_h(rate))),
     );
     let forces = axes().zip(steady.accel_force_in_case);
     all.extend(
-        forces.map(|(axis, force)| number(format!("specific force along {axis}"), "mg", milli_g(force))),
+        forces.map(|(axis, force)| number(format!("specific force bias along {axis}"), "mg", milli_g(force))),
     );
     all
 }

@@ -209,9 +209,9 @@ fn a_change_of_the_correction_is_told_per_sensor_and_in_case_axes() {
     let scale = of("accelerometer z scale factor");
     assert!((scale.after - 1021.4).abs() < 1e-9 && scale.unit == "(counts/s)/(m/s²)", "{scale:?}");
     // Of 0.01 °/h along x, a redundant set of four takes most.
-    let rate = of("angular rate about x");
+    let rate = of("angular rate bias about x");
     assert!((0.007..0.0101).contains(&(rate.after - rate.before)), "{rate:?}");
-    assert!(found.iter().any(|change| change.quantity == "specific force along y"));
+    assert!(found.iter().any(|change| change.quantity == "specific force bias along y"));
     // What does not differ is not told.
     assert!(found.iter().all(|change| !change.quantity.starts_with("gyro s ")));
     // In the other mode the magnetic bias has the other sign.
