@@ -275,7 +275,7 @@ impl UnitActor {
             following.follower.instance().is_some_and(|followed| *followed == *instance)
         } else {
             let listens = now.saturating_duration_since(following.listens);
-            !standing.yields && listens >= LONELY && !following.kept.was_heard_since(now - LONELY)
+            !standing.yields && listens >= LONELY && !following.kept.was_heard_within(now, LONELY)
         };
         if nobody_speaks {
             tracing::warn!(unit = %self.stream.id(), "no instance publishes: this one does from now on");

@@ -157,9 +157,10 @@ impl Kept {
         })
     }
 
-    /// Whether the other instance was heard since a time.
-    pub(super) fn was_heard_since(&self, time: Instant) -> bool {
-        self.last_heard.is_some() && self.heard_at.is_some_and(|heard_at| heard_at >= time)
+    /// Whether the other instance was heard within a time.
+    pub(super) fn was_heard_within(&self, now: Instant, time: Duration) -> bool {
+        let heard_at = self.heard_at.filter(|_| self.last_heard.is_some());
+        heard_at.is_some_and(|heard_at| now.saturating_duration_since(heard_at) < time)
     }
 
     /// The oldest frame that waits to be heard.
