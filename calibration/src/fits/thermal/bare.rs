@@ -17,7 +17,7 @@ const FINEST_GRID: f64 = 3.0;
 /// Distances of readings over which a temperature must not become stale.
 const FRESH_READINGS: f64 = 2.0;
 /// Where the readings of a thermometer without a conversion must lie to be °C.
-const DEG_C: [f64; 2] = [-100.0, 200.0];
+pub const DEG_C: [f64; 2] = [-100.0, 200.0];
 
 /// The document without what the fit finds: static and thermal terms of the gyros, bias and lags of the accelerometers.
 /// Scale, axes, mode and magnetic terms stay.
