@@ -268,7 +268,7 @@ fn moving(series: &Series, deg_c: impl Fn(&str, f64) -> f64) -> Option<String> {
     let moving = series.temperatures.iter().filter_map(known);
     let (name, [low, high]) = moving.max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
     Some(format!(
-        "warning: temperature channel {name:?} moves from {low:.1} to {high:.1} °C: what follows it is in B, K, R, σ and trend. Log at one \
+        "warning: temperature channel {name:?} moves from {low:.1} to {high:.1} °C: what follows it and is not corrected is in B, K, R, σ and trend. Log at one \
          temperature (within {SMALLEST_RANGE_DEG_C} °C), or cut to a part at one with --start and --duration"
     ))
 }
