@@ -20,7 +20,7 @@ use isotherm_protocol::document::{AccelSensor, Document};
 pub use fitted::{About, Fitted};
 pub(crate) use fitted::{by_name, rows};
 pub use isotherm_document::tidy;
-pub(crate) use plain::{channels, faults, follows, plain};
+pub(crate) use plain::{ASSUMED_DEG_C, channels, faults, follows, plain, reads_deg_c};
 pub(crate) use provenance::{BASE, base_of, files_of};
 pub use provenance::{TOOL, command_line, origin, recordings_in};
 pub use written::{Written, name_of, write_file};

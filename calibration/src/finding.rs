@@ -273,7 +273,7 @@ fn not_level(at_beginning: bool, force: Option<[f64; 3]>, troubles: &[String]) -
     let all = ["", "", ", or leave --latitude out"];
     let [when, of, moment] = if at_beginning { beginning } else { all };
     let force = force.map_or_else(
-        || "the document (--calibration) or the log has no valid accelerometer readings".to_owned(),
+        || "there are no valid accelerometer readings in m/s² in the log, or no accelerometers in the document".to_owned(),
         |force| {
             let parts = force.map(|part| fixed(part, 3)).join(", ");
             format!("the mean force {of}is ({parts}) m/s²; it must be within 2 % of one g, x not vertical")

@@ -24,6 +24,7 @@ use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::GyroTick;
 use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_log::mapping::SensorUnit;
+use isotherm_log::mapping::TemperatureUnit;
 use isotherm_log::message::Topic;
 use isotherm_log::offline::Offline;
 use isotherm_log::part::{LogFiles, Part};
@@ -176,6 +177,14 @@ impl Run {
     pub fn accelerometer_unit(&self) -> Option<&'static str> {
         let Source::Files { files: LogFiles::Text { mapping, .. }, .. } = &self.source else { return None };
         mapping.files.iter().find_map(|file| Some(file.accel.as_ref()?.sensors.first()?.unit.sent()))
+    }
+
+    /// Whether the mapping of a text log says that all its thermometers read °C; recordings do not say.
+    pub fn thermometers_read_deg_c(&self) -> bool {
+        let Source::Files { files: LogFiles::Text { mapping, .. }, .. } = &self.source else { return false };
+        mapping.files.iter().flat_map(|file| &file.temperatures).all(|channel| {
+            matches!(channel.unit, TemperatureUnit::DegC | TemperatureUnit::DegF | TemperatureUnit::Kelvin)
+        })
     }
 
     /// The files and folders that it was given as, which documents name; its files where nothing else is known.

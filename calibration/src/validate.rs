@@ -12,15 +12,15 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::units::AngularRate;
 use isotherm_protocol::document::{Document, Sample};
 
-use crate::axes::AXES;
+use crate::axes::{AXES, output_name};
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::thermal::Stand;
-use crate::fits::thermal::checks::{far, frozen, judging};
-use crate::numbers::{Size, is_white, norm, real};
+use crate::fits::thermal::checks::{far, frozen, judging, quiet};
+use crate::numbers::{Size, dot, is_white, norm, real};
 use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short};
 use crate::runs::Watch;
-use crate::runs::swapped::{Shown, force_at_rest};
+use crate::runs::swapped::{Shown, by_curves, force_at_rest, moved};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
 use coverage::Coverage;
 pub use runs::JudgedLog;
@@ -44,6 +44,8 @@ const DEAD: f64 = 1e-3;
 const ALMOST_WHOLE: f64 = 0.99;
 /// Share of windows that should be whole.
 const WHOLE: f64 = 0.9;
+/// Least part of the Earth's rate that is told of what is left, and what else there may be beside it.
+const EARTH_LEFT: [f64; 2] = [0.5, 0.1];
 /// Largest range of a mean rate of a unit that counts as being at rest (°/h): 5 °/s.
 const REST_RATE_DEG_PER_H: f64 = 18_000.0;
 /// Largest angle between mean specific forces of a unit that counts as being at rest (sine).
@@ -108,6 +110,9 @@ pub fn validate(
         let sample = if log.known { Sample::In } else { Sample::Out };
         let curves = Curve::of_tables(&run.name, sample, [&nominal, &after], document, &rest);
         report.warnings.extend(doubts(&run.name, &curves, &after));
+        report.warnings.extend(quiet(&run.name, (0..3).map(|axis| nominal.rate(axis))));
+        report.warnings.extend(earth_left(&run.name, &curves, &rest));
+        report.warnings.extend(curves_swapped(&run.name, &curves));
         report.warnings.extend(looks_swapped(&run.name, &nominal, (&rest, wanted.place.as_ref())));
         report.residuals.extend(curves);
         report.warnings.extend(after.troubles.iter().map(|words| format!("{}: {words}", run.name)));
@@ -201,6 +206,43 @@ fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place
     words.into_iter().flatten().map(|words| format!("{name}: {words}")).collect()
 }
 
+/// The curves of the three axes of a kind.
+fn three(curves: &[Curve], gyro: bool) -> Option<[&Curve; 3]> {
+    let of = |axis: usize| curves.iter().find(|curve| curve.of == output_name(gyro, axis));
+    Some([of(0)?, of(1)?, of(2)?])
+}
+
+/// Columns that look swapped, by the curves over temperature that the document takes off.
+fn curves_swapped(name: &str, curves: &[Curve]) -> Vec<String> {
+    let words = |(gyro, kind): (bool, &str)| {
+        let own = three(curves, gyro)?;
+        let (order, [left, other]) = by_curves(own.map(|curve| [&*curve.before, &*curve.after]))?;
+        Some(format!(
+            "{name}: {kind} {} look swapped: with the document's curves over temperature they leave {} {} rms, with each other's {}; \
+             check the columns in the mapping",
+            moved(order),
+            short(left),
+            own[0].measure,
+            short(other)
+        ))
+    };
+    [(true, "gyros"), (false, "accelerometers")].into_iter().filter_map(words).collect()
+}
+
+/// That the Earth's rate is what is left of the gyros in a stated attitude, with how many times of it.
+fn earth_left(name: &str, curves: &[Curve], rest: &Rest) -> Option<String> {
+    let earth = rest.rate_deg_per_h?;
+    let left = three(curves, true)?.map(|curve| curve.sizes()[1].mean);
+    let times = dot(left, earth) / dot(earth, earth);
+    let beside = norm([0, 1, 2].map(|axis| left[axis] - times * earth[axis]));
+    (times.abs() > EARTH_LEFT[0] && beside < EARTH_LEFT[1] * norm(earth)).then(|| {
+        format!(
+            "{name}: what is left of the gyros is {times:.2} times the Earth's rate of the stated place (-1: the output lacks it, -2: it has \
+             the wrong sign): check weights and signs in document and mapping, and the attitude"
+        )
+    })
+}
+
 /// Why a run cannot judge in which the unit was moved: what is left would be its motion.
 fn at_rest(name: &str, means: &Table) -> Option<String> {
     let refuse = |what: String| {
@@ -292,4 +334,31 @@ fn notes(curves: &[Curve], logs: &[JudgedLog], (window_s, placed): (f64, bool)) 
             .to_owned()
     });
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_earths_rate_that_is_left_is_told_with_its_sign() {
+        let earth = [7.4, -6.2, -11.5];
+        let rest = Rest { rate_deg_per_h: Some(earth), ..Rest::default() };
+        let told = |times: f64, beside: f64| {
+            let curve = |axis: usize| Curve {
+                of: output_name(true, axis),
+                measure: "°/h".to_owned(),
+                run: "log.csv".to_owned(),
+                sample: Sample::Out,
+                window_s: 10.0,
+                time_s: [0.0].into(),
+                temperature_deg_c: Vec::new(),
+                before: vec![0.0],
+                after: vec![times * earth[axis] + if axis == 0 { beside } else { 0.0 }],
+            };
+            earth_left("log.csv", &[0, 1, 2].map(curve), &rest)
+        };
+        assert_eq!((told(-0.02, 0.0), told(-1.0, 9.0)), (None, None));
+        insta::assert_snapshot!([told(-1.0, 0.3), told(-2.0, 0.0)].map(Option::unwrap).join("\n"));
+    }
 }

@@ -124,7 +124,8 @@ impl Channel {
     }
 
     /// Raw reading → °C, in nested form.
-    fn convert(&self, raw: f64) -> f64 {
+    #[must_use]
+    pub fn convert(&self, raw: f64) -> f64 {
         self.0.conversion.iter().rev().fold(0.0, |sum, a| sum * raw + a)
     }
 }

@@ -144,7 +144,9 @@ impl Orientation {
             (first, condition_number(&orientation.rows_at(first))),
             (last, condition_number(&orientation.rows_at(last))),
         ];
-        for (temperature_deg_c, got) in stated {
+        // Without slopes all three are one.
+        let same = if parts.slopes_per_deg_c.is_empty() { stated.len() - 1 } else { 0 };
+        for (temperature_deg_c, got) in stated.into_iter().skip(same) {
             // NaN comes from slopes that overflow.
             if got.is_nan() || got > CONDITION_LIMIT {
                 let limit = CONDITION_LIMIT;

@@ -4,6 +4,8 @@ use core::fmt;
 
 use thiserror::Error;
 
+use crate::calibration::EVERYWHERE_DEG_C;
+
 /// A number in words to people: with an exponent where it would be a row of zeros. Read back, it is the same number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shown(pub f64);
@@ -13,6 +15,21 @@ impl fmt::Display for Shown {
         let Self(value) = self;
         let is_plain = *value == 0.0 || !value.is_finite() || (1e-4..1e16).contains(&value.abs());
         if is_plain { write!(f, "{value}") } else { write!(f, "{value:e}") }
+    }
+}
+
+/// Where over temperature something is, in words: at the ends of the range without limits it is so anywhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AtDegC(pub f64);
+
+impl fmt::Display for AtDegC {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(deg_c) = self;
+        if EVERYWHERE_DEG_C.contains(deg_c) {
+            f.write_str("at any temperature")
+        } else {
+            write!(f, "at {} °C", Shown(*deg_c))
+        }
     }
 }
 
@@ -50,7 +67,7 @@ pub(crate) fn outside<T: PartialOrd + Copy, const N: usize>(
 mod tests {
     use alloc::string::ToString;
 
-    use super::Shown;
+    use super::{AtDegC, Shown};
 
     #[test]
     fn a_number_is_shown_without_a_row_of_zeros_and_is_the_same_when_it_is_read() {
@@ -61,5 +78,7 @@ mod tests {
             assert_eq!(shown.parse(), Ok(value));
         }
         assert_eq!([0.0, f64::NAN].map(|value| Shown(value).to_string()), ["0", "NaN"]);
+        let places = [1e9, 47.5].map(|deg_c| AtDegC(deg_c).to_string());
+        assert_eq!(places, ["at any temperature", "at 47.5 °C"]);
     }
 }

@@ -4,21 +4,25 @@ use std::path::PathBuf;
 
 use clap::Args;
 use isotherm_cli::Bar;
-use isotherm_correction::sample::OutputKind;
-use isotherm_protocol::document::{Document, GyroOutput, Temperature};
+use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::driver::{Job, Task};
 use super::output::OutputArgs;
 use super::place::PlaceArgs;
 use super::runs::{BaseArgs, JudgeArgs, LogArgs};
 use super::units::Logs;
-use crate::document::{About, Fitted, plain};
+use crate::axes::AXES;
+use crate::document::{About, Fitted};
 use crate::error::Error;
 use crate::fits::rates::document::{details, sigmas};
 use crate::fits::rates::fit::{Wanted, make};
 use crate::fits::rates::steps::{Step, listed, read};
+use crate::fits::thermal::bare::nominal;
 use crate::limits::within;
+use crate::numbers::{median_if_any, norm};
 use crate::runs::Run;
+use crate::runs::series::Ticks;
+use crate::runs::table::is_one_g;
 
 /// Scale factor, asymmetry, linearity, input axes and bias of gyros from runs on a rate table
 #[derive(Debug, Args)]
@@ -125,24 +129,24 @@ impl RatesArgs {
     }
 }
 
-/// Temperature of a unit whose document names no channel (°C).
-const ASSUMED_DEG_C: f64 = 20.0;
-
 /// A nominal document for a log of three gyros.
 fn without_document(run: &Run, bar: Bar) -> Result<Document, Error> {
-    let mut output = None;
-    let mut gyros = 0;
-    run.gyro_ticks(bar, |kind, tick| {
-        output = Some(kind);
-        gyros = tick.readings.len();
-    })?;
-    if gyros != 3 {
+    let mut series = run.series(bar)?;
+    let gyros = series.gyros.readings.len();
+    if gyros != AXES.len() {
         return Err(Error::Usage(format!(
             "{} has {gyros} gyros: only three of them have nominal axes. Give --calibration",
             run.name
         )));
     }
-    let output = if output == Some(OutputKind::Counts) { GyroOutput::Counts } else { GyroOutput::Mean };
-    let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() };
-    Ok(plain(run.unit.as_str(), output, temperature, None))
+    // At one temperature nothing tells °C from volts, and a table does not turn so fast that its accelerometers feel much beside gravity.
+    if !run.thermometers_read_deg_c() {
+        series.temperatures.clear();
+    }
+    let force: Vec<f64> =
+        series.accels.readings.iter().filter_map(|readings| median_if_any(readings)).collect();
+    if !<[f64; 3]>::try_from(force).is_ok_and(|force| is_one_g(norm(force))) {
+        series.accels = Ticks::default();
+    }
+    Ok(nominal(&series))
 }

@@ -167,9 +167,9 @@ impl<'a> Logs<'a> {
         if let Some(document) = self.document.filter(|_| folder.is_none()) {
             let base = Written::read(document)?;
             let unit = base.loaded.unit.clone();
-            let (runs, others) = self.of_document(self.runs(Some(&unit))?, &unit)?;
+            let (runs, others) = Self::of_document(self.runs(Some(&unit))?, &unit)?;
             let judges = match self.judges(Some(&unit))? {
-                Some(judges) => self.of_document(judges, &unit)?.0,
+                Some(judges) => Self::of_document(judges, &unit)?.0,
                 None => Vec::new(),
             };
             let mut work = Work::new(Some(base), runs, judges);
@@ -232,17 +232,16 @@ impl<'a> Logs<'a> {
         given.map(|logs| self.judging.runs(logs, fallback)).transpose()
     }
 
-    /// The runs of the unit that a document is of, or that --unit names, and the other units that there are.
-    fn of_document(&self, mut runs: Runs, unit: &UnitId) -> Result<(Vec<Run>, Vec<String>), Error> {
-        let wanted = self.reading.serial()?.unwrap_or_else(|| unit.clone());
-        let own = runs.remove(&wanted);
+    /// The runs of the unit that a document is of, and the other units that there are.
+    fn of_document(mut runs: Runs, unit: &UnitId) -> Result<(Vec<Run>, Vec<String>), Error> {
+        let own = runs.remove(unit);
         let others: Vec<String> = runs.keys().map(ToString::to_string).collect();
         match own {
             Some(own) => Ok((own, others)),
             None if others.is_empty() => Err(Error::refused(NOTHING)),
             None => Err(Error::refused(format!(
-                "the logs are of unit {}, the document is of {unit}: give the document of that unit, or --unit if \
-                 the serial has changed",
+                "the logs are of unit {}, the document is of {unit}: give the document of that unit; if the serial has \
+                 changed, change unit in the document",
                 others.join(", ")
             ))),
         }

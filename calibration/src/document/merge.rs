@@ -14,11 +14,12 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{Document, Temperature};
 use serde_json::{Map, json};
 use toml::Value;
 
 use crate::document::Written;
+use crate::document::plain::{ASSUMED_DEG_C, plain};
 use crate::document::provenance::{BASE, digest_of};
 use crate::document::show::terms::tree;
 use crate::error::Error;
@@ -113,7 +114,9 @@ impl Picked {
         for (part, sections) in parts.iter().zip(new) {
             let mut after = mine(sections);
             let gone: Vec<String> = before.keys().filter(|key| !after.contains_key(*key)).cloned().collect();
-            after.retain(|key, value| before.get(key) != Some(value));
+            after.retain(|key, value| {
+                before.get(key) != Some(value) && has_made(part, sections, key, value, &before)
+            });
             let open = |key: &&String| !take.iter().any(|take| covers(&take.key, key));
             let never: Vec<&str> = gone.iter().filter(open).map(String::as_str).collect();
             if !after.is_empty() && !never.is_empty() && !is_of(part, base, parts) {
@@ -189,9 +192,7 @@ impl Picked {
         let find = |name: &str| parts.iter().chain([base]).find(|document| document.name == name);
         let filter = find(from).and_then(filter_of);
         for (key, source) in &self.from {
-            let dynamic = ["thermal_rate", "thermal_acceleration", "lag"];
-            let bound = dynamic.iter().any(|term| key.ends_with(&format!(".{term}")));
-            if bound && find(source).and_then(filter_of) != filter {
+            if is_dynamic(key) && find(source).and_then(filter_of) != filter {
                 conflicts.push(format!(
                     "temperature.filter is taken from {from}, but {key} of {source} was fitted with another filter \
                      and is wrong with this one: repeat one of the fits with the other's filter"
@@ -201,11 +202,34 @@ impl Picked {
     }
 }
 
+/// Whether a part has made what it states: one that was made from its log alone states the rest as every first document does, and
+/// thermometers and their filter by what its log happens to be, which no static term rests on.
+fn has_made(part: &Written, own: &Sections, key: &str, value: &Value, before: &Sections) -> bool {
+    if made_from(part) != Some("") {
+        return true;
+    }
+    if key.starts_with("temperature.") && before.contains_key(key) {
+        return own.keys().any(|key| is_dynamic(key)) && key != "temperature.assumed_deg_c";
+    }
+    let Document { unit, gyro, accel, .. } = &part.document;
+    let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() };
+    let first = plain(unit, gyro.output, temperature, accel.as_ref().map(|accel| accel.output));
+    tree(&first).is_ok_and(|first| sections(&first).get(key) != Some(value))
+}
+
+/// Whether a term holds with the temperature filter that it was fitted with only.
+fn is_dynamic(key: &str) -> bool {
+    ["thermal_rate", "thermal_acceleration", "lag"].iter().any(|term| key.ends_with(&format!(".{term}")))
+}
+
+/// The digest of the document that a part was made from, as far as it says.
+fn made_from(part: &Written) -> Option<&str> {
+    part.document.origin.as_ref()?.details.as_ref()?.get(BASE)?.as_str()
+}
+
 /// Whether a part was made from the base or from another part, as far as it says.
 fn is_of(part: &Written, base: &Written, parts: &[Written]) -> bool {
-    let details = part.document.origin.as_ref().and_then(|origin| origin.details.as_ref());
-    let made_from = details.and_then(|details| details.get(BASE)?.as_str());
-    made_from.is_none_or(|digest| parts.iter().chain([base]).any(|one| digest_of(one) == digest))
+    made_from(part).is_none_or(|digest| parts.iter().chain([base]).any(|one| digest_of(one) == digest))
 }
 
 /// Whether a choice is about a key.

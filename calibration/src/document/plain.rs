@@ -7,7 +7,10 @@ use isotherm_protocol::document::{
 };
 
 use crate::axes::AXES;
-use crate::runs::series::Series;
+use crate::runs::series::{Channel as Readings, Series};
+
+/// Temperature that a first document assumes where none is read (°C).
+pub(crate) const ASSUMED_DEG_C: f64 = 25.0;
 
 /// A document that passes on what a log has: weights and scale factors are one, and each sensor follows the channel of its name.
 pub(crate) fn plain(
@@ -84,8 +87,7 @@ pub(crate) fn faults(series: &Series, of_accelerometers: bool, [low, high]: [f64
         }
     }
     for (name, channel) in &series.temperatures {
-        let good = channel.raw.iter().filter(|raw| (low..=high).contains(*raw)).count();
-        if 2 * good < channel.raw.len() {
+        if !reads_deg_c(channel, [low, high]) {
             reasons.push(format!(
                 "temperature channel {name:?} has readings outside {low} to {high} °C: it is not a temperature in °C: name \
                  the right column in the mapping, or give a document with the channel's conversion (--calibration)"
@@ -95,13 +97,19 @@ pub(crate) fn faults(series: &Series, of_accelerometers: bool, [low, high]: [f64
     reasons
 }
 
+/// Whether a thermometer's readings may be °C: half of them are within a range.
+pub(crate) fn reads_deg_c(channel: &Readings, [low, high]: [f64; 2]) -> bool {
+    let good = channel.raw.iter().filter(|raw| (low..=high).contains(*raw)).count();
+    2 * good >= channel.raw.len()
+}
+
 /// The temperature channels of a log that read °C, each with its limits: range and spikes.
 pub(crate) fn channels(
     series: &Series,
     range: [f64; 2],
     spike_limit: impl Fn(&[f64]) -> f64,
 ) -> Vec<Channel> {
-    let channel = |(name, readings): (&String, &crate::runs::series::Channel)| Channel {
+    let channel = |(name, readings): (&String, &Readings)| Channel {
         name: name.clone(),
         conversion_deg_c: vec![0.0, 1.0],
         range_deg_c: range,

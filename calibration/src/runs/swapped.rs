@@ -118,6 +118,25 @@ impl Display for Looks {
     }
 }
 
+/// The order in which axes fit each other's curves far better than their own, and what both leave of those out of place (rms about the
+/// mean): by axis, what there is before and after a document took its curve off.
+pub fn by_curves(axes: [[&[f64]; 2]; 3]) -> Option<([usize; 3], [f64; 2])> {
+    let left = |column: usize, curve: usize| {
+        let [[column, _], [before, after]] = [axes[column], axes[curve]];
+        let taken_off = before.iter().zip(after).map(|(before, after)| before - after);
+        Size::of(&column.iter().zip(taken_off).map(|(value, off)| value - off).collect::<Vec<f64>>())
+            .deviation
+    };
+    let of = |order: [usize; 3]| {
+        let out_of_place = || (0..3).filter(move |axis| order[*axis] != *axis);
+        let all_fit = out_of_place().all(|axis| left(order[axis], axis) < LEFT * left(axis, axis));
+        let largest = |of: &dyn Fn(usize) -> f64| out_of_place().map(of).fold(0.0, f64::max);
+        all_fit
+            .then(|| (order, [largest(&|axis| left(axis, axis)), largest(&|axis| left(order[axis], axis))]))
+    };
+    ORDERS.into_iter().find_map(of)
+}
+
 /// The axes that are not in their places, in words.
 pub fn moved(order: [usize; 3]) -> String {
     let names = AXES.into_iter().zip(order).enumerate();
@@ -155,6 +174,29 @@ mod tests {
             words("gyros", [-4.0, 7.5, -12.0], earth, 0.3),
         ];
         insta::assert_snapshot!(told.join("\n"));
+    }
+
+    #[test]
+    fn curves_that_fit_each_others_axes_are_a_swap() {
+        let curve = |axis: u32| -> Vec<f64> {
+            (0..60).map(|k| libm::sin(f64::from(k * (axis + 1)) * 0.05)).collect()
+        };
+        let curves = [0, 1, 2].map(curve);
+        let noise = |k: u32| 0.05 * libm::sin(f64::from(k * k));
+        let found = |order: [usize; 3]| {
+            let before =
+                order.map(|of| (0..).zip(&curves[of]).map(|(k, x)| x + noise(k)).collect::<Vec<f64>>());
+            let after = [0, 1, 2].map(|axis: usize| {
+                before[axis]
+                    .iter()
+                    .zip(&curves[axis])
+                    .map(|(value, curve)| value - curve)
+                    .collect::<Vec<f64>>()
+            });
+            by_curves([0, 1, 2].map(|axis| [&*before[axis], &*after[axis]])).map(|(order, _)| order)
+        };
+        assert_eq!(found([0, 1, 2]), None);
+        assert_eq!((found([2, 1, 0]), found([1, 2, 0])), (Some([2, 1, 0]), Some([2, 0, 1])));
     }
 
     #[test]

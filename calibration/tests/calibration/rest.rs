@@ -5,8 +5,9 @@ use std::path::Path;
 use isotherm_calibration::fits::drift::columns::{Columns, Kind};
 use isotherm_calibration::fits::drift::pieces::Spacing;
 use isotherm_calibration::fits::drift::pieces::checks::{at_rest, frozen};
+use serde_json::Value;
 
-use crate::command::{fails, shipped, succeeds, told};
+use crate::command::{fails, json, shipped, succeeds, told};
 use crate::drift_generator::{Normal, recording};
 
 /// Two hours at 1 Hz of three gyros; `change` spoils the readings (°/h), `keep` says which ticks are there.
@@ -59,7 +60,7 @@ fn drift_states_nothing_beyond_what_a_document_allows() {
     let turned = log(folder.path(), |columns| columns[0][3000..3100].fill(1e11), |_| true);
     insta::assert_snapshot!(told(folder.path(), &["drift", &turned]));
     let (_, json, _) = crate::command::words(&crate::command::calibrate(&["drift", &turned, "--json"]));
-    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let report: Value = serde_json::from_str(&json).unwrap();
     let noted = [0, 1].map(|gyro| report["sensors"][gyro]["drift_notes"].is_array());
     assert_eq!(noted, [false, true], "{report}");
 }
@@ -71,7 +72,7 @@ fn drift_states_no_ramp_of_a_log_with_gaps() {
         columns[0].iter_mut().enumerate().for_each(|(tick, rate)| *rate += 0.01 * tick as f64);
     };
     let states = |kept: fn(usize) -> bool| {
-        let report = crate::command::json(&["drift", &log(folder.path(), rising, kept), "--json"]);
+        let report = json(&["drift", &log(folder.path(), rising, kept), "--json"]);
         report["sensors"][0]["noise"]["R"]["value"].is_number()
     };
     assert_eq!([states(|_| true), states(|tick| !(4000..4300).contains(&tick))], [true, false]);
@@ -257,4 +258,24 @@ fn noise_of_two_measures_and_far_readings_are_told() {
     columns.duration_s = vec![2e-5; 8000];
     words.push(told(&columns).unwrap_err().to_string());
     insta::assert_snapshot!(words.join("\n"));
+}
+
+#[test]
+fn a_drift_slower_than_its_log_is_called_so_wherever_it_is_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("walk.mcap");
+    let columns = [1, 2, 3].map(|seed| {
+        let mut normal = Normal::new(seed);
+        let white = normal.white(28_800, 3.0);
+        let walk = normal.random_walk(28_800, 2.0 / 60.0);
+        white.iter().zip(walk).map(|(white, walk)| white + walk).collect::<Vec<f64>>()
+    });
+    recording(&log, "FOG-0001", &columns, 1_000_000_000, |_| true);
+    let log = log.display().to_string();
+    let (said, report) = (succeeds(&["drift", &log]), json(&["drift", &log, "--json"]));
+    let rows = report["tables"]["Drift"]["rows"].as_array().unwrap().iter();
+    let markov =
+        rows.filter(|row| row[0].as_str().unwrap().contains("Markov") || row[0] == "its correlation time, h");
+    let told = said.lines().take(7).map(str::to_owned).chain(markov.map(Value::to_string));
+    insta::assert_snapshot!(told.collect::<Vec<_>>().join("\n"));
 }

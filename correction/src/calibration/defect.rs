@@ -9,7 +9,7 @@ use crate::curve::CurveError;
 use crate::orientation::OrientationError;
 use crate::reversal::ReversalError;
 use crate::servo::ServoError;
-use crate::stated::{self, Shown};
+use crate::stated::{self, AtDegC, Shown};
 
 /// Part of the calibration in which a defect lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -144,7 +144,7 @@ pub enum DefectKind {
     #[error("is empty, must be a name")]
     NoName,
     /// Zero where a divisor or a weight is needed.
-    #[error("is zero at {at} °C, must not be zero anywhere in its range")]
+    #[error("is zero {}, must not be zero anywhere in its range", AtDegC(*.at))]
     Zero {
         /// Argument at which it is zero.
         at: f64,

@@ -6,6 +6,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::sample::{MAX_SENSORS, MIN_SENSORS};
+use crate::stated::AtDegC;
 use crate::thermal::PLAY_WIDTHS_DEG_C;
 
 /// Largest deviation of a row's norm from one that is taken for rounding in the document.
@@ -91,7 +92,7 @@ pub enum OrientationError {
         tolerance: f64,
     },
     /// The axes are too close to one plane.
-    #[error("condition number {got:.1} at {temperature_deg_c:.1} °C; at most {limit} is allowed")]
+    #[error("condition number {got:.1} {}; at most {limit} is allowed", AtDegC(*.temperature_deg_c))]
     Condition {
         /// Temperature of the offending matrix (°C): the reference or an end of the range.
         temperature_deg_c: f64,

@@ -158,8 +158,8 @@ fn axes_that_come_too_close_to_a_plane_are_refused() {
     let flat = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [libm::cos(tilt), 0.0, libm::sin(tilt)]];
     let errors = Orientation::new(&parts(flat)).unwrap_err();
     assert!(matches!(
-        errors[0],
-        OrientationError::Condition { got, .. } if (got - 2.0 / tilt).abs() < 2.0
+        errors[..],
+        [OrientationError::Condition { got, .. }] if (got - 2.0 / tilt).abs() < 2.0
     ));
 
     let mut stated = parts(identity());

@@ -154,6 +154,29 @@ fn what_does_not_go_together_is_refused_by_key() {
 }
 
 #[test]
+fn a_part_made_from_its_log_alone_gives_what_it_found_and_nothing_else() {
+    let base = named("base.toml", |document| {
+        document.temperature.assumed_deg_c = 21.0;
+        document.gyro.orientation.thermal = None;
+        document.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));
+    });
+    let part = named("part.toml", |document| {
+        let Document { unit, gyro, accel, temperature, .. } = &document;
+        let mut filter = temperature.filter.clone();
+        filter.as_mut().unwrap().smoothing_s += 1.0;
+        let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter, ..temperature.clone() };
+        let output = accel.as_ref().map(|accel| accel.output);
+        *document = plain(unit, gyro.output, temperature, output);
+        document.gyro.orientation.rows[0] = [1.0, 1e-5, 0.0];
+        let details = toml::Table::from_iter([(BASE.to_owned(), "".into())]);
+        document.origin.get_or_insert_default().details = Some(details);
+    });
+    let merged = merge(&base, &[part], &[]).unwrap();
+    let taken = merged.taken.iter().filter(|(_, from)| from == "part.toml").map(|(key, _)| key.as_str());
+    assert_eq!(taken.collect::<Vec<_>>(), ["gyro.orientation.rows"]);
+}
+
+#[test]
 fn what_a_parts_own_base_never_had_is_a_conflict() {
     let base = named("base.toml", |document| {
         document.gyro.sensor[0].put(StatedTerm::with_parameter(Feature::Lag, 300.0, constant(5.0)));

@@ -12,9 +12,11 @@ use super::allan::Term;
 use super::pieces::checks;
 use crate::axes::{AXES, sensor_name};
 use crate::error::Error;
-use crate::numbers::seconds;
+use crate::fits::thermal::bare::DEG_C;
+use crate::fits::thermal::checks::SMALLEST_RANGE_DEG_C;
+use crate::numbers::{percentile, seconds};
 use crate::runs::cut::Cut;
-use crate::runs::series::{Series, Ticks};
+use crate::runs::series::{Channel, Series, Ticks};
 use crate::runs::{Run, Watch};
 
 /// What a column measures.
@@ -79,6 +81,7 @@ impl Columns {
     /// # Errors
     /// [`Error::Refused`] where there are none, or counts without a weight.
     pub fn raw(series: Series, kind: Kind, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
+        let moving = moving(&series, |_, raw| raw);
         let Series { unit, gyros, accels, .. } = series;
         let (ticks, instead, scale, weight) = match kind {
             Kind::Rate => (
@@ -114,7 +117,8 @@ impl Columns {
         }
         let mean_outputs = "The readings are the accelerometers' mean outputs in the log. If they are volts, read V \
                             for m/s²; --calibration converts them to specific force.";
-        let notes = if kind == Kind::Force { vec![mean_outputs.to_owned()] } else { Vec::new() };
+        let notes =
+            (kind == Kind::Force).then(|| mean_outputs.to_owned()).into_iter().chain(moving).collect();
         Ok(Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes })
     }
 
@@ -128,10 +132,13 @@ impl Columns {
         let mut columns = Self::empty(loaded.unit.clone(), kind);
         let (series, troubles) = run.correct_with_series(loaded, watch, |tick| columns.push(tick));
         columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
+        let converted = |name: &str, raw: f64| {
+            let channel =
+                loaded.calibration.channels().iter().find(|channel| channel.name().as_str() == name);
+            channel.map_or(f64::NAN, |channel| channel.convert(raw))
+        };
         columns.notes = troubles?;
-        if run.unit != loaded.unit {
-            columns.notes.push(format!("The log is of unit {}, the document for {}.", run.unit, loaded.unit));
-        }
+        columns.notes.extend(moving(&series, converted));
         columns.finish()
     }
 
@@ -247,6 +254,23 @@ impl Kind {
             Self::Force => "accelerometer",
         }
     }
+}
+
+/// That the temperature of a log does not stay; readings that cannot be °C tell nothing.
+fn moving(series: &Series, deg_c: impl Fn(&str, f64) -> f64) -> Option<String> {
+    let known = |(name, channel): (&String, &Channel)| {
+        let values = channel.raw.iter().map(|raw| deg_c(name, *raw));
+        let values: Vec<f64> = values.filter(|value| (DEG_C[0]..=DEG_C[1]).contains(value)).collect();
+        let [low, high] = [1, 99].map(|share| percentile(values.iter().copied(), share));
+        (2 * values.len() > channel.raw.len() && high - low > SMALLEST_RANGE_DEG_C)
+            .then_some((name.clone(), [low, high]))
+    };
+    let moving = series.temperatures.iter().filter_map(known);
+    let (name, [low, high]) = moving.max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
+    Some(format!(
+        "warning: temperature channel {name:?} moves from {low:.1} to {high:.1} °C: what follows it and is not corrected is in B, K, R, σ and trend. Log at one \
+         temperature (within {SMALLEST_RANGE_DEG_C} °C), or cut to a part at one with --start and --duration"
+    ))
 }
 
 fn nothing(what: &str, advice: &str) -> Error {

@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 use super::columns::{Kind, stated_in};
 use super::document::{Parameters, Trend, trend};
 use super::fit::{Analysis, Deviation, Deviations};
+use super::markov::Estimate;
 use super::page;
 use super::pieces::Grid;
 use crate::fits::drift::allan::{Coefficient, Term};
@@ -114,6 +115,17 @@ impl Found {
         }
     }
 
+    /// σ and correlation time (h) of the Markov part in words; of what is slower than the log, that it is.
+    fn markov(&self, sensor: &Analysis, number: impl Fn(&Estimate) -> String) -> [String; 2] {
+        match sensor.slow_drift() {
+            Some((_, time)) if time.value > self.length_h => {
+                ["slower than the log".to_owned(), format!("> {}", short(self.length_h))]
+            }
+            Some((sigma, time)) => [number(&sigma), number(&time)],
+            None => ["none seen", "none seen"].map(str::to_owned),
+        }
+    }
+
     /// A row for each sensor.
     fn summary(&self) -> Table {
         let stated = Term::ALL.map(|term| format!("{}, {}", term.symbol(), stated_in(term, self.kind).1));
@@ -128,16 +140,14 @@ impl Found {
                 }
                 _ => "–".to_owned(),
             });
-            let part = sensor.slow_drift().filter(|(_, time)| time.value <= self.length_h);
             let slope = match trend(sensor) {
                 Trend::Seen { slope, .. } => Some(slope),
                 Trend::NotSeen { .. } => None,
             };
             let or_none = |value: Option<f64>| value.map_or_else(|| "none seen".to_owned(), short);
-            let slow =
-                [part.map(|(sigma, _)| sigma.value), part.map(|(_, time)| time.value), slope].map(or_none);
+            let slow = self.markov(sensor, |estimate| short(estimate.value));
             let of = format!("{} {}", self.kind.sensor(), sensor.name);
-            [of].into_iter().chain(noise).chain(slow).collect()
+            [of].into_iter().chain(noise).chain(slow).chain([or_none(slope)]).collect()
         };
         Table::of(head, self.sensors.iter().map(row))
     }
@@ -211,10 +221,13 @@ impl Found {
         row(format!("mean, {measure}"), &|a| short(a.mean));
         row(format!("standard deviation, {measure}"), &|a| short(a.deviation));
         row(format!("of the slow part, {measure}"), &|a| short(a.slow_deviation));
-        row(format!("σ of the Markov part, {measure}"), &|a| {
-            a.slow_drift().map_or_else(|| "none seen".to_owned(), |(s, _)| s.words())
-        });
-        row("its correlation time, h".to_owned(), &|a| or_dash(a.slow_drift().map(|(_, t)| t.words())));
+        for (place, name) in
+            [format!("σ of the Markov part, {measure}"), "its correlation time, h".to_owned()]
+                .into_iter()
+                .enumerate()
+        {
+            row(name, &|a| self.markov(a, Estimate::words)[place].clone());
+        }
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
             or_dash(a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map(short))
         });

@@ -4,7 +4,7 @@ use isotherm_protocol::document::{AccelOutput, Document, Filter, GyroOutput, Tem
 
 use isotherm_correction::sample::OutputKind;
 
-use crate::document::{channels, faults, plain};
+use crate::document::{ASSUMED_DEG_C, channels, faults, plain};
 use crate::error::Error;
 use crate::runs::series::Series;
 use crate::runs::{Run, Watch};
@@ -31,7 +31,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
         branch_dead_band_deg_c2_per_s3: None,
     };
     let filter = (!channels.is_empty()).then_some(filter);
-    let temperature = Temperature { assumed_deg_c: 25.0, filter, channel: channels };
+    let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter, channel: channels };
     Ok(plain(series.unit.as_str(), GyroOutput::Mean, temperature, Some(accel_output)))
 }
 

@@ -241,6 +241,14 @@ impl Made {
             self.write(wanted, axes_deg_c, watch)?;
             self.verdicts = beside(&self.verdicts, verdicts(&self.steps, &self.judged));
         }
+        for (axis, verdict) in self.verdicts.iter_mut().enumerate().filter(|(_, verdict)| verdict.accepted) {
+            let mut own = main_axes.iter().zip(&self.gyros).filter(|(main, _)| **main == axis).peekable();
+            if own.peek().is_some()
+                && own.all(|(_, gyro)| matches!(gyro, Err(Kind::NothingTurns | Kind::Across)))
+            {
+                *verdict = Verdict::said(&verdict.of, "not turned about, left as it was");
+            }
+        }
         for (sensor, what) in doubted {
             if let Some(verdict) = main_axes.get(*sensor).and_then(|axis| self.verdicts.get_mut(*axis)) {
                 *verdict = verdict.clone().refused(what.to_string());

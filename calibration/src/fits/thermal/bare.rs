@@ -1,11 +1,12 @@
 //! A unit without the terms that a thermal fit gives it, and a nominal document for a log that comes without one.
 
+use isotherm_correction::sample::OutputKind;
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{AccelOutput, Document, Filter, GyroOutput, Orientation, Temperature};
 
 use super::checks::median_step_s;
 use crate::axes::AXES;
-use crate::document::{channels, faults, follows, plain};
+use crate::document::{ASSUMED_DEG_C, channels, faults, follows, plain, reads_deg_c};
 use crate::error::Error;
 use crate::numbers::percentile;
 use crate::runs::{self, series::Series};
@@ -17,7 +18,7 @@ const FINEST_GRID: f64 = 3.0;
 /// Distances of readings over which a temperature must not become stale.
 const FRESH_READINGS: f64 = 2.0;
 /// Where the readings of a thermometer without a conversion must lie to be °C.
-const DEG_C: [f64; 2] = [-100.0, 200.0];
+pub const DEG_C: [f64; 2] = [-100.0, 200.0];
 
 /// The document without what the fit finds: static and thermal terms of the gyros, bias and lags of the accelerometers.
 /// Scale, axes, mode and magnetic terms stay.
@@ -55,7 +56,7 @@ pub fn along_axes(document: &Document, pattern: usize) -> Document {
     document
 }
 
-/// The document of a unit of which nothing is known but its log: scale one, orthogonal axes.
+/// The document of a unit of which nothing is known but its log, for a fit over temperature.
 ///
 /// # Errors
 /// [`Error::Refused`] where the log does not allow it: counts, other than three sensors, thermometers that are not in °C or whose
@@ -65,30 +66,38 @@ pub fn nominal_of(series: &Series) -> Result<Document, Error> {
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
     }
+    let nominal = nominal(series);
+    if nominal.gyro.sensor.iter().all(|gyro| gyro.channel.is_some()) {
+        return Ok(nominal);
+    }
+    let list = series.temperatures.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+    Err(Error::refused(if list.is_empty() {
+        "the log has no temperature: a thermal fit needs at least one channel; name it in the mapping"
+            .to_owned()
+    } else {
+        format!(
+            "the names of the temperature channels ({list}) do not tell which gyro follows which: name them \
+             gyro0, gyro1, gyro2 (and accel0 …) in the mapping, or give a document (--calibration)"
+        )
+    }))
+}
+
+/// The document of a unit of three gyros of which nothing is known but its log: weights and scale factors of one, orthogonal axes;
+/// the accelerometers where they are three and no counts, the thermometers where they read °C.
+pub fn nominal(series: &Series) -> Document {
     let mut channels = channels(series, DEG_C, spike_limit);
-    let of = |kind: &str| -> Option<Vec<String>> {
-        (0..AXES.len()).map(|index| follows(&channels, kind, index)).collect()
-    };
-    let Some(gyros) = of("gyro") else {
-        let list = series.temperatures.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-        return Err(Error::refused(if list.is_empty() {
-            "the log has no temperature: a thermal fit needs at least one channel; name it in the mapping"
-                .to_owned()
-        } else {
-            format!(
-                "the names of the temperature channels ({list}) do not tell which gyro follows which: name them \
-                 gyro0, gyro1, gyro2 (and accel0 …) in the mapping, or give a document (--calibration)"
-            )
-        }));
-    };
-    let accels = of("accel").filter(|_| !series.accels.is_empty());
-    let accel = accels.is_some().then_some(AccelOutput::MetresPerSecondSquared);
-    let used: Vec<String> = gyros.into_iter().chain(accels.into_iter().flatten()).collect();
-    channels.retain(|channel| used.contains(&channel.name));
+    channels.retain(|channel| reads_deg_c(&series.temperatures[&channel.name], DEG_C));
+    let of = |kind| (0..AXES.len()).filter_map(|index| follows(&channels, kind, index)).collect::<Vec<_>>();
+    let followed = [of("gyro"), of("accel")].concat();
+    channels.retain(|channel| followed.contains(&channel.name));
     let step =
         series.temperatures.values().map(|channel| median_step_s(&channel.time_ns)).fold(0.0, f64::max);
-    let temperature = Temperature { assumed_deg_c: 25.0, filter: Some(filter(step)), channel: channels };
-    Ok(plain(series.unit.as_str(), GyroOutput::Mean, temperature, accel))
+    let filter = (!channels.is_empty()).then(|| filter(step));
+    let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter, channel: channels };
+    let counts = series.gyros.output == Some(OutputKind::Counts);
+    let output = if counts { GyroOutput::Counts } else { GyroOutput::Mean };
+    let ours = series.accels.readings.len() == AXES.len() && series.accels.output == Some(OutputKind::Mean);
+    plain(series.unit.as_str(), output, temperature, ours.then_some(AccelOutput::MetresPerSecondSquared))
 }
 
 /// A filter for readings that come every so many seconds.

@@ -159,25 +159,30 @@ fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     }
 }
 
-/// Gyros with a rate output must be near rest, and feel the Earth.
+/// Gyros with a rate output must be near rest.
 fn rates(found: &mut Findings, name: &str, ticks: &Ticks) {
-    let mut largest = 0.0_f64;
     for (index, readings) in ticks.readings.iter().enumerate() {
         let sizes: Vec<f64> =
             readings.iter().filter(|r| r.is_finite()).map(|r| r.abs().to_degrees()).collect();
         let Some(usual) = median_if_any(&sizes) else { continue };
         let called = format!("{name}: gyro {}", sensor_name(index, ticks.readings.len()));
         found.refusals.extend(moves(&called, usual));
-        largest = largest.max(usual * 3600.0);
     }
-    if ticks.readings.len() >= 3 && largest > 0.0 && largest < QUIETEST_DEG_PER_H {
-        found.warnings.push(format!(
-            "{name}: no gyro reads more than {} °/h in the median, and the Earth turns by 15 °/h: is the unit of measure in the mapping \
-             right ({} where °/s are taken as °/h)?",
+}
+
+/// That gyros at rest do not feel the Earth, by what a document makes of them before any bias is taken off (°/h, by sensor and window).
+pub fn quiet<'a>(name: &str, rates: impl Iterator<Item = &'a [f64]>) -> Option<String> {
+    let sizes = |column: &[f64]| column.iter().map(|rate| rate.abs()).collect::<Vec<f64>>();
+    let usual: Vec<f64> = rates.filter_map(|column| median_if_any(&sizes(column))).collect();
+    let largest = usual.iter().copied().fold(0.0, f64::max);
+    (usual.len() >= 3 && largest > 0.0 && largest < QUIETEST_DEG_PER_H).then(|| {
+        format!(
+            "{name}: no gyro reads more than {} °/h in the median, and the Earth turns by 15 °/h: are the unit of measure in the mapping \
+             ({} where °/s are taken as °/h) and the weights in the document right?",
             short(largest),
             short(largest * 3600.0)
-        ));
-    }
+        )
+    })
 }
 
 fn thermometer(found: &mut Findings, name: &str, channel: &str, readings: &crate::runs::series::Channel) {
@@ -362,10 +367,12 @@ fn turned(samples: &Samples) -> Option<String> {
     ))
 }
 
-/// Looks at a run that went through the corrector: the accelerometers must feel about one g.
+/// Looks at a run that went through the corrector: the gyros must feel the Earth, the accelerometers about one g.
 pub fn corrected(samples: &Samples, stand: &Stand, dead: &[(bool, usize, String)]) -> Findings {
     let warnings = samples.troubles.iter().map(|words| format!("{}: {words}", samples.name)).collect();
     let mut found = Findings { warnings, ..Findings::default() };
+    let at_rest = samples.gyros.iter().map(Vec::as_slice).filter(|_| stand.turning.is_none());
+    found.warnings.extend(quiet(&samples.name, at_rest));
     // A dead accelerometer is refused for itself.
     let alive = dead.iter().all(|(gyro, ..)| *gyro);
     if samples.forces.len() == 3 && alive && stand.turning.is_none() {

@@ -78,6 +78,12 @@ pub fn fit(
         Some(base) => base.clone(),
         None => nominal_of(first)?,
     };
+    if base.accel.is_none() && !first.accels.is_empty() {
+        warnings.push(
+            "the log's accelerometers are left out: the document has none; add [accel] to fit them"
+                .to_owned(),
+        );
+    }
     let mut plain = bare(&base);
     if plain.temperature.channel.is_empty() {
         return Err(Error::refused(

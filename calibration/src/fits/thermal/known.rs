@@ -83,7 +83,12 @@ pub(super) fn histories(
         }
         let history = History::of(&parts);
         let [low, high] = history.range_deg_c;
-        if high.is_nan() || high - low < SMALLEST_RANGE_DEG_C {
+        if !temperature.iter().any(|deg_c| deg_c.is_finite()) {
+            refusals.push(format!(
+                "temperature channel {name:?} has no valid reading at the time of any window of the gyros: do its times fit theirs, do \
+                 both files belong together?"
+            ));
+        } else if high - low < SMALLEST_RANGE_DEG_C {
             refusals.push(stays(name, [low, high], plain));
         }
         if high > HOTTEST_DEG_C || low < COLDEST_DEG_C {

@@ -12,6 +12,7 @@ use super::joint::Found;
 use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
+use super::told::wider;
 use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
@@ -137,7 +138,7 @@ impl Outcome {
             }
         };
         let table = compared.table(&self, &curves);
-        self.say(&mut verdicts, !judges.is_empty());
+        self.say(&mut verdicts);
         for (sensor, _, found) in self.found.iter().filter(|(_, _, found)| found.refused.is_none()) {
             self.warnings.extend(found.remarks.iter().map(|words| format!("{}: {words}", sensor.name)));
         }
@@ -147,6 +148,8 @@ impl Outcome {
                 self.warnings.push(words);
             }
         }
+        self.warnings.extend(judges.is_empty().then(|| self.not_judged()).flatten());
+        self.warnings.extend(wider(&curves, &verdicts));
         let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
         self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
         let about = self.about();
@@ -256,10 +259,15 @@ impl Outcome {
     }
 
     /// Gives the verdicts their reasons.
-    fn say(&self, verdicts: &mut [Verdict], judged: bool) {
+    fn say(&self, verdicts: &mut [Verdict]) {
         for verdict in verdicts {
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
-            let Some((sensor, _, found)) = mine else { continue };
+            let Some((sensor, _, found)) = mine else {
+                if verdict.accepted {
+                    *verdict = verdict.clone().remark("it follows no temperature channel; left unchanged");
+                }
+                continue;
+            };
             if let Some(why) = &found.refused {
                 *verdict = verdict.clone().refused(why.clone());
                 if found.dead {
@@ -274,8 +282,8 @@ impl Outcome {
                     (true, false) => format!("{FLAT}; constant bias"),
                     (false, _) => found.words.clone(),
                 };
-                let unjudged = if judged && verdict.out_of_sample.is_none() { "; not judged" } else { "" };
-                *verdict = verdict.clone().remark(words + unjudged);
+                let unjudged = !found.terms.is_empty() && verdict.out_of_sample.is_none();
+                *verdict = verdict.clone().remark(words + if unjudged { "; not judged" } else { "" });
             }
         }
     }

@@ -1,7 +1,7 @@
 //! What is said of a thermal fit: the origin in the document, and the report.
 
 use isotherm_pages::Table;
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{Document, Sample};
 use serde_json::json;
 
 use super::columns::Basis;
@@ -12,7 +12,11 @@ use super::outcome::Outcome;
 use super::scale::Kept;
 use super::select::{Target, Tried};
 use crate::document::{About, by_name};
-use crate::report::{Curve, Report, Sigmas, Verdict, output_unit, short};
+use crate::numbers::Size;
+use crate::report::{Curve, Report, Sigmas, Verdict, is_worse, output_unit, short};
+
+/// What a fit may leave on parts that it did not see, as a share of what the mean leaves.
+const MUCH: f64 = 0.5;
 
 impl Outcome {
     /// Says which sensors keep their scale factors, and why.
@@ -39,6 +43,31 @@ impl Outcome {
                 kinds.join(" and of ")
             ));
         }
+    }
+
+    /// That only the fitted runs have judged, and of which sensors parts of them that the fit did not see say little good.
+    pub(super) fn not_judged(&self) -> Option<String> {
+        let fitted =
+            || self.found.iter().filter(|(.., found)| found.refused.is_none() && !found.terms.is_empty());
+        fitted().next()?;
+        let much = fitted().filter_map(|(sensor, _, found)| {
+            let choice = found.choice.as_ref()?;
+            let share = choice.best()?.score / choice.mean;
+            (share > MUCH).then(|| format!("{} {:.0} %", sensor.name, 100.0 * share))
+        });
+        let much = much.collect::<Vec<_>>().join(", ");
+        let doubt = if much.is_empty() {
+            String::new()
+        } else {
+            format!(
+                ". On parts of the log that it did not see the fit leaves much of what the mean leaves ({much}): do these \
+                 sensors follow temperature?"
+            )
+        };
+        Some(format!(
+            "not judged on another run: give --judge LOG, or with --judge-start a part of this one that --duration leaves \
+             out{doubt}"
+        ))
     }
 
     /// What the document says of the fit beside its coefficients.
@@ -113,6 +142,31 @@ impl Outcome {
     }
 }
 
+/// Axes of which the fit makes the level better and the spread about it worse, as `validate` finds without a place.
+pub(super) fn wider(curves: &[Curve], verdicts: &[Verdict]) -> Vec<String> {
+    let words = |verdict: &Verdict| {
+        let mine = |curve: &&Curve| curve.of == verdict.of && curve.sample == Sample::Out;
+        let about_mean = |values: fn(&Curve) -> &[f64]| -> Vec<f64> {
+            let runs = curves.iter().filter(mine).map(values);
+            runs.flat_map(|run| {
+                let mean = Size::of(run).mean;
+                run.iter().map(move |value| value - mean)
+            })
+            .collect()
+        };
+        let spread = [about_mean(|curve| &curve.before), about_mean(|curve| &curve.after)];
+        let [before, after] = spread.each_ref().map(|values| short(Size::of(values).rms));
+        is_worse(&spread[0], &spread[1]).then(|| {
+            format!(
+                "{}: on the judging run only its level gets better: about its mean it spreads by {after} {} rms, without the \
+                 terms by {before}, which validate refuses where no place is stated; add a run to the fit",
+                verdict.of, verdict.measure
+            )
+        })
+    };
+    verdicts.iter().filter(|verdict| verdict.accepted).filter_map(words).collect()
+}
+
 /// Unit of a sensor's bias.
 fn output(document: &Document, sensor: &Sensor) -> &'static str {
     if sensor.gyro { "°/h" } else { output_unit(document) }
@@ -160,4 +214,31 @@ fn validation(found: &[(Sensor, Basis, Found)]) -> Option<Table> {
         }
     }
     (!rows.is_empty()).then(|| Table::of(head, rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_that_grows_beside_a_level_that_falls_is_told() {
+        let wave = |k: u32| libm::sin(f64::from(k) * 0.3);
+        let curve = |spread: f64, level: f64| Curve {
+            of: "gyro x".to_owned(),
+            measure: "°/h".to_owned(),
+            run: "judge.csv".to_owned(),
+            sample: Sample::Out,
+            window_s: 10.0,
+            time_s: (0..100).map(f64::from).collect(),
+            temperature_deg_c: Vec::new(),
+            before: (0..100).map(|k| 38.0 + 5.0 * wave(k)).collect(),
+            after: (0..100).map(|k| level + spread * wave(k)).collect(),
+        };
+        let told = |spread: f64| {
+            let curves = [curve(spread, 10.0)];
+            wider(&curves, &Curve::verdicts(&curves))
+        };
+        assert!(told(5.0).is_empty());
+        insta::assert_snapshot!(told(12.0).join("\n"));
+    }
 }

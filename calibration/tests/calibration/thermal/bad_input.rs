@@ -108,7 +108,44 @@ fn a_sound_log_is_fitted() {
         "{}",
         made.report.to_text()
     );
-    assert!(made.report.warnings.is_empty(), "{:?}", made.report.warnings);
+    // Nothing but the fitted log has judged.
+    let [told] = made.report.warnings.as_slice() else { panic!("{:?}", made.report.warnings) };
+    insta::assert_snapshot!(format!("{told}\n{}", made.report.verdicts[0].reason));
+}
+
+#[test]
+fn a_gyro_that_follows_little_of_temperature_is_told_where_nothing_else_judges() {
+    let wandering = run(0..5400, |s| {
+        let mut second = usual(s);
+        second.rates[1] = 1e-5 * second.deg_c + 2.1e-4 * (f64::from(s) * 0.01).sin();
+        second
+    });
+    let made = tried(wandering, Method::Joint).unwrap();
+    assert!(made.report.accepted(), "{}", made.report.to_text());
+    let told = made.report.warnings.iter().filter(|words| words.starts_with("not judged"));
+    insta::assert_snapshot!(told.cloned().collect::<String>());
+}
+
+#[test]
+fn what_a_base_document_hides_is_told() {
+    let mut base = tried(run(0..5400, usual), Method::Joint).unwrap().written.document;
+    for gyro in &mut base.gyro.sensor {
+        gyro.increment_weight_rad_per_rad = Some(4.848e-6);
+    }
+    base.accel = None;
+    let made = fit(Some(&base), (&[run(0..5400, usual)], &[]), &Settings::default(), ()).unwrap();
+    insta::assert_snapshot!(made.report.warnings.join("\n"));
+}
+
+#[test]
+fn a_thermometer_of_another_time_is_refused() {
+    let mut events = events(0..5400, usual);
+    for event in &mut events {
+        if let LogEvent::Temperature(reading) = event {
+            reading.time = Timestamp::from_ns(reading.time.as_ns() + 1_773_000_000_000_000_000);
+        }
+    }
+    refused(run_of(events), &["has no valid reading at the time of any window"]);
 }
 
 #[test]
@@ -294,7 +331,7 @@ fn readings_every_ten_seconds_are_fitted() {
 #[test]
 fn a_first_reading_that_is_late_is_no_temperature_of_its_own() {
     let made = tried(thermometer_at(|s| s >= 45), Method::Joint).unwrap();
-    assert!(made.report.accepted() && made.report.warnings.is_empty(), "{}", made.report.to_text());
+    assert!(made.report.accepted() && made.report.warnings.len() == 1, "{}", made.report.to_text());
     let history = "Channel imu: -10.0 to 40.0 °C; ramps 20 to -10 °C at";
     assert!(made.report.notes.iter().any(|note| note.starts_with(history)), "{:?}", made.report.notes);
     // From 11.5 °C up.

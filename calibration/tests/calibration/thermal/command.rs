@@ -109,7 +109,9 @@ fn folders_recordings_and_several_units() {
 
     // What cannot be is said.
     std::fs::create_dir(at.join("empty")).unwrap();
-    let refusals: [(&[&str], &str); 8] = [
+    let of_another = ["log.csv", "--mapping", "mapping.toml", "--unit", "B", "--calibration", "a.toml"];
+    let refusals: [(&[&str], &str); 9] = [
+        (&of_another, "the logs are of unit B, the document is of A"),
         (&["empty"], "has no recording (.mcap) in it"),
         (&["whole.mcap", "other.mcap", "--unit", "B"], "whole.mcap has no raw ticks of unit B"),
         (&["whole.mcap", "./whole.mcap"], "is given twice"),
