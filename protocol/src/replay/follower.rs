@@ -267,9 +267,13 @@ impl Follower {
         rebuilt
     }
 
+    /// Whether the last gyro frame that a memory has heard came here: since it is followed, or of a unit that sends nothing, before.
     fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {
-        let heard = memory.heard.get(GYRO.index());
-        heard.is_none_or(|heard| heard.frames == 0) || self.last_heard(memory, GYRO).is_some()
+        let [heard, before] = [&memory.heard, &self.before].map(|of| of[GYRO.index()]);
+        let sends = self.frames.iter().any(|frame| frame.input == GYRO);
+        heard.frames == 0
+            || (!sends && before.frames > 0 && before.crc == heard.crc)
+            || self.last_heard(memory, GYRO).is_some()
     }
 
     /// Place of the last frame of an input that a memory has heard.
