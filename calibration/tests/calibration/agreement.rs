@@ -131,15 +131,12 @@ fn of_a_rate_table() {
         let rates: Vec<f64> = column(rows, 2).iter().map(|rate| rate.parse().unwrap()).collect();
         let windows = windows(rows, number);
         assert_eq!((windows.len(), rates.len()), if sample == Sample::In { (5, 5) } else { (2, 2) });
-        for axis in 0..3 {
-            let error = |(window, rate): (&[f64; 2], &f64)| {
-                let mean = mean_within(&ticks, *window, |tick| tick.delta_angle)[axis];
-                deg_per_h(mean) - if axis == 2 { 3600.0 * rate } else { 0.0 }
-            };
-            let errors: Vec<f64> = windows.iter().zip(&rates).map(error).collect();
-            let of = ["gyro.x", "gyro.y", "gyro.z"][axis];
-            agrees(&out, of, sample, &less_mean(&errors));
-        }
+        // Of axes that were not turned about nothing is stated.
+        let error = |(window, rate): (&[f64; 2], &f64)| {
+            deg_per_h(mean_within(&ticks, *window, |tick| tick.delta_angle)[2]) - 3600.0 * rate
+        };
+        let errors: Vec<f64> = windows.iter().zip(&rates).map(error).collect();
+        agrees(&out, "gyro.z", sample, &less_mean(&errors));
     }
 }
 

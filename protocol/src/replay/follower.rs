@@ -181,10 +181,11 @@ impl Follower {
         if let Some((memory, at_ns)) = self.memory.clone() {
             let anchor = Anchor { entry: memory, at_ns, frames: self.gone, made };
             // Where the last gyro frame that the other had heard did not come, some behind it may be missing too.
-            if !self.has_last_gyro_frame(&anchor.entry) {
+            let of_before = self.is_of_before(&anchor.entry);
+            if !of_before && !self.has_last_gyro_frame(&anchor.entry) {
                 return (None, now_ns > at_ns.saturating_add(LATE_NS));
             }
-            let rebuilt = self.rebuild(&anchor, false);
+            let rebuilt = self.rebuild(&anchor, of_before);
             let Some(again) = &rebuilt else {
                 return (None, now_ns > at_ns.saturating_add(4 * super::NEAR_NS));
             };
@@ -267,13 +268,14 @@ impl Follower {
         rebuilt
     }
 
-    /// Whether the last gyro frame that a memory has heard came here: since it is followed, or of a unit that sends nothing, before.
+    /// Whether a memory has heard what came here before it was followed, and no more: of a unit that sends nothing.
+    fn is_of_before(&self, memory: &JournalEntry) -> bool {
+        memory.heard.iter().zip(&self.before).all(|(heard, before)| heard.frames == 0 || heard == before)
+    }
+
     fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {
-        let [heard, before] = [&memory.heard, &self.before].map(|of| of[GYRO.index()]);
-        let sends = self.frames.iter().any(|frame| frame.input == GYRO);
-        heard.frames == 0
-            || (!sends && before.frames > 0 && before.crc == heard.crc)
-            || self.last_heard(memory, GYRO).is_some()
+        let heard = memory.heard.get(GYRO.index());
+        heard.is_none_or(|heard| heard.frames == 0) || self.last_heard(memory, GYRO).is_some()
     }
 
     /// Place of the last frame of an input that a memory has heard.
