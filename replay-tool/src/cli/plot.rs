@@ -136,13 +136,12 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let mut logs = Vec::new();
     let mut bar = None;
     for log in std::iter::once(&args.log).chain(&other) {
-        let messages = match corrected(log, unnamed.as_ref())? {
-            Some(messages) => messages,
-            None => {
-                let document = calibration.as_ref().map(|parsed| parsed.document.unit.as_str());
-                document.map_or(Ok(()), |unit| log.refuse_document_of_another(unit))?;
-                log.messages(BATCH, unnamed.as_ref())?
-            }
+        let messages = if let Some(messages) = corrected(log, unnamed.as_ref())? {
+            messages
+        } else {
+            let document = calibration.as_ref().map(|parsed| parsed.document.unit.as_str());
+            document.map_or(Ok(()), |unit| log.refuse_document_of_another(unit))?;
+            log.messages(BATCH, unnamed.as_ref())?
         };
         bar.get_or_insert_with(|| Bar::over_log(messages.progress().watch()));
         let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();

@@ -123,8 +123,9 @@ fn topics(topics: &[TopicInfo]) -> String {
     let gyro = topics.iter().find(|topic| topic.key.ends_with("/raw/gyro"));
     for topic in topics {
         topic_details(&mut text, topic);
-        let beside = gyro.filter(|_| topic.key.contains("/raw/"));
-        beside.into_iter().for_each(|gyro| apart(&mut text, topic, gyro));
+        if let Some(gyro) = gyro.filter(|_| topic.key.contains("/raw/")) {
+            apart(&mut text, topic, gyro);
+        }
     }
     text
 }
