@@ -232,8 +232,8 @@ fn temperatures_of_a_second_file_are_read_and_doubted_where_their_clock_is_anoth
         let args = ["correct", "imu.csv", "temp.csv", "--calibration", document.to_str().unwrap()];
         let said = stderr(&replay(path, &args));
         let text = stdout(&output);
-        let apart = text.lines().filter(|line| line.contains(" the gyros"));
-        apart.map(|line| format!("{line}\n")).collect::<String>() + &said
+        let apart = text.split_inclusive('\n').filter(|line| line.contains(" the gyros"));
+        apart.collect::<String>() + &said
     };
     let same = imported(0.0, "T_block_K");
     insta::assert_snapshot!(format!("{same}---\n{}", imported(1000.0, "Temperature [K]")));
