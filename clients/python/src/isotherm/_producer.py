@@ -192,7 +192,9 @@ class Producer:
             self._publishers[stream].put(frame)
 
     def _note_heard(self, first: int, count: int) -> None:
-        is_heard = self._publishers["gyro"].matching_status.matching
+        # The package's types take the status for a bool.
+        publisher: Any = self._publishers["gyro"]
+        is_heard = bool(publisher.matching_status.matching)
         if not is_heard:
             self.unheard += count
             if self._is_heard:
