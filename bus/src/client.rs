@@ -14,7 +14,7 @@ use crate::certificate::common_name;
 use crate::endpoint::{DEFAULT_ENDPOINT, endpoint};
 use crate::error::seconds;
 use crate::session::{close, connected_to, endpoints, keep_trying, set};
-use crate::{BusError, SessionOptions, obstacle};
+use crate::{BoxFuture, BusError, SessionOptions, obstacle};
 
 /// Environment variable that says where the service is: one endpoint, or several separated by commas.
 pub const CONNECT_VARIABLE: &str = "ISOTHERM_CONNECT";
@@ -292,28 +292,31 @@ impl Way {
     ///
     /// # Errors
     /// [`BusError::Unreachable`] with what to do next, [`BusError::Listen`], or [`BusError::Open`] where the cause is not known.
-    pub async fn open(&self, limit: Duration) -> Result<Session, BusError> {
-        obstacle::before(&self.config)?;
-        let (config, started) = (self.config.clone(), Instant::now());
-        // A task of its own: opening may hold its thread, and a timeout on the same one would not be heard.
-        let opening = tokio::spawn(async move { zenoh::open(config).await });
-        let source = match tokio::time::timeout(limit, opening).await {
-            Ok(Ok(Ok(session))) => {
-                if self.is_connected(&session, limit.saturating_sub(started.elapsed())).await {
-                    return Ok(session);
+    pub fn open(&self, limit: Duration) -> BoxFuture<'_, Result<Session, BusError>> {
+        Box::pin(async move {
+            obstacle::before(&self.config)?;
+            let (config, started) = (self.config.clone(), Instant::now());
+            // A task of its own: opening may hold its thread, and a timeout on the same one would not be heard.
+            let opening = tokio::spawn(async move { zenoh::open(config).await });
+            let source = match tokio::time::timeout(limit, opening).await {
+                Ok(Ok(Ok(session))) => {
+                    if self.is_connected(&session, limit.saturating_sub(started.elapsed())).await {
+                        return Ok(session);
+                    }
+                    // Why nobody answers is what counts.
+                    let _ = close(session, CLOSING).await;
+                    not_connected(limit)
                 }
-                // Why nobody answers is what counts.
-                let _ = close(session, CLOSING).await;
-                not_connected(limit)
-            }
-            Ok(Ok(Err(source))) => source,
-            Ok(Err(join)) => join.into(),
-            Err(_) => not_connected(limit),
-        };
-        let (config, said_by) = (self.config.clone(), self.said_by.clone());
-        let known =
-            tokio::task::spawn_blocking(move || obstacle::after(&config, limit, said_by.as_deref())).await;
-        Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+                Ok(Ok(Err(source))) => source,
+                Ok(Err(join)) => join.into(),
+                Err(_) => not_connected(limit),
+            };
+            let (config, said_by) = (self.config.clone(), self.said_by.clone());
+            let known =
+                tokio::task::spawn_blocking(move || obstacle::after(&config, limit, said_by.as_deref()))
+                    .await;
+            Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+        })
     }
 }
 

@@ -50,3 +50,9 @@ pub use outlet::{Outlet, OutletOptions};
 pub use producer::{Producer, ProducerOptions};
 pub use routes::DeclaredKeys;
 pub use session::{SessionOptions, close, connected, locators, open, open_config};
+
+use std::pin::Pin;
+
+/// A future that is compiled where it is made. What an `async fn` awaits is compiled by each crate that awaits it: for Zenoh's opening
+/// and closing that is half a minute for every program and test.
+pub type BoxFuture<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;

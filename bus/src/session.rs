@@ -8,7 +8,7 @@ use serde_json::Value;
 use zenoh::{Config, Session, Wait};
 
 use crate::endpoint::{DEFAULT_ENDPOINT, address, endpoint, host_and_port};
-use crate::{BusError, obstacle};
+use crate::{BoxFuture, BusError, obstacle};
 
 /// Where a session listens and connects when neither options nor a configuration say so.
 const LOOPBACK: &str = "tcp/127.0.0.1:0";
@@ -227,25 +227,27 @@ pub fn set(config: &mut Config, option: &'static str, value: impl Into<Value>) -
 /// # Errors
 /// [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`] for what the options say, [`BusError::Listen`]
 /// where a port cannot be bound, [`BusError::Unreachable`] where no endpoint can be reached, [`BusError::Open`] for anything else.
-pub async fn open(options: &SessionOptions) -> Result<Session, BusError> {
-    open_config(options.to_config()?).await
+pub fn open(options: &SessionOptions) -> BoxFuture<'_, Result<Session, BusError>> {
+    Box::pin(async move { open_config(options.to_config()?).await })
 }
 
 /// Opens a session with a configuration.
 ///
 /// # Errors
 /// As [`open`].
-pub async fn open_config(config: Config) -> Result<Session, BusError> {
-    obstacle::before(&config)?;
-    let started = Instant::now();
-    match zenoh::open(config.clone()).await {
-        Ok(session) => Ok(session),
-        Err(source) => {
-            let waited = started.elapsed();
-            let known = tokio::task::spawn_blocking(move || obstacle::after(&config, waited, None)).await;
-            Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+pub fn open_config(config: Config) -> BoxFuture<'static, Result<Session, BusError>> {
+    Box::pin(async move {
+        obstacle::before(&config)?;
+        let started = Instant::now();
+        match zenoh::open(config.clone()).await {
+            Ok(session) => Ok(session),
+            Err(source) => {
+                let waited = started.elapsed();
+                let known = tokio::task::spawn_blocking(move || obstacle::after(&config, waited, None)).await;
+                Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+            }
         }
-    }
+    })
 }
 
 /// Waits until a session is connected to every endpoint that its options name, a client to one of them; no longer than `limit`. Whether
@@ -253,15 +255,17 @@ pub async fn open_config(config: Config) -> Result<Session, BusError> {
 ///
 /// # Errors
 /// As [`SessionOptions::to_config`].
-pub async fn connected(
-    session: &Session,
-    options: &SessionOptions,
+pub fn connected<'a>(
+    session: &'a Session,
+    options: &'a SessionOptions,
     limit: Duration,
-) -> Result<bool, BusError> {
-    let config = options.to_config()?;
-    let wanted = endpoints(&config, "connect/endpoints");
-    let least = if is_client(&config) { wanted.len().min(1) } else { wanted.len() };
-    Ok(connected_to(session, &wanted, least, limit).await >= least)
+) -> BoxFuture<'a, Result<bool, BusError>> {
+    Box::pin(async move {
+        let config = options.to_config()?;
+        let wanted = endpoints(&config, "connect/endpoints");
+        let least = if is_client(&config) { wanted.len().min(1) } else { wanted.len() };
+        Ok(connected_to(session, &wanted, least, limit).await >= least)
+    })
 }
 
 fn is_client(config: &Config) -> bool {
@@ -312,13 +316,15 @@ pub fn locators(session: &Session) -> Vec<String> {
 ///
 /// # Errors
 /// [`BusError::CloseTimeout`] and [`BusError::Close`].
-pub async fn close(session: Session, limit: Duration) -> Result<(), BusError> {
-    let closing = tokio::spawn(async move { session.close().await });
-    match tokio::time::timeout(limit, closing).await {
-        Ok(Ok(closed)) => closed.map_err(BusError::Close),
-        Ok(Err(join)) => Err(BusError::Close(join.into())),
-        Err(_) => Err(BusError::CloseTimeout(limit)),
-    }
+pub fn close(session: Session, limit: Duration) -> BoxFuture<'static, Result<(), BusError>> {
+    Box::pin(async move {
+        let closing = tokio::spawn(async move { session.close().await });
+        match tokio::time::timeout(limit, closing).await {
+            Ok(Ok(closed)) => closed.map_err(BusError::Close),
+            Ok(Err(join)) => Err(BusError::Close(join.into())),
+            Err(_) => Err(BusError::CloseTimeout(limit)),
+        }
+    })
 }
 
 #[cfg(test)]

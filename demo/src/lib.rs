@@ -19,6 +19,7 @@ use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use isotherm_bus::BoxFuture;
 use isotherm_cli::{Exit, failed, print};
 use tokio::sync::mpsc::unbounded_channel;
 use tokio::task::JoinSet;
@@ -61,8 +62,8 @@ pub struct DemoArgs {
 }
 
 /// Runs the demo and prints what came of it; [`Exit::DataLoss`] where a tick was lost.
-pub async fn run(args: DemoArgs) -> Exit {
-    show(args).await.unwrap_or_else(|error| failed(error, Exit::Failed))
+pub fn run(args: DemoArgs) -> BoxFuture<'static, Exit> {
+    Box::pin(async move { show(args).await.unwrap_or_else(|error| failed(error, Exit::Failed)) })
 }
 
 async fn show(args: DemoArgs) -> Result<Exit, DemoError> {

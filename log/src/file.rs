@@ -150,9 +150,11 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        if !self.kept && !is_being_written(&self.writing) {
-            // It may never have been created.
-            let _ = std::fs::remove_file(&self.writing);
+        if !self.kept {
+            // It may never have been created, or be another program's.
+            if !is_being_written(&self.writing) {
+                let _ = std::fs::remove_file(&self.writing);
+            }
             writing().remove(&self.writing);
         }
     }

@@ -34,6 +34,7 @@ pub use top::TopArgs;
 pub use top::{Feed, Fleet, worst_first};
 
 use clap::Subcommand;
+use isotherm_bus::BoxFuture;
 use isotherm_cli::{Exit, failed};
 
 /// A command of the operator's side.
@@ -55,15 +56,17 @@ pub enum Operation {
 
 impl Operation {
     /// Runs it; SIGINT ends it at any point, where it does not say otherwise.
-    pub async fn run(self) -> Exit {
-        let done = match self {
-            Self::Status(args) => status::run(&args).await,
-            Self::Top(args) => top::run(&args).await,
-            Self::Swap(args) => swap::run(&args).await,
-            Self::Rollback(args) => swap::rollback(&args).await,
-            Self::History(args) => history::run(&args).await,
-            Self::Command(args) => command::run(&args).await,
-        };
-        done.unwrap_or_else(|error| failed(&error, error.exit()))
+    pub fn run(self) -> BoxFuture<'static, Exit> {
+        Box::pin(async move {
+            let done = match self {
+                Self::Status(args) => status::run(&args).await,
+                Self::Top(args) => top::run(&args).await,
+                Self::Swap(args) => swap::run(&args).await,
+                Self::Rollback(args) => swap::rollback(&args).await,
+                Self::History(args) => history::run(&args).await,
+                Self::Command(args) => command::run(&args).await,
+            };
+            done.unwrap_or_else(|error| failed(&error, error.exit()))
+        })
     }
 }

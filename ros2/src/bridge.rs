@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
-use isotherm_bus::{BusError, Consumer, presence};
+use isotherm_bus::{BoxFuture, BusError, Consumer, presence};
 use isotherm_protocol::codec;
 use isotherm_protocol::key;
 use isotherm_protocol::status::Status;
@@ -135,50 +135,57 @@ impl Bridge {
     ///
     /// # Errors
     /// [`Error::Bus`] where something cannot be declared.
-    pub async fn start(mapping: &Mapping, domain: u32, ros: Session, bus: Session) -> Result<Self, Error> {
-        let mut declarer = Declarer::new(&ros, mapping, domain).await?;
-        let (mut units, mut subscribers, mut queues) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut feeding, mut rest) = (Vec::new(), Vec::new());
-        let (mut statuses, mut answers) = (Vec::new(), Vec::new());
-        let tokens: Vec<_> = mapping.units.iter().map(|unit| unit.unit.as_str()).collect();
-        let names = isotherm_log::ros2::Names::of(tokens, "unit");
-        for mapping in &mapping.units {
-            let unit = Arc::new(Unit::new(mapping.clone()));
-            statuses.push(hear_status(&bus, &unit).await?);
-            // First what comes back, then what is sent.
-            let outlet = declarer.publisher(&mapping.corrected, IMU, mapping.output).await?;
-            let consumer = Consumer::declare(&bus, Some(&mapping.unit)).await?;
-            let documents = Arc::new(Notify::new());
-            rest.push(tokio::spawn(publishing::documents(
-                bus.clone(),
-                Arc::clone(&unit),
-                Arc::clone(&documents),
-            )));
-            rest.push(tokio::spawn(publishing::publish(Arc::clone(&unit), consumer, outlet, documents)));
-            let name = names.get(mapping.unit.as_str());
-            answers.extend(services::declare(&mut declarer, &bus, mapping, &name).await?);
-            let (sender, arrived) = unbounded_channel();
-            feeding.push(tokio::spawn(feeding::feed(Arc::clone(&unit), bus.clone(), arrived)));
-            let queue = Queue::new(sender, Arc::clone(&unit));
-            subscribers.extend(subscribe(&mut declarer, mapping, &queue).await?);
-            queues.push(queue);
-            units.push(unit);
-        }
-        let left = move |gid| queues.iter().for_each(|queue| queue.push(Arrived::Left(gid)));
-        let graph = Graph::declare(&ros, domain, Topics::of(mapping), left).await?;
-        let outlet = declarer.publisher(&mapping.diagnostics, DIAGNOSTICS, Qos::DIAGNOSTICS).await?;
-        rest.push(tokio::spawn(diagnostics::publish(units.clone(), ros.clone(), outlet)));
-        Ok(Self {
-            ros,
-            bus,
-            units,
-            subscribers,
-            feeding,
-            rest,
-            _statuses: statuses,
-            _services: answers,
-            _graph: graph,
-            _tokens: declarer.tokens,
+    pub fn start(
+        mapping: &Mapping,
+        domain: u32,
+        ros: Session,
+        bus: Session,
+    ) -> BoxFuture<'_, Result<Self, Error>> {
+        Box::pin(async move {
+            let mut declarer = Declarer::new(&ros, mapping, domain).await?;
+            let (mut units, mut subscribers, mut queues) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut feeding, mut rest) = (Vec::new(), Vec::new());
+            let (mut statuses, mut answers) = (Vec::new(), Vec::new());
+            let tokens: Vec<_> = mapping.units.iter().map(|unit| unit.unit.as_str()).collect();
+            let names = isotherm_log::ros2::Names::of(tokens, "unit");
+            for mapping in &mapping.units {
+                let unit = Arc::new(Unit::new(mapping.clone()));
+                statuses.push(hear_status(&bus, &unit).await?);
+                // First what comes back, then what is sent.
+                let outlet = declarer.publisher(&mapping.corrected, IMU, mapping.output).await?;
+                let consumer = Consumer::declare(&bus, Some(&mapping.unit)).await?;
+                let documents = Arc::new(Notify::new());
+                rest.push(tokio::spawn(publishing::documents(
+                    bus.clone(),
+                    Arc::clone(&unit),
+                    Arc::clone(&documents),
+                )));
+                rest.push(tokio::spawn(publishing::publish(Arc::clone(&unit), consumer, outlet, documents)));
+                let name = names.get(mapping.unit.as_str());
+                answers.extend(services::declare(&mut declarer, &bus, mapping, &name).await?);
+                let (sender, arrived) = unbounded_channel();
+                feeding.push(tokio::spawn(feeding::feed(Arc::clone(&unit), bus.clone(), arrived)));
+                let queue = Queue::new(sender, Arc::clone(&unit));
+                subscribers.extend(subscribe(&mut declarer, mapping, &queue).await?);
+                queues.push(queue);
+                units.push(unit);
+            }
+            let left = move |gid| queues.iter().for_each(|queue| queue.push(Arrived::Left(gid)));
+            let graph = Graph::declare(&ros, domain, Topics::of(mapping), left).await?;
+            let outlet = declarer.publisher(&mapping.diagnostics, DIAGNOSTICS, Qos::DIAGNOSTICS).await?;
+            rest.push(tokio::spawn(diagnostics::publish(units.clone(), ros.clone(), outlet)));
+            Ok(Self {
+                ros,
+                bus,
+                units,
+                subscribers,
+                feeding,
+                rest,
+                _statuses: statuses,
+                _services: answers,
+                _graph: graph,
+                _tokens: declarer.tokens,
+            })
         })
     }
 
@@ -210,30 +217,32 @@ impl Bridge {
     }
 
     /// Takes nothing more, waits for what is under way, closes both sessions.
-    pub async fn stop(mut self) -> Totals {
-        for subscriber in self.subscribers.drain(..) {
-            let _ = subscriber.undeclare().wait_callbacks().wait();
-        }
-        let deadline = Instant::now() + SETTLE;
-        for (unit, task) in self.units.iter().zip(self.feeding.drain(..)) {
-            unit.end.notify_one();
-            // One that waits for a service that is not there is given up.
-            let abort = task.abort_handle();
-            if tokio::time::timeout_at(deadline, task).await.is_err() {
-                abort.abort();
+    pub fn stop(mut self) -> BoxFuture<'static, Totals> {
+        Box::pin(async move {
+            for subscriber in self.subscribers.drain(..) {
+                let _ = subscriber.undeclare().wait_callbacks().wait();
             }
-        }
-        for unit in &self.units {
-            let _ = tokio::time::timeout_at(deadline, unit.settled()).await;
-        }
-        let totals = self.totals();
-        self.rest.iter().for_each(JoinHandle::abort);
-        for session in [self.ros, self.bus] {
-            if let Err(error) = isotherm_bus::close(session, CLOSE).await {
-                tracing::warn!("{error}");
+            let deadline = Instant::now() + SETTLE;
+            for (unit, task) in self.units.iter().zip(self.feeding.drain(..)) {
+                unit.end.notify_one();
+                // One that waits for a service that is not there is given up.
+                let abort = task.abort_handle();
+                if tokio::time::timeout_at(deadline, task).await.is_err() {
+                    abort.abort();
+                }
             }
-        }
-        totals
+            for unit in &self.units {
+                let _ = tokio::time::timeout_at(deadline, unit.settled()).await;
+            }
+            let totals = self.totals();
+            self.rest.iter().for_each(JoinHandle::abort);
+            for session in [self.ros, self.bus] {
+                if let Err(error) = isotherm_bus::close(session, CLOSE).await {
+                    tracing::warn!("{error}");
+                }
+            }
+            totals
+        })
     }
 }
 

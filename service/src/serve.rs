@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use isotherm_bus::SessionOptions;
+use isotherm_bus::{BoxFuture, SessionOptions};
 use isotherm_cli::{Exit, print_within};
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
@@ -72,16 +72,18 @@ pub struct ServeArgs {
 }
 
 /// Serves until a signal comes.
-pub async fn run(args: ServeArgs) -> Exit {
-    let json = args.json;
-    match serve(args).await {
-        Ok(Some(totals)) => report(&totals, json),
-        Ok(None) => {
-            tracing::error!("stopped immediately by a second signal");
-            Exit::DataLoss
+pub fn run(args: ServeArgs) -> BoxFuture<'static, Exit> {
+    Box::pin(async move {
+        let json = args.json;
+        match serve(args).await {
+            Ok(Some(totals)) => report(&totals, json),
+            Ok(None) => {
+                tracing::error!("stopped immediately by a second signal");
+                Exit::DataLoss
+            }
+            Err(error) => error.tell(),
         }
-        Err(error) => error.tell(),
-    }
+    })
 }
 
 /// Says what was done.

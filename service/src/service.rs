@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 
-use isotherm_bus::receipt;
+use isotherm_bus::{BoxFuture, receipt};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Status;
 use tokio::task::JoinHandle;
@@ -60,23 +60,28 @@ pub struct RunningService {
 /// folder of calibrations cannot be read and [`ServiceError::BadCalibrations`] where a document is bad;
 /// [`ServiceError::Metrics`] where the configured address cannot be had; [`ServiceError::Declare`] and
 /// [`ServiceError::Thread`].
-pub async fn start(settings: Settings, session: Session) -> Result<RunningService, ServiceError> {
+pub fn start(
+    settings: Settings,
+    session: Session,
+) -> BoxFuture<'static, Result<RunningService, ServiceError>> {
     tell_state(&settings);
-    start_with(settings, Calibrations::default(), session).await
+    start_with(settings, Calibrations::default(), session)
 }
 
 /// Starts the service on a session, with calibrations that need not be documents beside those that are.
 ///
 /// # Errors
 /// As [`start`].
-pub async fn start_with(
+pub fn start_with(
     settings: Settings,
     calibrations: Calibrations,
     session: Session,
-) -> Result<RunningService, ServiceError> {
-    let state = open_store(settings.state.as_deref())?;
-    let metrics = Endpoint::start(&settings.metrics, "its units".to_owned()).await?;
-    start_on(settings, calibrations, state, metrics, session).await
+) -> BoxFuture<'static, Result<RunningService, ServiceError>> {
+    Box::pin(async move {
+        let state = open_store(settings.state.as_deref())?;
+        let metrics = Endpoint::start(&settings.metrics, "its units".to_owned()).await?;
+        start_on(settings, calibrations, state, metrics, session).await
+    })
 }
 
 /// Starts the service with a state folder that is open already, what it was found like, and an endpoint that answers already.
@@ -226,56 +231,60 @@ impl RunningService {
     /// most the configured time.
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
-    pub async fn stop(self) -> Totals {
-        let Self {
-            session,
-            settings,
-            intake,
-            watcher,
-            declared,
-            status_publisher,
-            swap_manager,
-            pair,
-            metrics,
-            asking,
-            ..
-        } = self;
-        // From here on the stop itself asks.
-        asking.abort();
-        metrics.iter().for_each(Endpoint::stopping);
-        let deadline = Instant::now() + settings.stop_timeout;
-        let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
-        // Each of these may wait: a callback for a slow subscriber, the status publisher for a callback, the swap manager for a disk.
-        let units = Arc::clone(&intake);
-        let flush = tokio::task::spawn_blocking(move || {
-            let (received, alive) = declared.undeclare();
-            let paired = pair.stop();
-            let kept = status_publisher.stop();
-            let watched = watcher.is_none_or(Watcher::stop);
-            // Last of all: the first ticks of a calibration may have come with the flush.
-            let registered = swap_manager.stop();
-            units.each_unit(UnitActor::end);
-            (received && paired && kept && watched && registered, alive)
-        });
-        // The token is there until the session is closed: where it goes, nothing more comes.
-        let (flushed, _alive) = match tokio::time::timeout_at(deadline, flush).await {
-            Ok(Ok((in_order, alive))) => (in_order, Some(alive)),
-            Ok(Err(_)) | Err(_) => (false, None),
-        };
-        let taken =
-            receipt::all_taken(&session, left(deadline).saturating_sub(settings.stop_timeout / CLOSE_SHARE))
-                .await;
-        if !flushed {
-            tracing::error!("not everything was published within {:?}", settings.stop_timeout);
-        }
-        let closed = isotherm_bus::close(session, left(deadline)).await;
-        for error in [&taken, &closed].into_iter().filter_map(|done| done.as_ref().err()) {
-            tracing::error!("{error}");
-        }
-        if let Some(metrics) = metrics {
-            metrics.end().await;
-        }
-        Totals { stopped_in_time: flushed && taken.is_ok() && closed.is_ok(), ..intake.totals() }
+    pub fn stop(self) -> BoxFuture<'static, Totals> {
+        Box::pin(async move {
+            let Self {
+                session,
+                settings,
+                intake,
+                watcher,
+                declared,
+                status_publisher,
+                swap_manager,
+                pair,
+                metrics,
+                asking,
+                ..
+            } = self;
+            // From here on the stop itself asks.
+            asking.abort();
+            metrics.iter().for_each(Endpoint::stopping);
+            let deadline = Instant::now() + settings.stop_timeout;
+            let left = |deadline: Instant| deadline.saturating_duration_since(Instant::now());
+            // Each of these may wait: a callback for a slow subscriber, the status publisher for a callback, the swap manager for a disk.
+            let units = Arc::clone(&intake);
+            let flush = tokio::task::spawn_blocking(move || {
+                let (received, alive) = declared.undeclare();
+                let paired = pair.stop();
+                let kept = status_publisher.stop();
+                let watched = watcher.is_none_or(Watcher::stop);
+                // Last of all: the first ticks of a calibration may have come with the flush.
+                let registered = swap_manager.stop();
+                units.each_unit(UnitActor::end);
+                (received && paired && kept && watched && registered, alive)
+            });
+            // The token is there until the session is closed: where it goes, nothing more comes.
+            let (flushed, _alive) = match tokio::time::timeout_at(deadline, flush).await {
+                Ok(Ok((in_order, alive))) => (in_order, Some(alive)),
+                Ok(Err(_)) | Err(_) => (false, None),
+            };
+            let taken = receipt::all_taken(
+                &session,
+                left(deadline).saturating_sub(settings.stop_timeout / CLOSE_SHARE),
+            )
+            .await;
+            if !flushed {
+                tracing::error!("not everything was published within {:?}", settings.stop_timeout);
+            }
+            let closed = isotherm_bus::close(session, left(deadline)).await;
+            for error in [&taken, &closed].into_iter().filter_map(|done| done.as_ref().err()) {
+                tracing::error!("{error}");
+            }
+            if let Some(metrics) = metrics {
+                metrics.end().await;
+            }
+            Totals { stopped_in_time: flushed && taken.is_ok() && closed.is_ok(), ..intake.totals() }
+        })
     }
 
     /// Has the documents of the folder read again, and those judged again that are not taken.

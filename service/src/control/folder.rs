@@ -109,8 +109,7 @@ impl Folder {
 
     /// The first file whose document names a unit, or did while it was valid.
     pub(super) fn first_naming(&self, unit: &UnitId) -> Option<&Path> {
-        let names = |file: &File| [&file.unit, &file.hint].contains(&&Some(unit.clone()));
-        self.files.iter().find(|(_, file)| names(file)).map(|(path, _)| path.as_path())
+        self.files.iter().find(|(_, file)| file.hint.as_ref() == Some(unit)).map(|(path, _)| path.as_path())
     }
 
     /// Enters a file that cannot be read; the problem.
