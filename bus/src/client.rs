@@ -292,6 +292,7 @@ impl Way {
     ///
     /// # Errors
     /// [`BusError::Unreachable`] with what to do next, [`BusError::Listen`], or [`BusError::Open`] where the cause is not known.
+    #[must_use]
     pub fn open(&self, limit: Duration) -> BoxFuture<'_, Result<Session, BusError>> {
         Box::pin(async move {
             obstacle::before(&self.config)?;

@@ -227,6 +227,7 @@ pub fn set(config: &mut Config, option: &'static str, value: impl Into<Value>) -
 /// # Errors
 /// [`BusError::Configuration`], [`BusError::Endpoint`] and [`BusError::Option`] for what the options say, [`BusError::Listen`]
 /// where a port cannot be bound, [`BusError::Unreachable`] where no endpoint can be reached, [`BusError::Open`] for anything else.
+#[must_use]
 pub fn open(options: &SessionOptions) -> BoxFuture<'_, Result<Session, BusError>> {
     Box::pin(async move { open_config(options.to_config()?).await })
 }
@@ -235,6 +236,7 @@ pub fn open(options: &SessionOptions) -> BoxFuture<'_, Result<Session, BusError>
 ///
 /// # Errors
 /// As [`open`].
+#[must_use]
 pub fn open_config(config: Config) -> BoxFuture<'static, Result<Session, BusError>> {
     Box::pin(async move {
         obstacle::before(&config)?;
@@ -255,6 +257,7 @@ pub fn open_config(config: Config) -> BoxFuture<'static, Result<Session, BusErro
 ///
 /// # Errors
 /// As [`SessionOptions::to_config`].
+#[must_use]
 pub fn connected<'a>(
     session: &'a Session,
     options: &'a SessionOptions,
@@ -316,6 +319,7 @@ pub fn locators(session: &Session) -> Vec<String> {
 ///
 /// # Errors
 /// [`BusError::CloseTimeout`] and [`BusError::Close`].
+#[must_use]
 pub fn close(session: Session, limit: Duration) -> BoxFuture<'static, Result<(), BusError>> {
     Box::pin(async move {
         let closing = tokio::spawn(async move { session.close().await });

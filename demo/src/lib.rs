@@ -62,6 +62,7 @@ pub struct DemoArgs {
 }
 
 /// Runs the demo and prints what came of it; [`Exit::DataLoss`] where a tick was lost.
+#[must_use]
 pub fn run(args: DemoArgs) -> BoxFuture<'static, Exit> {
     Box::pin(async move { show(args).await.unwrap_or_else(|error| failed(error, Exit::Failed)) })
 }

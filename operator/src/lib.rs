@@ -56,6 +56,7 @@ pub enum Operation {
 
 impl Operation {
     /// Runs it; SIGINT ends it at any point, where it does not say otherwise.
+    #[must_use]
     pub fn run(self) -> BoxFuture<'static, Exit> {
         Box::pin(async move {
             let done = match self {

@@ -135,6 +135,7 @@ impl Bridge {
     ///
     /// # Errors
     /// [`Error::Bus`] where something cannot be declared.
+    #[must_use]
     pub fn start(
         mapping: &Mapping,
         domain: u32,
@@ -217,6 +218,7 @@ impl Bridge {
     }
 
     /// Takes nothing more, waits for what is under way, closes both sessions.
+    #[must_use]
     pub fn stop(mut self) -> BoxFuture<'static, Totals> {
         Box::pin(async move {
             for subscriber in self.subscribers.drain(..) {

@@ -72,6 +72,7 @@ pub struct ServeArgs {
 }
 
 /// Serves until a signal comes.
+#[must_use]
 pub fn run(args: ServeArgs) -> BoxFuture<'static, Exit> {
     Box::pin(async move {
         let json = args.json;

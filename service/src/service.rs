@@ -60,6 +60,7 @@ pub struct RunningService {
 /// folder of calibrations cannot be read and [`ServiceError::BadCalibrations`] where a document is bad;
 /// [`ServiceError::Metrics`] where the configured address cannot be had; [`ServiceError::Declare`] and
 /// [`ServiceError::Thread`].
+#[must_use]
 pub fn start(
     settings: Settings,
     session: Session,
@@ -72,6 +73,7 @@ pub fn start(
 ///
 /// # Errors
 /// As [`start`].
+#[must_use]
 pub fn start_with(
     settings: Settings,
     calibrations: Calibrations,
@@ -231,6 +233,7 @@ impl RunningService {
     /// most the configured time.
     ///
     /// The session given to [`start`] is closed for whoever else holds it.
+    #[must_use]
     pub fn stop(self) -> BoxFuture<'static, Totals> {
         Box::pin(async move {
             let Self {
