@@ -257,18 +257,15 @@ pub fn open_config(config: Config) -> BoxFuture<'static, Result<Session, BusErro
 ///
 /// # Errors
 /// As [`SessionOptions::to_config`].
-#[must_use]
-pub fn connected<'a>(
-    session: &'a Session,
-    options: &'a SessionOptions,
+pub async fn connected(
+    session: &Session,
+    options: &SessionOptions,
     limit: Duration,
-) -> BoxFuture<'a, Result<bool, BusError>> {
-    Box::pin(async move {
-        let config = options.to_config()?;
-        let wanted = endpoints(&config, "connect/endpoints");
-        let least = if is_client(&config) { wanted.len().min(1) } else { wanted.len() };
-        Ok(connected_to(session, &wanted, least, limit).await >= least)
-    })
+) -> Result<bool, BusError> {
+    let config = options.to_config()?;
+    let wanted = endpoints(&config, "connect/endpoints");
+    let least = if is_client(&config) { wanted.len().min(1) } else { wanted.len() };
+    Ok(connected_to(session, &wanted, least, limit).await >= least)
 }
 
 fn is_client(config: &Config) -> bool {

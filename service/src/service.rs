@@ -65,8 +65,10 @@ pub fn start(
     settings: Settings,
     session: Session,
 ) -> BoxFuture<'static, Result<RunningService, ServiceError>> {
-    tell_state(&settings);
-    start_with(settings, Calibrations::default(), session)
+    Box::pin(async move {
+        tell_state(&settings);
+        start_with(settings, Calibrations::default(), session).await
+    })
 }
 
 /// Starts the service on a session, with calibrations that need not be documents beside those that are.
