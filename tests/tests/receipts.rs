@@ -1,7 +1,6 @@
 //! Who stops waits until slow subscribers have taken everything, or says that they have not (I8).
 //!
-//! In a process of its own, one test at a time: a callback that blocks holds up one of the two threads that receive for all sessions of
-//! a process.
+//! In a process of its own: a callback that blocks holds up one of the two threads that receive for all sessions of a process.
 
 #![expect(clippy::unwrap_used, reason = "a test may panic, its helpers included")]
 
@@ -26,21 +25,22 @@ use zenoh::Session;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{CongestionControl, Priority};
 
-/// Held by the one listener of the process.
-static ALONE: AsyncMutex<()> = AsyncMutex::const_new(());
+/// One listener at a time: two that block would hold up all that the process receives.
+static TURN: AsyncMutex<()> = AsyncMutex::const_new(());
 
 /// A subscriber that gives receipts, and whose callback takes its time.
 struct Listener {
-    _alone: AsyncMutexGuard<'static, ()>,
     session: Session,
     receipt: Receipt,
     subscriber: Subscriber<()>,
     taken: Arc<AtomicU64>,
+    // Goes after the callback that may block.
+    _turn: AsyncMutexGuard<'static, ()>,
 }
 
 impl Listener {
     async fn new(session: Session, keys: &str, dawdle: impl Fn() + Send + Sync + 'static) -> Self {
-        let alone = ALONE.lock().await;
+        let turn = TURN.lock().await;
         let receipt = Receipt::declare(&session).await.unwrap();
         let taken = Arc::new(AtomicU64::new(0));
         let counter = Arc::clone(&taken);
@@ -50,7 +50,7 @@ impl Listener {
             counter.fetch_add(batch.map_or(1, |batch| batch.ticks.len() as u64), Ordering::SeqCst);
         });
         let subscriber = subscriber.await.unwrap();
-        Self { _alone: alone, session, receipt, subscriber, taken }
+        Self { session, receipt, subscriber, taken, _turn: turn }
     }
 
     /// Corrected ticks, or other messages, whose callback has ended.
