@@ -57,7 +57,7 @@ fn shown_values_are_those_of_the_document() {
     assert_eq!(of("s", "lag of 45 s")["unit"], "(°/h)/(°C/s)");
     assert_eq!(of("s", "thermal_rate run-up")["argument"], "°C/s");
     let rows = shown["tables"]["Terms"]["rows"].as_array().unwrap();
-    insta::assert_snapshot!(rows.iter().map(|row| format!("{row}\n")).collect::<String>());
+    insta::assert_snapshot!(rows.iter().map(|row| row.to_string() + "\n").collect::<String>());
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn merge_puts_parts_together_or_says_what_is_in_the_way() {
         serde_json::from_value(shown["tables"][heading]["rows"].take()).unwrap()
     };
     let parts = [rows(&new, "Parts"), rows(&new, "Residuals as stated by each part")].concat();
-    let parts: String = parts.iter().map(|row| format!("{row}\n")).collect();
+    let parts: String = parts.iter().map(|row| row.to_string() + "\n").collect();
     // A merged document goes into the next merge, with all that it says of itself.
     let again = path("again.toml");
     let twice = calibrate(&["merge", &new, &base, "--out", &again]);

@@ -290,7 +290,7 @@ fn one_direction_and_too_few_plateaus_are_told() {
 
 /// Whether a gyro has terms that a run in one direction cannot tell.
 fn follows_rates(made: &Fitted) -> bool {
-    let gyros = &mut made.written.document.gyro.sensor.iter();
+    let mut gyros = made.written.document.gyro.sensor.iter();
     gyros.any(|gyro| gyro.terms.has(Feature::Lag) || gyro.terms.has(Feature::ThermalRate))
 }
 
