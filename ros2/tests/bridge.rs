@@ -67,7 +67,7 @@ fn prepare(folder: &Path) {
     let mapping = std::fs::read_to_string(root().join("config/ros2.toml")).unwrap();
     let changed = mapping.replace("history = \"keep_last\"", "history = \"keep_all\"");
     assert_ne!(changed, mapping);
-    assert!(changed.contains("uncertainty_us = 200"));
+    assert!(changed.lines().any(|line| line.starts_with("uncertainty_us = 200")));
     std::fs::write(folder.join("ros2.toml"), changed).unwrap();
     std::fs::create_dir_all(folder.join("units")).unwrap();
     let document = std::fs::read_to_string(root().join(format!("config/calibration/{UNIT}.toml"))).unwrap();

@@ -57,29 +57,22 @@ fn a_report_says_the_same_in_every_form() {
         after: wave.iter().map(|value| 0.1 * value).collect(),
         before: wave,
     });
-    insta::assert_snapshot!(format!("{}\n{}", report.to_text(), report.refusals().unwrap()));
     let json = report.to_json();
     assert_eq!(json["accepted"], false);
     assert_eq!(json["verdict"], report.headline());
     assert_eq!(json["verdicts"][0]["out_of_sample"]["after"]["peak_to_peak"], 0.17);
     assert_eq!(json["coefficients"][1]["sigma"], Value::Null);
     let html = report.to_html();
-    for part in [
-        "1.2346",
-        "-2.50e-5",
-        "class=\"headline\">\n<li>gyro x",
-        "plateau &lt; 3",
-        "Over temperature",
-        "Spectrum of the residual",
-    ] {
-        assert!(html.contains(part), "{part}");
-    }
+    // The page's curves are left out.
+    let (body, _) = html.split_once("<main>").unwrap().1.split_once("</main>").unwrap();
+    let page: Vec<&str> = body.lines().filter(|line| !line.starts_with("<script")).collect();
+    let refusals = report.refusals().unwrap();
+    insta::assert_snapshot!([&report.to_text(), &refusals, &page.join("\n")].map(String::as_str).join("\n"));
     // A unit of measure by itself is said once.
     assert!(
         html.contains(r#""title":"","unit":"°/h""#) && !html.contains(r#""title":"°/h""#),
         "units doubled"
     );
-    assert!(html.contains("; refused <span>worse</span></li>"), "{html}");
     assert!(html.len() < 600_000, "{}", html.len());
 }
 

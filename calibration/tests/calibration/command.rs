@@ -46,10 +46,22 @@ pub(crate) fn words(output: &Output) -> (Option<i32>, String, String) {
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }
 
-/// What the program says, with its exit code, but for where its files are: for a snapshot.
+/// What the program said, with its exit code: for a snapshot.
+pub(crate) fn ended(output: &Output) -> String {
+    let (code, results, errors) = words(output);
+    format!("exit code {}\n{errors}{results}\n", code.unwrap())
+}
+
+/// The same of a run of it, but for where its files are.
 pub(crate) fn told(folder: &Path, arguments: &[&str]) -> String {
-    let (code, results, errors) = words(&calibrate(arguments));
-    format!("exit code {}\n{errors}{results}\n", code.unwrap()).replace(folder.to_str().unwrap(), "FOLDER")
+    ended(&calibrate(arguments)).replace(folder.to_str().unwrap(), "FOLDER")
+}
+
+/// The headings of a page: for a snapshot.
+pub(crate) fn headings(page: impl AsRef<Path>) -> String {
+    let html = std::fs::read_to_string(page).unwrap();
+    let parts = html.split("<h2>").skip(1).filter_map(|part| part.split_once("</h2>"));
+    parts.map(|(heading, _)| heading.to_owned() + "\n").collect()
 }
 
 /// Runs the program, which must succeed, and gives its results.

@@ -51,6 +51,8 @@ fn octave_reads_recordings_and_frames() {
         panic!("{octave:?}");
     };
     assert_eq!((ticks, equal, fewer), ("MEMS-0001 2000", "1", "1"), "{octave:?}");
-    assert!(cut.contains(" at byte "), "{cut}");
-    assert!(String::from_utf8_lossy(&octave.stderr).contains("checksum"), "{octave:?}");
+    // Where it is cut depends on how well it was compressed.
+    let cut: String = cut.chars().filter(|sign| !sign.is_ascii_digit()).collect();
+    let warnings = String::from_utf8_lossy(&octave.stderr);
+    insta::assert_snapshot!(cut + "\n" + warnings.lines().find(|line| line.contains("bad.wire")).unwrap());
 }

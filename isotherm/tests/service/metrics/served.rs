@@ -86,17 +86,14 @@ fn a_second_service_on_the_same_port_does_not_start() {
     let address = address(&ready).to_string();
     let (code, stderr) = refused(&["--metrics", &address]);
     assert_eq!(code, Some(1), "{stderr}");
-    let last = stderr.lines().last().unwrap();
-    for words in [&*address, "--metrics", "[metrics] listen", "in use", "another port"] {
-        assert!(last.contains(words), "{words}: {stderr}");
-    }
+    insta::assert_snapshot!(stderr.lines().last().unwrap().replace(&address, "ADDRESS"));
 }
 
 #[test]
 fn an_address_that_others_could_reach_is_refused() {
     let (code, stderr) = refused(&["--metrics", "0.0.0.0:0"]);
     assert_eq!(code, Some(78), "{stderr}");
-    assert!(stderr.contains("0.0.0.0:0") && stderr.contains("allow_remote = true"), "{stderr}");
+    let mut told = stderr.lines().last().unwrap().to_owned() + "\n";
     let (code, stderr) = refused(&["--metrics", "9464"]);
     assert_eq!(code, Some(2), "{stderr}");
 
@@ -105,5 +102,6 @@ fn an_address_that_others_could_reach_is_refused() {
     std::fs::write(&config, "[metrics]\nlisten = \"0.0.0.0:0\"\n").unwrap();
     let (code, stderr) = refused(&["--config", config.to_str().unwrap()]);
     assert_eq!(code, Some(78), "{stderr}");
-    assert!(stderr.contains("service.toml:2:10: metrics.listen: "), "{stderr}");
+    told += &stderr;
+    insta::assert_snapshot!(told.replace(folder.path().to_str().unwrap(), "FOLDER"));
 }

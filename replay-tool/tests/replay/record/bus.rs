@@ -178,7 +178,7 @@ async fn what_is_published_is_in_the_file() {
     let said: Vec<_> = metadata.iter().map(|record| record.values["record"].as_str()).collect();
     assert_eq!(said, ["beginning", "end"]);
     assert_eq!(metadata[0].values["units"], "A-1 B-2");
-    assert!(metadata[0].values["wire_versions"].contains("raw_gyro 1 to 1"));
+    assert!(metadata[0].values["wire_versions"].split(", ").any(|range| range == "raw_gyro 1 to 1"));
     assert_eq!(metadata[1].values["written"], "4001");
     let text = format!("{metadata:?}");
     assert!(!text.contains("127.0.0.1") && !text.contains(bench.folder.path().to_str().unwrap()), "{text}");
@@ -285,7 +285,7 @@ async fn what_does_not_fit_the_queue_is_counted_per_topic() {
     recorder.interrupt();
     let (code, summary, errors) = recorder.end();
     assert_eq!(code, Some(3), "{errors}");
-    assert!(errors.contains("3 of 304 "), "{errors}");
+    insta::assert_snapshot!(errors.replace(bench.folder.path().to_str().unwrap(), "FOLDER"));
     let topic = |index: usize| {
         let topic = &summary["topics"][index];
         (topic["received"].as_u64(), topic["written"].as_u64(), topic["lost"].as_u64())

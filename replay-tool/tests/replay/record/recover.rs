@@ -43,12 +43,12 @@ fn what_is_lost_is_said_and_the_old_file_stays() {
     let output = replay(path, &["recover", "a.mcap", "--out", "c.mcap"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(3), "{text}");
-    assert!(text.contains("imu/A-1/raw/temp: 10 of 100 "), "{text}");
     assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
 
     let refused =
         [["a.mcap", "--out", "a.mcap"], ["a.mcap", "--out", "c.mcap"], ["missing.mcap", "--out", "d.mcap"]];
-    insta::assert_snapshot!(refused.map(|args| told(path, &[&["recover"], &args[..]].concat())).concat());
+    let refused = refused.map(|args| told(path, &[&["recover"], &args[..]].concat())).concat();
+    insta::assert_snapshot!(format!("{}\n{refused}", text.lines().last().unwrap()));
     assert_eq!(fs::read(path.join("a.mcap")).unwrap(), damaged);
     assert_eq!(replay(path, &["recover", "a.mcap", "--out", "c.mcap", "--overwrite"]).status.code(), Some(3));
 }

@@ -254,8 +254,9 @@ mod tests {
         for series in [1, 2, 1, 2, 1] {
             arrivals.note(GYRO, Some(series), now);
         }
-        assert!(arrivals.look(now, &counters(400, 0)).unwrap().contains("series 2 and 1"));
+        let by_turns = arrivals.look(now, &counters(400, 0)).unwrap();
         assert_eq!(arrivals.look(now, &counters(800, 0)), None, "it is over");
-        assert!(arrivals.look(now, &counters(1200, 200)).unwrap().contains("200 of 400"));
+        let late = arrivals.look(now, &counters(1200, 200)).unwrap();
+        insta::assert_snapshot!([by_turns, late].join("\n"));
     }
 }
