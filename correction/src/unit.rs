@@ -230,9 +230,6 @@ impl Unit {
             if front.restart {
                 self.accels.starts_anew(front.tick.end_time, &mut self.pipeline.counters);
             }
-            if !front.due {
-                return;
-            }
             let accel = self.accels.partner(front.tick, &mut self.pipeline.counters);
             let met = accel.is_some();
             if !met && self.pipeline.expects_accels() && !front.expired {

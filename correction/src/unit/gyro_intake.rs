@@ -38,20 +38,10 @@ pub(super) struct Pending {
     refused_before: u64,
 }
 
-impl Pending {
-    /// Whether an earlier tick of its series may still be on its way: the first of a new run that does not count from 0.
-    /// A jump is believed after many ticks: what comes before them is none of its.
-    fn waits_for_earlier(&self) -> bool {
-        self.restart && self.tick.sequence > 0 && self.refused_before == 0
-    }
-}
-
 /// The tick that is to leave next.
 #[derive(Debug)]
 pub(super) struct Front<'a> {
     pub(super) tick: &'a GyroTick,
-    /// It waits for no earlier tick.
-    pub(super) due: bool,
     /// Its window has passed: it waits for nothing any more.
     pub(super) expired: bool,
     /// It starts a new series.
@@ -103,12 +93,6 @@ struct Newest {
     end_time: Timestamp,
 }
 
-impl Newest {
-    fn of(tick: &GyroTick) -> Self {
-        Self { sequence: tick.sequence, end_time: tick.end_time }
-    }
-}
-
 /// Memory of the gyro stream.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct GyroIntake {
@@ -134,12 +118,7 @@ pub(super) struct GyroIntake {
 
 /// What became of a tick.
 enum Admission {
-    Admitted {
-        restart: bool,
-        refused_before: u64,
-    },
-    /// Admitted as the first of its series, before a tick that was taken for it and has not left.
-    First,
+    Admitted { restart: bool, refused_before: u64 },
     Refused,
 }
 
@@ -185,7 +164,7 @@ impl GyroIntake {
     pub(super) fn passed(&mut self, run: &[GyroTick]) {
         let Some(last) = run.last() else { return };
         self.jump = None;
-        self.newest = Some(Newest::of(last));
+        self.newest = Some(Newest { sequence: last.sequence, end_time: last.end_time });
         let count = u32::try_from(run.len()).unwrap_or(u32::MAX);
         // So many ones behind what there was.
         self.released = self.released.wrapping_add(1).checked_shl(count).unwrap_or(0).wrapping_sub(1);
@@ -206,17 +185,12 @@ impl GyroIntake {
             counters.bad_duration += 1;
             return false;
         }
-        let (restart, refused_before) = match self.judge(tick, counters) {
-            Admission::Admitted { restart, refused_before } => (restart, refused_before),
-            Admission::First => {
-                self.insert_first(tick, output);
-                return false;
-            }
-            Admission::Refused => return false,
+        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else {
+            return false;
         };
         let pending = Pending { tick: tick.clone(), output, batch_end: None, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
-            self.newest = Some(Newest::of(tick));
+            self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
             self.restarts_pending += usize::from(restart);
             self.pending.push_back(pending);
             self.batch += 1;
@@ -299,11 +273,6 @@ impl GyroIntake {
                     counters.gyro_duplicates += 1;
                     Admission::Refused
                 }
-                Ordering::Less
-                    if first.waits_for_earlier() && plausible_step(Newest::of(tick), &first.tick) =>
-                {
-                    Admission::First
-                }
                 Ordering::Less => {
                     counters.gyro_implausible += 1;
                     self.follow_jump(tick, OLD_BELIEVED_AFTER, counters)
@@ -352,17 +321,6 @@ impl GyroIntake {
         Admission::Admitted { restart: true, refused_before: refused }
     }
 
-    /// Puts a tick before the one that was taken for the first of its series.
-    fn insert_first(&mut self, tick: &GyroTick, output: OutputKind) {
-        let Some(place) = self.pending.iter().rposition(|pending| pending.restart) else { return };
-        if let Some(second) = self.pending.get_mut(place) {
-            second.restart = false;
-        }
-        let first = Pending { tick: tick.clone(), output, batch_end: None, restart: true, refused_before: 0 };
-        self.pending.insert(place, first);
-        self.batch += 1;
-    }
-
     /// Puts a tick that came out of order in its place among those that wait.
     fn insert_between(&mut self, pending: Pending, counters: &mut Counters) {
         // Only ticks behind the last restart can still be joined.
@@ -386,7 +344,7 @@ impl GyroIntake {
         self.batch += 1;
     }
 
-    /// The tick that is to leave next.
+    /// The tick that is to leave next; `None` while it must wait for a missing neighbour.
     pub(super) fn front(&self, window: Span, flushing: bool) -> Option<Front<'_>> {
         let front = self.pending.front()?;
         // What waits before a restart lives in another time: the newest tick says nothing of its window.
@@ -396,9 +354,8 @@ impl GyroIntake {
             .newest
             .is_some_and(|newest| newest.end_time > batch_end && newest.end_time >= batch_end + window);
         let expired = flushing || restarted_behind || passed || self.pending.len() > MAX_PENDING;
-        let follows =
-            if front.restart { !front.waits_for_earlier() } else { self.distance(&front.tick) == Some(1) };
-        Some(Front { tick: &front.tick, due: follows || expired, expired, restart: front.restart })
+        let in_sequence = front.restart || self.distance(&front.tick) == Some(1);
+        (in_sequence || expired).then_some(Front { tick: &front.tick, expired, restart: front.restart })
     }
 
     /// How far a tick lies ahead of the last one that was released; `None` before the first.

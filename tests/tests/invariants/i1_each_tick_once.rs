@@ -119,42 +119,17 @@ fn i1_a_stretch_of_old_ticks_sent_again_gives_nothing() {
     assert_eq!(account(&out), (1100, 0));
 }
 
-/// A batch of a run of the producer.
-fn in_series(series: u64, k: u64) -> [Owned; 2] {
-    let [accels, Owned::Gyro(mut gyros)] = batch(k) else { unreachable!("a batch ends with its gyro ticks") };
-    gyros[0].series = series;
-    [accels, Owned::Gyro(gyros)]
-}
-
-#[test]
-fn i1_the_first_ticks_of_a_new_run_may_come_in_any_order() {
-    for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 0, 3, 2], [2, 0, 1, 3]] {
-        // Later and earlier than the run before, or from 0.
-        for begin in [500, 40, 0] {
-            let mut unit = drive::unit(&compile(&identity()));
-            let mut out = Vec::new();
-            (100..150)
-                .flat_map(|k| in_series(1, k))
-                .for_each(|event| drive::hand(&mut unit, &event, &mut out));
-            let first = if begin == 0 { vec![0, 1, 2, 3] } else { order.map(|k| begin + k).to_vec() };
-            for event in first.into_iter().chain(begin + 4..begin + 50).flat_map(|k| in_series(2, k)) {
-                drive::hand(&mut unit, &event, &mut out);
-            }
-            unit.handle(Event::Flush, &mut |tick| out.push(tick.clone()));
-            let sequences = out.iter().map(|tick| tick.sequence);
-            assert!(sequences.eq((100..150).chain(begin..begin + 50)), "{begin}, {order:?}");
-            let restarts = out.iter().map(|tick| tick.flags.contains(TickFlags::RESTART));
-            assert!(restarts.eq((0..out.len()).map(|i| i == 50)), "{begin}, {order:?}");
-            let [rest, counters] = [out.iter().map(|tick| tick.missed).sum(), unit.counters().gyro_late];
-            assert_eq!((rest, counters, unit.counters().accel_unpaired), (0, 0, 0), "{begin}, {order:?}");
-        }
-    }
-}
-
 #[test]
 fn i1_a_producer_that_says_it_starts_anew_loses_nothing() {
     let mut unit = drive::unit(&compile(&identity()));
     let mut out = Vec::new();
+    let in_series = |series, k| {
+        let [accels, Owned::Gyro(mut gyros)] = batch(k) else {
+            unreachable!("a batch ends with its gyro ticks")
+        };
+        gyros[0].series = series;
+        [accels, Owned::Gyro(gyros)]
+    };
     for series in [10, 30, 20] {
         // The same short log again and again, its first message twice, and then one from the run before.
         let first = in_series(series, 0).into_iter().chain(in_series(series, 0));
