@@ -34,7 +34,7 @@ pub use curve::{Curve, Judged, Rest, judge, output_unit};
 pub use figures::{alike, counted, fixed, or_dash, per_deg_c, short, six, superscript, table, within};
 pub(crate) use page::bars;
 pub use sigma::Sigmas;
-pub use verdict::{FLAT, SAME_SHARE, Verdict, beside, is_worse, residuals};
+pub use verdict::{FLAT, SAME_SHARE, Verdict, beside, few, is_worse, residuals};
 
 pub(crate) use words::{grouped, gyros, of_logs, together};
 

@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::{far, frozen, judging, quiet};
 use crate::numbers::{Size, dot, is_white, norm, real};
-use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short};
+use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short, six};
 use crate::runs::Watch;
 use crate::runs::swapped::{Shown, by_curves, force_at_rest, moved};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
@@ -40,8 +40,6 @@ const WINDOW_S: f64 = 10.0;
 const SAME: f64 = 1e-9;
 /// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
 const DEAD: f64 = 1e-3;
-/// Share of a window that must be there: of a unit at rest its mean lacks nothing by a tick in a hundred.
-const ALMOST_WHOLE: f64 = 0.99;
 /// Share of windows that should be whole.
 const WHOLE: f64 = 0.9;
 /// Least part of the Earth's rate that is told of what is left, and what else there may be beside it.
@@ -88,18 +86,29 @@ pub fn validate(
     for (log, (faults, _, left_out)) in logs.iter().zip(readings) {
         let run = &log.run.without(left_out);
         let documents = [written.loaded.clone(), bare.clone()];
-        let rows = Rows { whole: Some(ALMOST_WHOLE), ..Rows::valid(window_s) };
+        let rows = Rows::mostly_valid(window_s);
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
         let tables = Table::together_seen(run, &documents, rows, &mut watch, seen)?;
         let mut tables = tables.into_iter();
         let mut next = || tables.next().unwrap_or_default();
         let (after, nominal) = (next(), next());
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
-            let nothing = format!(
-                "{}: {name} gives no valid rate for any gyro tick: check that it is the document of this unit, and \
-                 the mapping",
-                run.name
-            );
+            let good_s: f64 = after.taken_s[0].iter().sum();
+            let nothing = if good_s > 0.0 {
+                format!(
+                    "{}: no window of {} s is complete, though {} s of rates are valid: look for gaps and flags with \
+                     isotherm-replay correct, or choose a shorter --window",
+                    run.name,
+                    six(window_s),
+                    short(good_s)
+                )
+            } else {
+                format!(
+                    "{}: {name} gives no valid rate for any gyro tick: check that it is the document of this unit, and \
+                     the mapping",
+                    run.name
+                )
+            };
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
         }
         if let Some(reason) = at_rest(&run.name, &after) {

@@ -62,15 +62,10 @@ impl Verdict {
     /// Refused where few of so many windows are whole: the others may say something else.
     fn unless_few(self, all: usize) -> Self {
         let [Size { count, .. }, _] = self.deciding();
-        let few = real(count) < LEAST_SHARE * real(all);
-        if !few {
-            return self;
+        match few([count, all]) {
+            Some(why) => self.refused(why),
+            None => self,
         }
-        self.refused(format!(
-            "{count} of {all} windows are complete, at least {:.0} % must be: look for gaps and flags with \
-             isotherm-replay correct, and choose another --window if the log has gaps",
-            100.0 * LEAST_SHARE
-        ))
     }
 
     /// Refused where these values have grown by more than noise.
@@ -170,6 +165,17 @@ pub const SAME_SHARE: f64 = 0.01;
 const ACCIDENT: f64 = 1e-3;
 /// Times by which an rms grows at most by noise.
 const LARGEST_GROWTH: f64 = 2.0;
+
+/// That few windows are complete, of all.
+pub fn few([complete, all]: [usize; 2]) -> Option<String> {
+    (real(complete) < LEAST_SHARE * real(all)).then(|| {
+        format!(
+            "{complete} of {all} windows are complete, at least {:.0} % must be: look for gaps and flags with \
+             isotherm-replay correct, and choose another --window if the log has gaps",
+            100.0 * LEAST_SHARE
+        )
+    })
+}
 
 /// Whether a change made something worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

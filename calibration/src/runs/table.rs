@@ -52,6 +52,11 @@ impl Rows {
         Self { length_s, takes: Takes::Valid, whole: Some(0.999) }
     }
 
+    /// Windows of valid ticks of which less than a fifth is missing: single readings that are no numbers take no window away.
+    pub const fn mostly_valid(length_s: f64) -> Self {
+        Self { whole: Some(0.8), ..Self::valid(length_s) }
+    }
+
     /// Every tick.
     pub const TICKS: Self = Self { length_s: 0.0, takes: Takes::All, whole: None };
 }

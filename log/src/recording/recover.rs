@@ -132,7 +132,8 @@ impl Recovery {
                 &mut watch,
             )?;
         }
-        if report.chunks + report.attachments + report.metadata == 0 && !self.begins_well {
+        let is_damaged = report.damaged_places > 0 || !self.begins_well;
+        if report.chunks + report.attachments + report.metadata == 0 && is_damaged {
             // What was written holds nothing.
             let _ = std::fs::remove_file(output);
             let source = std::io::Error::other("nothing in it is intact, or it is not a recording");

@@ -64,10 +64,11 @@ impl Worker {
     pub(super) fn note_refusal(&mut self, request: &Request, bytes: &[u8], decision: &Decision) {
         let Decision { unit, problems, .. } = decision;
         let unit = unit.as_ref();
-        self.count_refusal(unit, problems.first());
+        // A dry run changes nothing, and nobody is to be woken by one.
         if request.options.dry_run {
             return;
         }
+        self.count_refusal(unit, problems.first());
         let digest = Digest::of(bytes);
         let same = (unit.cloned(), request.source.clone(), digest);
         if !self.refusals.is_news(Instant::now(), same) {

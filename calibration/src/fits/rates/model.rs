@@ -105,7 +105,8 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     };
     let widened = chi_square > limit;
     if widened {
-        covariance *= chi_square;
+        let along: Vec<f64> = points.iter().map(|point| along(point) / point.sigma).collect();
+        covariance = wide_enough(&build(asymmetric), covariance, &left, (&along, chi_square));
     }
     let last = beta.len() - 1;
     let (gain, gain_sigma, axis, axis_sigma) = if spans {
@@ -139,6 +140,34 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     })
 }
 
+/// The covariance of a fit that leaves more than noise of its rows: all are noisier than was thought, or the rates of the table scatter
+/// by a share of the rate that the gyro feels (`along`, over the noise), whichever is likelier. Where rates scatter, the steps about the
+/// gyro's own axis tell of its scale factor and have nearly all of the scatter.
+fn wide_enough(
+    x: &DMatrix<f64>,
+    inverse: DMatrix<f64>,
+    left: &DVector<f64>,
+    (along, chi_square): (&[f64], f64),
+) -> DMatrix<f64> {
+    let spare = |row: usize| 1.0 - (x.row(row) * &inverse * x.row(row).transpose())[(0, 0)];
+    let spare: Vec<f64> = (0..x.nrows()).map(spare).collect();
+    let by_rate: f64 = spare.iter().zip(along).map(|(spare, along)| spare * along * along).sum();
+    let share = ((left.norm_squared() - spare.iter().sum::<f64>()) / by_rate).max(0.0);
+    let scattered: Vec<f64> = along.iter().map(|along| 1.0 + share * along * along).collect();
+    let unlikely = |variance: &[f64]| -> f64 {
+        variance
+            .iter()
+            .zip(left.iter())
+            .map(|(variance, left)| libm::log(*variance) + left * left / variance)
+            .sum()
+    };
+    if unlikely(&scattered) >= unlikely(&vec![chi_square; along.len()]) {
+        return inverse * chi_square;
+    }
+    let spread = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| scattered[i] * x[(i, j)]);
+    &inverse * (x.transpose() * spread) * &inverse
+}
+
 /// Directions that the steps span.
 fn rank(points: &[Point]) -> usize {
     let sum = points.iter().fold(nalgebra::Matrix3::zeros(), |sum, point| {
@@ -150,4 +179,34 @@ fn rank(points: &[Point]) -> usize {
     // Rates of the Earth's size span nothing.
     let least = (1e-4 * largest).max(1e6);
     values.iter().filter(|value| **value > least).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::noise;
+
+    #[test]
+    fn standard_errors_hold_where_the_tables_rates_scatter() {
+        const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let rates = [10.0, -10.0, 50.0, -50.0, 100.0, -100.0].map(|rate| 3600.0 * rate);
+        let mut noise = noise();
+        let (mut squares, mut count) = ([0.0; 2], 0.0);
+        for _ in 0..200 {
+            let point = |(axis, rate): ([f64; 3], f64)| {
+                let shown = dot([1.0, 1e-3, 0.0], axis) * rate * (1.0 + 500e-6 * noise()) + noise();
+                Point { rate: axis.map(|along| along * rate), shown, sigma: 1.0 }
+            };
+            let steps = AXES.into_iter().flat_map(|axis| rates.map(|rate| (axis, rate)));
+            let found = solve(&steps.map(point).collect::<Vec<_>>(), AXES[0]).unwrap();
+            let ([gain, sigma], [asymmetry, of_asymmetry]) = (found.gain, found.asymmetry.unwrap());
+            squares[0] += ((gain - norm([1.0, 1e-3, 0.0])) / sigma).powi(2);
+            squares[1] += (asymmetry / of_asymmetry).powi(2);
+            count += 1.0;
+        }
+        assert!(
+            squares.iter().all(|sum| (0.5..1.5).contains(&(sum / count).sqrt())),
+            "{squares:?} of {count}"
+        );
+    }
 }

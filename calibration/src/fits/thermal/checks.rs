@@ -117,15 +117,15 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
     let share = real(bad) / real(readings.len().max(1));
     if share > 0.5 {
         let why = format!(
-            "{name}: {of}: {:.0} % of its readings are not numbers: check the sensor, and the column in the mapping",
+            "{:.0} % of its readings are not numbers: check the sensor, and the column in the mapping",
             100.0 * share
         );
-        found.refusals.push(why);
+        found.dead.push((gyro, index, why));
         return;
     }
     if bad > 0 {
         found.warnings.push(format!(
-            "{name}: {of}: {bad} readings are not numbers ({:.3} %); the windows with them are left out",
+            "{name}: {of}: {bad} readings are not numbers ({:.3} %); windows with many of them are left out",
             100.0 * share
         ));
     }

@@ -206,7 +206,7 @@ impl Outcome {
 
 impl Stage<'_> {
     fn tables(&self, loaded: &[Loaded], watch: impl Watch) -> Result<Vec<Table>, Error> {
-        Table::together(self.run, loaded, Windows::valid(self.window_s), watch)
+        Table::together(self.run, loaded, Windows::mostly_valid(self.window_s), watch)
     }
 
     /// On a table the accelerometers feel its turning, too.

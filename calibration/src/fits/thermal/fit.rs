@@ -18,7 +18,7 @@ use super::target::{rest, target};
 use crate::document::{Fitted, accelerometers};
 use crate::error::Error;
 use crate::finding::ThermalKind;
-use crate::report::{Rest, six};
+use crate::report::{Rest, few, six};
 use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
 use crate::runs::{Run, Watch};
@@ -131,7 +131,10 @@ pub fn fit(
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));
     }
-    let sensors = sensors(&plain, &dead);
+    let mut sensors = sensors(&plain, &dead);
+    for sensor in sensors.iter_mut().filter(|sensor| sensor.dead.is_none()) {
+        sensor.dead = few_windows(sensor, samples.iter().zip(&stands));
+    }
     let histories = histories(&plain, &filter, &sensors, &samples, &mut warnings)?;
     let targets: Vec<Target> = sensors
         .iter()
@@ -186,6 +189,14 @@ fn stands_as_stated(
     found.refusals.extend(stands.refusals);
     found.warnings.extend(stands.warnings);
     Ok((Some(rest), found))
+}
+
+/// Why a sensor cannot be fitted of which few windows are complete: the others must not wait for it.
+fn few_windows<'a>(sensor: &Sensor, runs: impl Iterator<Item = (&'a Samples, &'a Stand)>) -> Option<String> {
+    // On a table the accelerometers take no part.
+    let takes_part = runs.filter(|(_, stand)| sensor.gyro || stand.turning.is_none());
+    let counts = takes_part.map(|(run, _)| run.complete(sensor.gyro, sensor.index));
+    few(counts.fold([0, 0], |[complete, all], [own, of]| [complete + own, all + of]))
 }
 
 /// Every sensor that follows a channel.

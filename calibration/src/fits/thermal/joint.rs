@@ -54,8 +54,10 @@ impl<'a> Joint<'a> {
                 (sensor, target, Trials::of(target, &columns, &terms, &noise, pieces))
             })
             .collect();
+        // One of which nothing can be judged has no say.
+        let judged = trials.iter().filter(|(_, _, trials)| trials.score(&Spec::default()).is_some());
         let both: Vec<(bool, &Trials<'_>)> =
-            trials.iter().map(|(sensor, _, trials)| (sensor.gyro, trials)).collect();
+            judged.map(|(sensor, _, trials)| (sensor.gyro, trials)).collect();
         let best = together(&plans, &both);
         Ok(Self { columns, known, plans, trials, best })
     }

@@ -12,7 +12,7 @@ use super::joint::Found;
 use super::model::{put_accel, put_gyro};
 use super::settings::Settings;
 use super::stand::Stand;
-use super::told::wider;
+use super::told::{stepping, wider};
 use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
@@ -21,6 +21,9 @@ use crate::numbers::{Size, once_each};
 use crate::report::{Curve, FLAT, Judged, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
+
+/// Why a sensor is refused that nothing can judge.
+const NO_WINDOW: &str = "none of its windows is complete: look for gaps and flags with isotherm-replay correct, and choose a shorter --window";
 
 /// Everything that gathers on the way.
 #[derive(Debug)]
@@ -121,7 +124,7 @@ impl Outcome {
                 let rest = Rest { levels: shares.then(|| compared.levels()), ..rest(run, &stand)? };
                 // On a table the accelerometers feel its turning, too.
                 let counts = if stand.turning.is_none() { "" } else { "gyro" };
-                Ok((rest, Rows::valid(stand.window_s(window_s)), counts))
+                Ok((rest, Rows::mostly_valid(stand.window_s(window_s)), counts))
             };
             let Judged { mut curves, mut troubles } =
                 judge((runs, judges), [&before, &written], of_run, &mut watch)?;
@@ -150,6 +153,7 @@ impl Outcome {
         }
         self.warnings.extend(judges.is_empty().then(|| self.not_judged()).flatten());
         self.warnings.extend(wider(&curves, &verdicts));
+        self.warnings.extend(stepping(&curves, &verdicts));
         let any_accepted = self.found.iter().any(|(.., found)| found.refused.is_none());
         self.warnings.extend(any_accepted.then(|| self.kept_terms()).flatten());
         let about = self.about();
@@ -193,19 +197,18 @@ impl Outcome {
     /// Takes the terms of sensors out whose axis became worse, by the verdicts or than it is with the document before; whether there was
     /// one.
     fn take_out(&mut self, verdicts: &[Verdict], compared: &Compared) -> bool {
-        let why = |sensor: &Sensor| {
+        let why = |(sensor, _, found): &(Sensor, Basis, Found)| {
             let axis = axis_name(sensor)?;
-            let worse =
-                verdicts.iter().find(|verdict| verdict.of == axis && !verdict.accepted).map(|verdict| {
-                    let sample =
-                        if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
-                    format!("{sample} its {}", verdict.reason)
-                });
+            let Some(verdict) = verdicts.iter().find(|verdict| verdict.of == axis) else {
+                return (!found.terms.is_empty()).then(|| NO_WINDOW.to_owned());
+            };
+            let sample = if verdict.out_of_sample.is_some() { "on the judging run" } else { "in sample" };
+            let worse = (!verdict.accepted).then(|| format!("{sample}: {}", verdict.reason));
             let than_before = || compared.before_is_better(axis_of(sensor)?).map(|kind| kind.to_string());
             worse.or_else(|| than_before().filter(|_| self.had_terms(sensor)))
         };
-        let standing = self.found.iter().map(|(sensor, _, found)| found.refused.is_none().then_some(sensor));
-        let reasons: Vec<Option<String>> = standing.map(|sensor| why(sensor?)).collect();
+        let reason = |of: &(Sensor, Basis, Found)| if of.2.refused.is_none() { why(of) } else { None };
+        let reasons: Vec<Option<String>> = self.found.iter().map(reason).collect();
         for ((.., found), why) in self.found.iter_mut().zip(&reasons).filter(|(_, why)| why.is_some()) {
             found.refused.clone_from(why);
             found.terms.clear();
@@ -258,8 +261,17 @@ impl Outcome {
         }
     }
 
-    /// Gives the verdicts their reasons.
-    fn say(&self, verdicts: &mut [Verdict]) {
+    /// Gives the verdicts their reasons, and a refused sensor of which no window is complete a verdict of its own.
+    fn say(&self, verdicts: &mut Vec<Verdict>) {
+        let nothing = |found: &Found| found.dead || found.refused.as_deref() == Some(NO_WINDOW);
+        let unseen = self.found.iter().filter(|(.., found)| nothing(found));
+        for axis in unseen.filter_map(|(sensor, ..)| axis_name(sensor)) {
+            if verdicts.iter().all(|verdict| verdict.of != axis) {
+                verdicts.push(Verdict::said(axis, ""));
+            }
+        }
+        let place = |of: &str| (0..6).position(|axis| output_name(axis < 3, axis % 3) == of);
+        verdicts.sort_by_key(|verdict| place(&verdict.of).unwrap_or(usize::MAX));
         for verdict in verdicts {
             let mine = self.found.iter().find(|(sensor, ..)| axis_name(sensor).as_ref() == Some(&verdict.of));
             let Some((sensor, _, found)) = mine else {

@@ -30,7 +30,7 @@ pub struct Samples {
     pub window_s: f64,
     /// Middle of each window since the start (s).
     pub time_s: Vec<f64>,
-    /// Mean rate of each gyro (°/h); a window that is not whole has no number.
+    /// Mean rate of each gyro (°/h); a window of which a fifth or more is missing has no number.
     pub gyros: Vec<Vec<f64>>,
     /// Mean output of each accelerometer less nothing but what its scale needs: specific force (m/s²).
     pub forces: Vec<Vec<f64>>,
@@ -68,7 +68,7 @@ impl Samples {
             kinds.iter().flat_map(|document| (0..patterns).map(|pattern| along_axes(document, pattern)));
         let loaded: Vec<Loaded> =
             documents.map(|document| Written::compiled(&document)).collect::<Result<_, Error>>()?;
-        let tables = Table::together(run, &loaded, Rows::valid(window_s), watch)?;
+        let tables = Table::together(run, &loaded, Rows::mostly_valid(window_s), watch)?;
         let rates: Vec<[&[f64]; 3]> =
             tables.iter().take(patterns).map(|table| [0, 1, 2].map(|axis| table.rate(axis))).collect();
         let forces: Vec<[&[f64]; 3]> =
@@ -94,6 +94,15 @@ impl Samples {
             deg_c: temperature_deg_c,
             troubles,
         })
+    }
+}
+
+impl Samples {
+    /// Windows of a sensor that have numbers, and all.
+    pub fn complete(&self, gyro: bool, index: usize) -> [usize; 2] {
+        let outputs = if gyro { &self.gyros } else { &self.forces };
+        let own = outputs.get(index).map_or(&[][..], Vec::as_slice);
+        [own.iter().filter(|value| value.is_finite()).count(), own.len()]
     }
 }
 

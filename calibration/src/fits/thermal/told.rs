@@ -12,6 +12,7 @@ use super::outcome::Outcome;
 use super::scale::Kept;
 use super::select::{Target, Tried};
 use crate::document::{About, by_name};
+use crate::fits::drift::pieces::steps;
 use crate::numbers::Size;
 use crate::report::{Curve, Report, Sigmas, Verdict, is_worse, output_unit, short};
 
@@ -165,6 +166,26 @@ pub(super) fn wider(curves: &[Curve], verdicts: &[Verdict]) -> Vec<String> {
         })
     };
     verdicts.iter().filter(|verdict| verdict.accepted).filter_map(words).collect()
+}
+
+/// Share of a step that the terms must leave for it to be told: what heat makes they take.
+const LEFT_OF_STEP: f64 = 0.25;
+
+/// Runs of the fit in which an axis with terms steps from one level to another, whatever they do.
+pub(super) fn stepping(curves: &[Curve], verdicts: &[Verdict]) -> Vec<String> {
+    let stands = |of: &str| verdicts.iter().any(|verdict| verdict.of == of && verdict.accepted);
+    let fitted = curves.iter().filter(|curve| curve.sample == Sample::In && stands(&curve.of));
+    let words = |curve: &Curve| {
+        let [(before, at), (after, _)] =
+            [steps::step_in(&curve.before, 1)?, steps::step_in(&curve.after, 1)?];
+        let [whole, left] = [before, after].map(|step| (step.behind - step.before).abs());
+        let stays = before.part.abs_diff(after.part) <= 1 && left >= LEFT_OF_STEP * whole;
+        let called = format!("{}: {}", curve.run, curve.of);
+        stays.then(|| {
+            steps::words((&called, &curve.measure), before, curve.time_s.get(at).copied().unwrap_or(0.0))
+        })
+    };
+    fitted.filter_map(words).collect()
 }
 
 /// Unit of a sensor's bias.

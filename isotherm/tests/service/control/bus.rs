@@ -99,6 +99,7 @@ async fn a_dry_run_says_what_would_happen_and_changes_nothing() {
     assert!(!reply.difference.unwrap().correction.is_empty());
     assert_refused(&stand.swap(UNIT, "schema = 1", &dry).await, &["gyro"]);
     assert_eq!(stand.revisions(UNIT, 10).await, [1]);
+    assert_eq!(stand.status(UNIT).swaps.refused, 0, "nobody is to be woken by a dry run");
     let entries = stand.history(UNIT).await;
     assert!(!entries.iter().any(|entry| matches!(entry.event, AuditEvent::Refused(_))), "{entries:#?}");
     stand.stop().await;

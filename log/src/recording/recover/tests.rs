@@ -197,6 +197,11 @@ fn what_is_no_recording_is_refused_and_nothing_is_written_over() {
     let error = recover(&input, &output, RecordingOptions::default()).unwrap_err();
     assert!(error.to_string().starts_with(input.to_str().unwrap()), "{error}");
     assert!(!output.exists());
+    // Nothing is whole behind the beginning.
+    write(&input, false);
+    let whole = std::fs::read(&input).unwrap();
+    std::fs::write(&input, &whole[..70]).unwrap();
+    assert!(recover(&input, &output, RecordingOptions::default()).is_err() && !output.exists());
     let overwrite = RecordingOptions { overwrite: true, ..RecordingOptions::default() };
     assert!(recover(&input, &input, overwrite).is_err());
     std::fs::write(&output, "mine").unwrap();

@@ -128,7 +128,12 @@ pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, 
         let called = format!("{} {name}", columns.kind.sensor());
         let unlike = if columns.frozen.is_empty() { unlike(&called, columns, noise) } else { None };
         // Where the noise changes, a step is one more sign of what is told already.
-        notes.extend(unlike.or_else(|| steps::words(&called, columns, column)));
+        let step = || {
+            let (step, tick) = steps::step_in(column, steps::FEWEST_TICKS)?;
+            let words = steps::words((&called, columns.kind.measure()), step, columns.since_s(tick));
+            Some(format!("warning: {words}"))
+        };
+        notes.extend(unlike.or_else(step));
     }
     Ok(notes)
 }

@@ -1,12 +1,11 @@
 //! A step in readings that are otherwise steady: no drift, but a log of two states.
 
-use crate::fits::drift::columns::Columns;
 use crate::numbers::{SIGMA_PER_MAD, median, real};
 use crate::report::short;
 
 /// Parts of a log whose means are compared, and the fewest ticks of one.
 const PARTS: usize = 128;
-const FEWEST_TICKS: usize = 16;
+pub(super) const FEWEST_TICKS: usize = 16;
 /// Parts that must be there before and behind a step.
 const BESIDE: usize = 4;
 /// A step stands so far out of all changes (robust standard deviations), and so many times out of those near it.
@@ -53,18 +52,22 @@ pub(crate) fn step(means: &[f64]) -> Option<Step> {
     Some(Step { part: at + 1, before, behind })
 }
 
-/// Words where the readings step from one level to another and stay there.
-pub(super) fn words(called: &str, columns: &Columns, column: &[f64]) -> Option<String> {
-    let width = column.len().div_ceil(PARTS).max(FEWEST_TICKS);
-    let Step { part, before, behind } = step(&column.chunks_exact(width).map(mean).collect::<Vec<f64>>())?;
-    let measure = columns.kind.measure();
-    Some(format!(
-        "warning: {called} steps from {} to {} {measure} at about {:.0} s and stays there: was the unit moved, its power or its range \
+/// Where readings, or means over windows, step from one level to another and stay there, and the place in its middle; a part is at least
+/// so many.
+pub(crate) fn step_in(column: &[f64], fewest: usize) -> Option<(Step, usize)> {
+    let width = column.len().div_ceil(PARTS).max(fewest);
+    let step = step(&column.chunks_exact(width).map(mean).collect::<Vec<f64>>())?;
+    Some((step, step.part * width + width / 2))
+}
+
+/// A step in words.
+pub(crate) fn words((called, measure): (&str, &str), Step { before, behind, .. }: Step, at_s: f64) -> String {
+    format!(
+        "{called} steps from {} to {} {measure} at about {at_s:.0} s and stays there: was the unit moved, its power or its range \
          switched, or are these two logs? A step is taken for drift; cut the log there with --start and --duration",
         short(before),
-        short(behind),
-        columns.since_s(part * width + width / 2)
-    ))
+        short(behind)
+    )
 }
 
 /// Of the good readings; no number without any.

@@ -26,6 +26,9 @@ fn gyros(sensors: &[Beside]) -> Result<Option<String>, String> {
             "{} look swapped: check the columns in the mapping: they show a mirror image of the case. {words}",
             several("accelerometer", &moved, 3)
         )),
+        (0, []) => Ok(Some(format!(
+            "{words}. Or are two columns swapped in gyros and accelerometers alike? Then the document is a mirror image of the case"
+        ))),
         _ => Ok(Some(words)),
     }
 }

@@ -22,7 +22,7 @@ families! { Service "isotherm_":
         |look| faults(look, [FaultKind::OtherBits, FaultKind::TwoSpeak]);
     Counter "refused_messages" "" ["kind"] "Messages refused that belong to no known unit"
         |look| faults(look, FaultKind::ALL.iter().copied().filter(|kind| kind.is_refusal()));
-    Counter "swaps" "" ["outcome"] "Swaps accepted and refused, of all units, unknown ones included; a first document from a file is not counted"
+    Counter "swaps" "" ["outcome"] "Swaps accepted and refused, of all units, unknown ones included; dry runs and a first document from a file are not counted"
         |look| each([("accepted", look.posted.accepted), ("refused", look.posted.refused)]);
     Counter "log_lines_dropped" "" [] "Log lines dropped because stderr was blocked: a stopped terminal, a full pipe"
         |look| one(look.log_lines_dropped);
