@@ -236,6 +236,7 @@ mod tests {
             left: vec![left, -left],
             chi_square: 1e9,
             widened,
+            freedom: 1.0,
         };
         // 100 °/s about x.
         let rates = [[360_000.0, 0.0, 0.0], [-360_000.0, 0.0, 0.0]];

@@ -9,6 +9,7 @@
 //! h = C·`K_old`/K: its direction is the input axis, its length says the weight; c the asymmetry, b what is left of the bias.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use crate::finding::Kind;
 use crate::lsq::linear::{self, Linear, Weak};
@@ -18,6 +19,8 @@ use crate::numbers::{dot, norm, real};
 const SINGULAR: f64 = 1e-7;
 /// Standard deviations of its estimate by which χ² may be too large before the stated errors grow.
 const ALLOWED: f64 = 3.0;
+/// Least variance that a step is taken to leave, over that of its noise.
+const LEAST_SPARE: f64 = 1e-3;
 
 /// One step as a gyro saw it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +54,18 @@ pub struct GyroRates {
     pub chi_square: f64,
     /// Whether the standard errors were widened to cover what is left.
     pub widened: bool,
+    /// Degrees of freedom that they then rest on.
+    pub freedom: f64,
+}
+
+impl GyroRates {
+    /// Whether a value of so many standard errors is no more of an accident than `seen` of them were, if they were known. Widened ones
+    /// are known no better than the few steps about the gyro's own axis tell.
+    pub fn stands_out(&self, sigmas: f64, seen: f64) -> bool {
+        let accident = Normal::standard().sf(seen);
+        let law = StudentsT::new(0.0, 1.0, self.freedom).ok().filter(|_| self.widened);
+        law.map_or(sigmas.abs() > seen, |law| law.sf(sigmas.abs()) < accident)
+    }
 }
 
 /// Fits one gyro; `old` is its input axis in the document.
@@ -96,9 +111,8 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     let narrow = || Some(build(false)).and_then(found);
     let found = wide.or_else(narrow).ok_or(Kind::FewSteps { steps: points.len() })?;
     let Linear { coefficients: beta, inverse: mut covariance, residual: left, .. } = found;
-    let freedom = points.len() - beta.len();
-    let (chi_square, limit) = if freedom > 0 {
-        let freedom = real(freedom);
+    let mut freedom = real(points.len() - beta.len());
+    let (chi_square, limit) = if freedom > 0.0 {
         (left.norm_squared() / freedom, 1.0 + ALLOWED * (2.0 / freedom).sqrt())
     } else {
         (f64::NAN, f64::INFINITY)
@@ -106,7 +120,8 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     let widened = chi_square > limit;
     if widened {
         let along: Vec<f64> = points.iter().map(|point| along(point) / point.sigma).collect();
-        covariance = wide_enough(&build(asymmetric), covariance, &left, (&along, chi_square));
+        (covariance, freedom) =
+            wide_enough(&build(asymmetric), covariance, &left, (&along, chi_square, freedom));
     }
     let last = beta.len() - 1;
     let (gain, gain_sigma, axis, axis_sigma) = if spans {
@@ -137,35 +152,44 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
         covariance,
         chi_square,
         widened,
+        freedom,
     })
 }
 
-/// The covariance of a fit that leaves more than noise of its rows: all are noisier than was thought, or the rates of the table scatter
+/// The covariance of a fit that leaves more than noise of its rows, and the degrees of freedom that it rests on: all are noisier than was thought, or the rates of the table scatter
 /// by a share of the rate that the gyro feels (`along`, over the noise), whichever is likelier. Where rates scatter, the steps about the
 /// gyro's own axis tell of its scale factor and have nearly all of the scatter.
 fn wide_enough(
     x: &DMatrix<f64>,
     inverse: DMatrix<f64>,
     left: &DVector<f64>,
-    (along, chi_square): (&[f64], f64),
-) -> DMatrix<f64> {
-    let spare = |row: usize| 1.0 - (x.row(row) * &inverse * x.row(row).transpose())[(0, 0)];
-    let spare: Vec<f64> = (0..x.nrows()).map(spare).collect();
-    let by_rate: f64 = spare.iter().zip(along).map(|(spare, along)| spare * along * along).sum();
+    (along, chi_square, freedom): (&[f64], f64, f64),
+) -> (DMatrix<f64>, f64) {
+    // What is left of a row's own noise, and of that of the others.
+    let leaves = DMatrix::identity(x.nrows(), x.nrows()) - x * &inverse * x.transpose();
+    let spare: Vec<f64> = leaves.diagonal().iter().copied().collect();
+    let told: Vec<f64> = spare.iter().zip(along).map(|(spare, along)| spare * along * along).collect();
+    let by_rate: f64 = told.iter().sum();
     let share = ((left.norm_squared() - spare.iter().sum::<f64>()) / by_rate).max(0.0);
     let scattered: Vec<f64> = along.iter().map(|along| 1.0 + share * along * along).collect();
     let unlikely = |variance: &[f64]| -> f64 {
-        variance
-            .iter()
-            .zip(left.iter())
-            .map(|(variance, left)| libm::log(*variance) + left * left / variance)
-            .sum()
+        let of_row = |(row, left): (usize, &f64)| {
+            let own = leaves.row(row);
+            let explained: f64 =
+                own.iter().zip(variance).map(|(share, variance)| share * share * variance).sum();
+            let explained = explained.max(LEAST_SPARE);
+            libm::log(explained) + left * left / explained
+        };
+        left.iter().enumerate().map(of_row).sum()
     };
     if unlikely(&scattered) >= unlikely(&vec![chi_square; along.len()]) {
-        return inverse * chi_square;
+        return (inverse * chi_square, freedom);
     }
     let spread = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| scattered[i] * x[(i, j)]);
-    &inverse * (x.transpose() * spread) * &inverse
+    // As many as equal steps would have: those at small rates tell nothing.
+    let equal =
+        by_rate * by_rate / told.iter().zip(along).map(|(told, along)| told * along * along).sum::<f64>();
+    (&inverse * (x.transpose() * spread) * &inverse, equal)
 }
 
 /// Directions that the steps span.
@@ -185,13 +209,14 @@ fn rank(points: &[Point]) -> usize {
 mod tests {
     use super::*;
     use crate::fixture::noise;
+    use crate::numbers::median;
 
     #[test]
     fn standard_errors_hold_where_the_tables_rates_scatter() {
         const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let rates = [10.0, -10.0, 50.0, -50.0, 100.0, -100.0].map(|rate| 3600.0 * rate);
         let mut noise = noise();
-        let (mut squares, mut count) = ([0.0; 2], 0.0);
+        let (mut away, mut seen) = ([Vec::new(), Vec::new()], 0);
         for _ in 0..200 {
             let point = |(axis, rate): ([f64; 3], f64)| {
                 let shown = dot([1.0, 1e-3, 0.0], axis) * rate * (1.0 + 500e-6 * noise()) + noise();
@@ -200,13 +225,12 @@ mod tests {
             let steps = AXES.into_iter().flat_map(|axis| rates.map(|rate| (axis, rate)));
             let found = solve(&steps.map(point).collect::<Vec<_>>(), AXES[0]).unwrap();
             let ([gain, sigma], [asymmetry, of_asymmetry]) = (found.gain, found.asymmetry.unwrap());
-            squares[0] += ((gain - norm([1.0, 1e-3, 0.0])) / sigma).powi(2);
-            squares[1] += (asymmetry / of_asymmetry).powi(2);
-            count += 1.0;
+            away[0].push(((gain - norm([1.0, 1e-3, 0.0])) / sigma).abs());
+            away[1].push((asymmetry / of_asymmetry).abs());
+            seen += usize::from(found.stands_out(asymmetry / of_asymmetry, 4.0));
         }
-        assert!(
-            squares.iter().all(|sum| (0.5..1.5).contains(&(sum / count).sqrt())),
-            "{squares:?} of {count}"
-        );
+        // Half of all values lie within 0.67 standard errors, a little more where few steps tell these.
+        let middles = away.map(|away| median(&away));
+        assert!(middles.iter().all(|middle| (0.5..1.2).contains(middle)) && seen < 4, "{middles:?}, {seen}");
     }
 }

@@ -240,7 +240,9 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
         short(1e6 * worst / full),
         short(full / 3600.0)
     ));
-    if let Some([value, sigma]) = found.asymmetry.filter(|[value, sigma]| value.abs() > SEEN * sigma) {
+    if let Some([value, sigma]) =
+        found.asymmetry.filter(|[value, sigma]| found.stands_out(value / sigma, SEEN))
+    {
         report.warnings.push(format!(
             "gyro {name}: positive and negative scale factor differ by {} ± {} ppm, which is not in the document",
             short(1e6 * value),
