@@ -133,7 +133,7 @@ impl Recovery {
             )?;
         }
         let is_damaged = report.damaged_places > 0 || !self.begins_well;
-        if report.chunks + report.attachments + report.metadata == 0 && is_damaged {
+        if report.chunks + report.attachments == 0 && is_damaged {
             // What was written holds nothing.
             let _ = std::fs::remove_file(output);
             let source = std::io::Error::other("nothing in it is intact, or it is not a recording");

@@ -156,9 +156,11 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     })
 }
 
-/// The covariance of a fit that leaves more than noise of its rows, and the degrees of freedom that it rests on: all are noisier than was thought, or the rates of the table scatter
-/// by a share of the rate that the gyro feels (`along`, over the noise), whichever is likelier. Where rates scatter, the steps about the
-/// gyro's own axis tell of its scale factor and have nearly all of the scatter.
+/// The covariance of a fit that leaves more than noise of its rows, and the degrees of freedom that it rests on.
+///
+/// All rows are noisier than was thought, or the rates of the table scatter by a share of the rate that the gyro feels (`along`, over the
+/// noise), whichever is likelier. Where rates scatter, the steps about the gyro's own axis alone tell of its scale factor, and have nearly
+/// all of the scatter.
 fn wide_enough(
     x: &DMatrix<f64>,
     inverse: DMatrix<f64>,
