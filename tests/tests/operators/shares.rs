@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use isotherm_bus::{SessionOptions, close, open};
 use isotherm_protocol::codec;
@@ -127,10 +127,16 @@ async fn two_pairs_share_four_hundred_units_and_a_unit_that_nobody_takes_is_show
         println!("{} units: {} kB, {:?} of computing", UNITS, used.resident_kb, used.cpu);
     }
     let connect: Vec<_> = connect.iter().flat_map(|it| ["--connect", it.as_str()]).collect();
-    let status = tokio::task::block_in_place(|| run("isotherm", &[&["status"], &connect[..]].concat()));
-    let shown = String::from_utf8_lossy(&status.stdout);
-    assert!(shown.contains("C-000"), "{shown}");
-    assert!(shown.contains("A-199") && shown.contains("B-199"), "{shown}");
+    let deadline = Instant::now() + LIMIT;
+    loop {
+        let status = tokio::task::block_in_place(|| run("isotherm", &[&["status"], &connect[..]].concat()));
+        let shown = String::from_utf8_lossy(&status.stdout);
+        if ["A-199", "B-199", "C-000"].iter().all(|unit| shown.contains(unit)) {
+            break;
+        }
+        // On a busy machine a standby takes over now and then, and for that moment nobody speaks for its units.
+        assert!(Instant::now() < deadline, "{shown}");
+    }
     over.store(true, Ordering::SeqCst);
     let sources = playing.await.unwrap();
     drop(counting);
