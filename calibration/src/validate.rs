@@ -93,22 +93,7 @@ pub fn validate(
         let mut next = || tables.next().unwrap_or_default();
         let (after, nominal) = (next(), next());
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
-            let good_s: f64 = after.taken_s[0].iter().sum();
-            let nothing = if good_s > 0.0 {
-                format!(
-                    "{}: no window of {} s is complete, though {} s of rates are valid: look for gaps and flags with \
-                     isotherm-replay correct, or choose a shorter --window",
-                    run.name,
-                    six(window_s),
-                    short(good_s)
-                )
-            } else {
-                format!(
-                    "{}: {name} gives no valid rate for any gyro tick: check that it is the document of this unit, and \
-                     the mapping",
-                    run.name
-                )
-            };
+            let nothing = nothing_valid(&run.name, name, &after);
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
         }
         if let Some(reason) = at_rest(&run.name, &after) {
@@ -169,6 +154,24 @@ pub fn validate(
     report.warnings.extend(coverage.warnings());
     report.tables.extend(coverage.tables());
     Ok(report)
+}
+
+/// That no window has a rate, and why.
+fn nothing_valid(run: &str, document: &str, table: &Table) -> String {
+    let good_s: f64 = table.taken_s[0].iter().sum();
+    if good_s > 0.0 {
+        format!(
+            "{run}: no window of {} s is complete, though {} s of rates are valid: look for gaps and flags with \
+             isotherm-replay correct, or choose a shorter --window",
+            six(table.window_s),
+            short(good_s)
+        )
+    } else {
+        format!(
+            "{run}: {document} gives no valid rate for any gyro tick: check that it is the document of this unit, and the \
+             mapping"
+        )
+    }
 }
 
 /// What a run's curves show of sensors that do not work, and of gaps.

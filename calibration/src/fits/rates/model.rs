@@ -172,8 +172,8 @@ fn wide_enough(
     let spare: Vec<f64> = leaves.diagonal().iter().copied().collect();
     let told: Vec<f64> = spare.iter().zip(along).map(|(spare, along)| spare * along * along).collect();
     let by_rate: f64 = told.iter().sum();
-    let share = ((left.norm_squared() - spare.iter().sum::<f64>()) / by_rate).max(0.0);
-    let scattered: Vec<f64> = along.iter().map(|along| 1.0 + share * along * along).collect();
+    let growth = ((left.norm_squared() - spare.iter().sum::<f64>()) / by_rate).max(0.0);
+    let scattered: Vec<f64> = along.iter().map(|along| 1.0 + growth * along * along).collect();
     let unlikely = |variance: &[f64]| -> f64 {
         let of_row = |(row, left): (usize, &f64)| {
             let own = leaves.row(row);

@@ -131,10 +131,7 @@ pub fn fit(
     if !refusals.is_empty() {
         return Err(Error::Refused(refusals));
     }
-    let mut sensors = sensors(&plain, &dead);
-    for sensor in sensors.iter_mut().filter(|sensor| sensor.dead.is_none()) {
-        sensor.dead = few_windows(sensor, samples.iter().zip(&stands));
-    }
+    let sensors = sensors(&plain, &dead, (&samples, &stands));
     let histories = histories(&plain, &filter, &sensors, &samples, &mut warnings)?;
     let targets: Vec<Target> = sensors
         .iter()
@@ -191,18 +188,23 @@ fn stands_as_stated(
     Ok((Some(rest), found))
 }
 
-/// Why a sensor cannot be fitted of which few windows are complete: the others must not wait for it.
-fn few_windows<'a>(sensor: &Sensor, runs: impl Iterator<Item = (&'a Samples, &'a Stand)>) -> Option<String> {
+/// That few windows of a sensor are complete: it cannot be fitted, and the others must not wait for it.
+fn few_windows((gyro, index): (bool, usize), samples: &[Samples], stands: &[Stand]) -> Option<String> {
     // On a table the accelerometers take no part.
-    let takes_part = runs.filter(|(_, stand)| sensor.gyro || stand.turning.is_none());
-    let counts = takes_part.map(|(run, _)| run.complete(sensor.gyro, sensor.index));
+    let takes_part = samples.iter().zip(stands).filter(|(_, stand)| gyro || stand.turning.is_none());
+    let counts = takes_part.map(|(run, _)| run.complete(gyro, index));
     few(counts.fold([0, 0], |[complete, all], [own, of]| [complete + own, all + of]))
 }
 
 /// Every sensor that follows a channel.
-fn sensors(bare: &Document, dead: &[(bool, usize, String)]) -> Vec<Sensor> {
+fn sensors(
+    bare: &Document,
+    dead: &[(bool, usize, String)],
+    (samples, stands): (&[Samples], &[Stand]),
+) -> Vec<Sensor> {
     let sensor = |gyro: bool, index: usize, name: &str, channel: Option<&String>| {
         let dead = dead.iter().find(|(g, i, _)| (*g, *i) == (gyro, index)).map(|(_, _, why)| why.clone());
+        let dead = dead.or_else(|| few_windows((gyro, index), samples, stands));
         let kind = if gyro { "gyro" } else { "accelerometer" };
         Some(Sensor { gyro, index, name: format!("{kind} {name}"), channel: channel?.clone(), dead })
     };
