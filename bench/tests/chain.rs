@@ -54,7 +54,7 @@ fn a_profile_reaches_the_one_in_the_middle() {
     let brief =
         ["--measure", "latency", "--units", "1", "--rate", "200", "--rounds", "1", "--seconds", "0.1"];
     let (well, _, words) = chain(&[&brief[..], &["--subject", "relay", "--profile", "(no RON"]].concat());
-    assert!(!well && words.contains("relay: "), "{words}");
+    assert!(!well && words.contains("relay: has ended"), "{words}");
     let (well, report, words) = chain(&[&brief[..], &["--subject", "relay", "--profile", "rx-1"]].concat());
     assert!(well && report["rows"][0]["profile"] == "rx-1", "{words}");
 }

@@ -95,9 +95,7 @@ impl Samples {
             troubles,
         })
     }
-}
 
-impl Samples {
     /// Windows of a sensor that have numbers, and all.
     pub fn complete(&self, gyro: bool, index: usize) -> [usize; 2] {
         let outputs = if gyro { &self.gyros } else { &self.forces };
