@@ -123,11 +123,17 @@ impl StepSum {
         tick: &CorrectedTick,
         emit: &mut E,
     ) {
-        if step.ticks <= 1 && !step.coning_sculling && self.open.is_none() {
-            emit(tick);
-        } else {
+        if self.sums(step) {
             self.sum(*step, tick, emit);
+        } else {
+            emit(tick);
         }
+    }
+
+    /// Whether the next tick is summed, and not a step by itself.
+    #[inline]
+    pub(crate) fn sums(&self, step: &NavigationStep) -> bool {
+        step.ticks > 1 || step.coning_sculling || self.open.is_some()
     }
 
     /// Takes one tick of a step.

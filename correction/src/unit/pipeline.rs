@@ -215,6 +215,7 @@ impl Pipeline {
         let mut untold = run.before.after(core::mem::take(&mut self.unannounced));
         let mut unseen = run.before.after(core::mem::take(&mut self.unseen));
         let mut accels = run.accels.iter();
+        let sums = self.steps.sums(&self.settings.navigation);
         if let Some(active) = &self.active {
             let out = &mut self.corrected;
             (out.ticks, out.series, out.revision) = (1, first.series, active.revision);
@@ -252,21 +253,34 @@ impl Pipeline {
                 continue;
             }
             self.corrected.missed = untold.missed;
-            if untold.missed > 0 {
-                self.corrected.flags |= TickFlags::GAP;
-                self.counters.gaps += 1;
-                self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(untold.missed);
-            } else if steps {
-                self.corrected.flags |= TickFlags::TIME_STEP;
-            }
-            if untold.restart {
-                self.corrected.flags |= TickFlags::RESTART;
+            if (untold.missed > 0) | untold.restart | steps {
+                self.announce(untold, steps);
             }
             (untold, unseen) = (Break::default(), Break::default());
             self.counters.ticks_out += 1;
-            self.steps.push(&self.settings.navigation, &self.corrected, emit);
+            if sums {
+                self.steps.push(&self.settings.navigation, &self.corrected, emit);
+            } else {
+                emit(&self.corrected);
+            }
         }
         (self.unannounced, self.unseen) = (untold, unseen);
+    }
+
+    /// Flags what lies between a tick and the one that was given out before it.
+    #[cold]
+    fn announce(&mut self, untold: Break, steps: bool) {
+        let flags = &mut self.corrected.flags;
+        if untold.missed > 0 {
+            *flags |= TickFlags::GAP;
+            self.counters.gaps += 1;
+            self.counters.ticks_missed = self.counters.ticks_missed.saturating_add(untold.missed);
+        } else if steps {
+            *flags |= TickFlags::TIME_STEP;
+        }
+        if untold.restart {
+            *flags |= TickFlags::RESTART;
+        }
     }
 }
 

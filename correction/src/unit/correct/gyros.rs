@@ -110,7 +110,7 @@ impl Corrector {
             (drift, clamped) = self.drift_with_motion(calibration, shares, scale, readings, duration_s);
             bias = array::from_fn(|lane| bias[lane] + drift[lane]);
         }
-        if reversal.is_some() || self.calm.needs.contains(Needs::SPECIAL) {
+        if self.calm.needs.contains(Needs::SWITCHES) {
             self.servo.advance(lost, time, raw.duration);
         }
         if let Some(settles_s) = calibration.servos_settle_s.filter(|_| !lost)

@@ -31,6 +31,8 @@ bitflags! {
         const POSITIONS = 1 << 8;
         /// Sensors that lag less than another, or of which something is still held back.
         const DELAYS = 1 << 9;
+        /// Switches of the mode, or special terms.
+        const SWITCHES = 1 << 10;
     }
 }
 
@@ -43,10 +45,11 @@ impl Corrector {
         let any = |has: fn(&Motion) -> bool| calibration.motion.as_deref().into_iter().chain(old).any(has);
         let is_asymmetric = |banks: &MotionBanks| banks.gyros.has_any([ASYMMETRY; 2]);
         let curves = any(Motion::has_curves);
+        let special = slews || given_up || calibration.trends.is_some() || self.drift.subtracts();
         [
             (Needs::WIDE, calibration.gyros.len().max(calibration.accels.len()) > 4),
             (Needs::MODAL, slews || self.thermal.gyros.has_any([2, 3])),
-            (Needs::SPECIAL, slews || given_up || calibration.trends.is_some() || self.drift.subtracts()),
+            (Needs::SPECIAL, special),
             (Needs::DRIFTS, !self.drift.is_idle()),
             (Needs::FORCE, any(|motion| motion.feels_force)),
             (Needs::CURVES, curves),
@@ -57,6 +60,7 @@ impl Corrector {
             (Needs::SQUARES, any(|motion| !motion.accels.is_empty())),
             (Needs::POSITIONS, any(|motion| motion.has_positions)),
             (Needs::DELAYS, any(|motion| motion.holds_back) || self.motion.held.is_some()),
+            (Needs::SWITCHES, special || calibration.reversal.is_some()),
         ]
         .into_iter()
         .filter_map(|(need, there)| there.then_some(need))
