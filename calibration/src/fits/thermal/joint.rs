@@ -226,11 +226,10 @@ impl Found {
         Some(target.flat(columns).map_or_else(
             || {
                 Self::refused(&format!(
-                    "no model beats its mean: the best one, {}, leaves {:.3e} on unseen parts, the mean {:.3e}; the \
-                     axis does not follow temperature",
+                    "no model beats its mean: the best one, {}, leaves {:.1} % of what the mean leaves on unseen parts; \
+                     the axis does not follow temperature",
                     best.spec.words(),
-                    best.score,
-                    choice.mean
+                    100.0 * best.score / choice.mean
                 ))
             },
             |level| Self::flat(&level, target.level),

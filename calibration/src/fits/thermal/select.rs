@@ -22,6 +22,9 @@ const PLAINLY_STATIC: f64 = 0.8;
 pub const WORTH_IT: f64 = 0.9;
 /// How many times what is usual a temperature may count.
 const CROWDED: f64 = 3.0;
+/// Weight of zero against the highest power of the static bias, as a share of that against lags: beyond the temperatures of the log it
+/// goes furthest astray.
+const OF_HIGHEST: f64 = 0.2;
 
 /// One sensor's windows over all runs.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -178,6 +181,7 @@ impl<'a> Trials<'a> {
     /// What stands against each coefficient of a model.
     fn shares(&self, spec: &Spec) -> Vec<f64> {
         let share = |term: &Term| match term.effect {
+            Effect::Static if term.power == spec.degree => OF_HIGHEST * spec.shrink,
             Effect::Static | Effect::Scale => 0.0,
             _ => spec.shrink,
         };
