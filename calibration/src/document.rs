@@ -21,7 +21,7 @@ pub use fitted::{About, Fitted};
 pub(crate) use fitted::{by_name, rows};
 pub use isotherm_document::tidy;
 pub(crate) use plain::{ASSUMED_DEG_C, channels, faults, follows, plain, reads_deg_c};
-pub(crate) use provenance::{BASE, base_of, files_of};
+pub(crate) use provenance::{BASE, are_copies, base_of, files_of};
 pub use provenance::{TOOL, command_line, origin, recordings_in};
 pub use written::{Written, name_of, write_file};
 

@@ -190,7 +190,7 @@ impl Unit {
         if starts_anew {
             self.accels.sets_apart();
         } else {
-            self.accels.goes_on();
+            self.accels.goes_on(&mut self.pipeline.counters);
         }
         self.release(false, emit);
     }

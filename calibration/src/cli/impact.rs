@@ -15,7 +15,7 @@ use super::bar;
 use super::driver::emit;
 use super::files::PageArgs;
 use super::runs::{LogArgs, Reading};
-use super::units::Logs;
+use super::units::{Logs, once_each_log};
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::drift::HOUR_S;
@@ -175,6 +175,7 @@ impl ImpactArgs {
         if self.start_log.is_empty() {
             return Ok(None);
         }
+        once_each_log(&self.start_log)?;
         let means = |path: &PathBuf| Ok(over_starts::means(&self.columns(slice::from_ref(path), cut)?));
         let means: Vec<[f64; 3]> = self.start_log.iter().map(means).collect::<Result<_, Error>>()?;
         let found = over_starts::sigmas(&means).ok_or_else(|| {

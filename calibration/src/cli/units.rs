@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use isotherm_protocol::key::UnitId;
 
 use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
-use crate::document::{Written, files_of, name_of};
+use crate::document::{Written, are_copies, files_of, name_of};
 use crate::error::Error;
 use crate::numbers::once_each;
 use crate::runs::Run;
@@ -136,21 +136,13 @@ impl<'a> Logs<'a> {
 
     /// A log counts once, and judges nothing that was fitted to it.
     fn each_once(&self) -> Result<(), Error> {
-        let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
-            (Ok(a), Ok(b)) => a == b,
-            _ => a == b,
-        };
         let logs = self.files;
-        let again =
-            logs.iter().enumerate().find(|(at, log)| logs.iter().take(*at).any(|other| same(log, other)));
-        if let Some((_, log)) = again {
-            return Err(Error::Usage(format!("{} is given twice: each log counts once", log.display())));
-        }
+        once_each_log(logs)?;
         let [fitted, judged] = [self.reading, self.judging].map(Reading::part_s);
         if fitted[0] >= judged[1] || judged[0] >= fitted[1] {
             return Ok(());
         }
-        match self.judge.iter().find(|judge| logs.iter().any(|log| same(log, judge))) {
+        match self.judge.iter().find(|judge| logs.iter().any(|log| are_one_log(log, judge))) {
             None => Ok(()),
             Some(judge) => Err(Error::Usage(format!(
                 "--judge {}: the document is fitted to the same part of it: give another log, or another part \
@@ -275,4 +267,25 @@ fn of_folder(folder: &Path) -> Result<BTreeMap<UnitId, Written>, Error> {
         }
     }
     Ok(documents)
+}
+
+/// Refuses a log that is given twice, even as a copy.
+pub(super) fn once_each_log(logs: &[PathBuf]) -> Result<(), Error> {
+    let earlier = |at: usize, log: &Path| logs.iter().take(at).find(|other| are_one_log(log, other));
+    let again =
+        logs.iter().enumerate().find_map(|(at, log)| Some((log.display(), earlier(at, log)?.display())));
+    let Some((log, other)) = again else { return Ok(()) };
+    Err(Error::Usage(if log.to_string() == other.to_string() {
+        format!("{log} is given twice: each log counts once")
+    } else {
+        format!("{log} is {other} once more: each log counts once")
+    }))
+}
+
+/// Whether two logs are the same file, or copies of each other.
+fn are_one_log(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b || are_copies(&a, &b),
+        _ => a == b,
+    }
 }

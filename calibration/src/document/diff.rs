@@ -10,14 +10,15 @@ mod sheet;
 mod tests;
 
 use isotherm_correction::calibration::Steady;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 use isotherm_protocol::control::DocumentChange;
-use isotherm_protocol::document::{difference, turn_rad};
+use isotherm_protocol::document::{Curve, Document, OrientationThermal, Shape, difference, turn_rad};
 use serde::Serialize;
 
-use crate::document::Written;
 use crate::document::show::terms::{terms, tree};
 use crate::document::show::{places, range_of, steady};
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::norm;
 use crate::report::Sigmas;
@@ -26,6 +27,8 @@ use crate::report::Sigmas;
 pub const BEYOND: f64 = 3.0;
 /// Temperatures that changes are taken at.
 const POINTS: usize = 101;
+/// Difference of two temperatures over which axes hardly turn (°C).
+const SAME_DEG_C: f64 = 1.0;
 
 /// How an input axis has turned.
 #[derive(Debug, Clone, Serialize)]
@@ -89,10 +92,12 @@ pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Resul
     let [first, second] = ranges;
     let ([a, b], [c, d]) = (first?, second?);
     let range = if a.max(c) < b.min(d) { [a.max(c), b.min(d)] } else { [a.min(c), b.max(d)] };
-    let reference = after.document.temperature.assumed_deg_c.clamp(range[0], range[1]);
+    let reference = own_reference(&after.document).clamp(range[0], range[1]);
     let at = places(range, POINTS);
     let pair = |x: f64| [steady(before, x, 0.0), steady(after, x, 0.0)];
     let compared = Compared {
+        documents: [&before.document, &after.document],
+        reference_deg_c: reference,
         reference: pair(reference),
         over: at.iter().map(|x| pair(*x)).collect(),
         sigmas: [Sigmas::of(&before.document), Sigmas::of(&after.document)],
@@ -133,14 +138,41 @@ fn matched(before: &[String], after: &[String]) -> Vec<(String, [usize; 2])> {
     places.collect()
 }
 
-struct Compared {
+/// Temperature that a document's curves are given about (°C), where its standard errors are known best.
+fn own_reference(document: &Document) -> f64 {
+    let axes =
+        ["accel", "gyro"].into_iter().filter_map(|kind| Some(axes_over(document, kind)?.reference_deg_c));
+    let scales = accelerometers(document).iter().map(|sensor| Some(&sensor.scale_factor));
+    let biases = document.gyro.sensor.iter().map(|sensor| sensor.terms.curve(Feature::One));
+    axes.chain(scales.chain(biases).filter_map(about)).next().unwrap_or(document.temperature.assumed_deg_c)
+}
+
+/// How the axes of a kind follow temperature.
+fn axes_over<'a>(document: &'a Document, kind: &str) -> Option<&'a OrientationThermal> {
+    if kind == "gyro" {
+        return document.gyro.orientation.thermal.as_ref();
+    }
+    document.accel.as_ref()?.orientation.thermal.as_ref()
+}
+
+/// Temperature that a polynomial is given about (°C).
+pub(crate) fn about(curve: Option<&Curve>) -> Option<f64> {
+    match curve?.shape() {
+        Shape::Polynomial { reference, .. } => Some(*reference),
+        _ => None,
+    }
+}
+
+struct Compared<'a> {
+    documents: [&'a Document; 2],
+    reference_deg_c: f64,
     reference: [Steady; 2],
     over: Vec<[Steady; 2]>,
     sigmas: [Sigmas; 2],
     axis_sigma: Option<f64>,
 }
 
-impl Compared {
+impl Compared<'_> {
     fn axis(
         &self,
         of: &str,
@@ -155,7 +187,7 @@ impl Compared {
         };
         let (old, new) = both(&self.reference);
         let change = [0, 1, 2].map(|i| Angle::from_rad(new[i] - old[i]).as_arcsec());
-        let stated = self.sigmas.each_ref().map(|sigmas| self.row_sigma(sigmas, kind, sensor));
+        let stated = [0, 1].map(|side| self.row_sigma(side, kind, sensor));
         let sigma = match stated {
             [Some(a), Some(b)] => [0, 1, 2].map(|i| libm::hypot(a[i], b[i])),
             _ => [0.0; 3],
@@ -189,20 +221,27 @@ impl Compared {
         }
     }
 
-    /// Standard errors of the direction cosines of one document.
-    fn row_sigma(&self, sigmas: &Sigmas, kind: &str, sensor: &str) -> Option<[f64; 3]> {
-        let stated = sigmas.get(kind, sensor, "axis_arcsec").and_then(|row| <[f64; 3]>::try_from(row).ok());
+    /// Standard errors of the direction cosines of one document. Those that it states hold at the reference of its axes, for those of the
+    /// slopes are not known.
+    fn row_sigma(&self, side: usize, kind: &str, sensor: &str) -> Option<[f64; 3]> {
+        let (document, sigmas) = (self.documents[side], &self.sigmas[side]);
+        let away = |axes: &OrientationThermal| (axes.reference_deg_c - self.reference_deg_c).abs();
+        let there = axes_over(document, kind).is_none_or(|axes| away(axes) < SAME_DEG_C);
+        let stated = sigmas.get(kind, sensor, "axis_arcsec").filter(|_| there);
+        let stated = stated.and_then(|row| <[f64; 3]>::try_from(row).ok());
         stated.or_else(|| self.axis_sigma.map(|sigma| [sigma; 3]))
     }
 
     fn gyro(&self, name: &str, places: [usize; 2], same_output: bool, values: &mut Vec<ValueChange>) {
         let deg_per_h = |[a, b]: [f64; 2]| AngularRate::from_rad_per_s(b - a).as_deg_per_h();
-        let sigma = self.first_sigma("gyro", name, "static_bias", [1.0; 2]);
+        let gyro = |side: usize| self.documents[side].gyro.sensor.get(places[side]);
+        let biases = [0, 1].map(|side| about(gyro(side)?.terms.curve(Feature::One)));
+        let sigma = self.value_sigma(("gyro", name, "static_bias"), biases, [1.0; 2]);
         let of = format!("gyro {name} bias");
         values.extend(self.value(of, "°/h", places, |s| &s.gyro_bias, deg_per_h, sigma));
         if same_output {
             let of = format!("gyro {name} increment weight");
-            let sigma = self.first_sigma("gyro", name, "increment_weight_ppm", [1.0; 2]);
+            let sigma = self.value_sigma(("gyro", name, "increment_weight_ppm"), [None; 2], [1.0; 2]);
             values.extend(self.value(of, "ppm", places, |s| &s.gyro_weight, ppm, sigma));
         }
     }
@@ -214,22 +253,42 @@ impl Compared {
             scales.get(places[side]).copied().unwrap_or(f64::NAN)
         });
         // A standard error of the output is one of the specific force by the scale factor.
-        let sigma = self.first_sigma("accel", name, "bias", scale.map(|scale| milli_g(1.0 / scale)));
+        let accel = |side: usize| accelerometers(self.documents[side]).get(places[side]);
+        let biases = [0, 1].map(|side| about(accel(side)?.terms.curve(Feature::One)));
+        let per_scale = scale.map(|scale| milli_g(1.0 / scale));
+        let sigma = self.value_sigma(("accel", name, "bias"), biases, per_scale);
         let change = |[a, b]: [f64; 2]| milli_g(b - a);
         let of = format!("accelerometer {name} bias");
         values.extend(self.value(of, "mg", places, |s| &s.accel_bias, change, sigma));
         if same_output {
             let of = format!("accelerometer {name} scale factor");
-            let sigma = self.first_sigma("accel", name, "scale_factor", scale.map(|scale| 1e6 / scale));
+            let scales = [0, 1].map(|side| about(Some(&accel(side)?.scale_factor)));
+            let sigma =
+                self.value_sigma(("accel", name, "scale_factor"), scales, scale.map(|scale| 1e6 / scale));
             values.extend(self.value(of, "ppm", places, |s| &s.accel_scale, ppm, sigma));
         }
     }
 
-    /// Standard error of the difference of first coefficients, each by its factor.
-    fn first_sigma(&self, kind: &str, sensor: &str, term: &str, factors: [f64; 2]) -> Option<f64> {
-        let first = |sigmas: &Sigmas| sigmas.get(kind, sensor, term).and_then(|row| row.first().copied());
-        let [a, b] = self.sigmas.each_ref().map(first);
-        let sigma = libm::hypot(a? * factors[0], b? * factors[1]);
+    /// Standard error of the difference of two curves at the reference, each by its factor: of polynomials about some temperature that
+    /// of all their coefficients, as if they were found apart from each other; else of the first.
+    fn value_sigma(
+        &self,
+        (kind, sensor, term): (&str, &str, &str),
+        about: [Option<f64>; 2],
+        factors: [f64; 2],
+    ) -> Option<f64> {
+        let of = |side: usize| {
+            let away = about[side].map_or(0.0, |about| self.reference_deg_c - about);
+            let mut power = factors[side];
+            let sigmas = self.sigmas[side].get(kind, sensor, term)?;
+            let parts = sigmas.iter().map(|sigma| {
+                let part = sigma * power;
+                power *= away;
+                part * part
+            });
+            Some(parts.sum::<f64>().sqrt())
+        };
+        let sigma = libm::hypot(of(0)?, of(1)?);
         (sigma > 0.0).then_some(sigma)
     }
 

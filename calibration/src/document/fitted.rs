@@ -6,10 +6,13 @@ use isotherm_protocol::document::{Created, Document};
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 
-use super::provenance::{BASE, base_of};
+use super::provenance::{BASE, MOST_LOGS, base_of};
 use super::{Written, command_line, origin, tidy};
 use crate::error::Error;
 use crate::report::{Report, Sigmas, residuals};
+
+/// Key in `origin.details`: what a document rests on that a fit started from, and that one on another.
+const BEFORE: &str = "before";
 
 /// What comes of a fit.
 #[derive(Debug)]
@@ -62,7 +65,11 @@ impl About {
             // What the rest of the document rests on.
             let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
             let earlier = json!({ "tool": tool, "method": method, "log": before.log });
-            details.extend(kept(earlier).map(|earlier| ("before".to_owned(), earlier)));
+            let mut earlier = kept(earlier).unwrap_or_else(|| toml::Table::new().into());
+            if let (Some(earlier), Some(still)) = (earlier.as_table_mut(), details.remove(BEFORE)) {
+                earlier.insert(BEFORE.to_owned(), still);
+            }
+            details.insert(BEFORE.to_owned(), earlier);
         }
         let mut own = json!({
             "verdict": report.headline(),
@@ -70,6 +77,10 @@ impl About {
             "notes": report.notes,
             "coefficients": report.coefficients_by_name(),
         });
+        let other_logs = origin.log.split_off(origin.log.len().min(MOST_LOGS));
+        if !other_logs.is_empty() {
+            own["log"] = json!(other_logs);
+        }
         if let (Some(own), Some(more)) = (own.as_object_mut(), self.details.as_object()) {
             own.extend(more.clone());
         }
@@ -106,4 +117,35 @@ pub(crate) fn rows(matrix: &DMatrix<f64>) -> Value {
 /// Something of each sensor, by the sensor's name.
 pub(crate) fn by_name<'a>(all: impl IntoIterator<Item = (&'a str, Value)>) -> Value {
     Value::Object(all.into_iter().map(|(name, of)| (name.to_owned(), of)).collect::<Map<_, _>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_names_all_logs_that_it_rests_on_however_long_the_chain() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
+        let mut document = Written::read(path.as_ref()).unwrap().document;
+        document.origin = None;
+        let log = |name: String| {
+            let path = folder.path().join(&name);
+            std::fs::write(&path, &name).unwrap();
+            path
+        };
+        let created = document.created.unwrap();
+        let many: Vec<PathBuf> = (0..70).map(|number| log(format!("{number}.csv"))).collect();
+        for logs in [vec![log("first.csv".to_owned())], vec![log("second.csv".to_owned())], many] {
+            let about = About { method: "m", key: "fit", details: json!({}), ..About::default() };
+            let report = Report::new("", "");
+            document = about.complete(document, (None, &logs), &report, created).unwrap().document;
+        }
+        let origin = document.origin.unwrap();
+        assert_eq!(origin.log.len(), MOST_LOGS);
+        let details = origin.details.unwrap();
+        assert_eq!(details["fit"]["log"].as_array().unwrap().len(), 70 - MOST_LOGS);
+        assert_eq!(details[BEFORE]["log"][0]["name"].as_str(), Some("second.csv"));
+        assert_eq!(details[BEFORE][BEFORE]["log"][0]["name"].as_str(), Some("first.csv"));
+    }
 }

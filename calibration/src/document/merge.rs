@@ -24,7 +24,7 @@ use crate::document::provenance::{BASE, digest_of};
 use crate::document::show::terms::tree;
 use crate::error::Error;
 use crate::report::Report;
-use check::{check, same_unit};
+use check::{check, chosen, same_unit};
 use sections::{Sections, group, sections, with};
 
 /// Which part decides over keys that begin so.
@@ -60,6 +60,7 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
     let old = sections(&tree(&base.document)?);
     let new: Vec<Sections> =
         parts.iter().map(|part| Ok(sections(&tree(&part.document)?))).collect::<Result<_, Error>>()?;
+    chosen(take, new.iter().chain([&old]))?;
     let mut picked = Picked { sections: old.clone(), ..Picked::default() };
     for key in old.keys() {
         picked.from.insert(key.clone(), base.name.clone());
@@ -164,7 +165,7 @@ impl Picked {
             .filter(|(key, from)| group(key) == of && **from != base.name)
             .map(|(_, from)| from)
             .collect();
-        if of.ends_with(" bias") && fits.len() > 1 {
+        if (of.ends_with(" bias") || of.ends_with(" output")) && fits.len() > 1 {
             let names: Vec<&str> = fits.into_iter().map(String::as_str).collect();
             self.warnings.push(format!(
                 "the terms of {of} are from several separate fits ({}): judge the result with validate",

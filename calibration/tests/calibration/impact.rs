@@ -140,6 +140,12 @@ fn the_command_sails_stated_drifts_and_documents() {
     assert_eq!(report["table_3"].as_array().unwrap().len(), 18);
     assert_eq!(report["models"].as_array().unwrap().len(), 0, "nothing but a log bears a model out");
 
+    // The end is the end, not the last whole point.
+    let short = json(&["impact", "--constant", "0.1", "--gyro", "z", "--hours", "0.65", "--json"]);
+    let hours = |point: &serde_json::Value| point[0].as_f64().unwrap();
+    let points: Vec<f64> = short["rows"][0]["points"].as_array().unwrap().iter().map(hours).collect();
+    assert!(points.len() == 4 && (points[3] - 0.65).abs() < 1e-9, "{points:?}");
+
     let document = shipped("ZLG-0001.toml").display().to_string();
     let arguments = ["impact", "--calibration", &document, "--seeds", "4", "--hours", "12", "--json"];
     let many = json(&arguments);

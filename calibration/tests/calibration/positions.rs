@@ -8,8 +8,10 @@ use isotherm_calibration::fits::positions::model::SMALL;
 use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::fits::positions::times::Times;
 use isotherm_calibration::fits::positions::track::Track;
+use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::Offline;
+use isotherm_protocol::document::{Curve, OrientationThermal, Shape};
 use nalgebra::DVector;
 
 use crate::stand::judging::{
@@ -244,6 +246,33 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
 }
 
 #[test]
+fn a_negative_scale_factor_keeps_its_sign_its_axis_and_its_slopes() {
+    let (plan, mut document) = (Plan::twelve(), stand::document());
+    let instrument = stand::instrument();
+    let accel = document.accel.as_mut().unwrap();
+    let scale = &mut accel.sensor[2].scale_factor;
+    let value = -scale.shape().at(20.0).unwrap();
+    *scale = Curve::new(Shape::Constant { value }).in_unit(accel.output.scale_unit());
+    accel.orientation.rows[2] = accel.orientation.rows[2].map(|c| -c);
+    accel.orientation.thermal = Some(OrientationThermal {
+        channels: vec![document.temperature.channel[0].name.clone()],
+        reference_deg_c: -60.0,
+        range_deg_c: [-60.0, 80.0],
+        slopes_arcsec_per_deg_c: vec![[0.0; 3], [0.0; 3], [0.0, 100.0, 0.0]],
+        hysteresis: Vec::new(),
+    });
+    let written = Written::of(&document).unwrap();
+    let found = found_in_room(&instrument, &plan, &written, &quick(1));
+    let made = complete(&written.document, &found, GRAVITY).accel.unwrap();
+    assert!((made.sensor[2].scale_factor.shape().at(20.0).unwrap() / value - 1.0).abs() < 0.1);
+    let turned = 100.0 * ARCSEC * (found.slopes_deg_c + 60.0);
+    let truth = stand::true_rows(&instrument, 20.0 + HOUSING_ABOVE_DEG_C)[2];
+    let row = made.orientation.rows[2];
+    assert!((row[2] + 1.0).abs() < 2e-3 && (row[1] - (-truth[1] - turned)).abs() < 2e-3, "{row:?} {truth:?}");
+    assert_eq!(found.warnings, Vec::<String>::new());
+}
+
+#[test]
 fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let (plan, document) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
     let instrument = stand::instrument();
@@ -268,6 +297,17 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
             track.outputs[0].iter_mut().for_each(|x| *x = x.min(3e5));
         }),
     ];
+    let (events, held) = stand::log(&instrument, 20.0, &plan, &all, &driven(3));
+    let own = tracks(&[stand::run("room", events)], &document);
+    // Terms that readings hold beside K and S, and rows of the same ticks.
+    let mut squared = document.document.clone();
+    let two = Curve::new(Shape::Constant { value: 300.0 });
+    squared.accel.as_mut().unwrap().sensor[1].set(Feature::ForceSquared, two);
+    told.push(analyse(&own, &squared, &settings(plan.clone(), None)).unwrap_err().join("\n"));
+    let mut rows = times(&plan, "room", &held);
+    let [start, end] = rows.rows[0].0;
+    rows.rows.push(([0.5 * (start + end), end], rows.rows[0].1.clone(), None));
+    told.push(analyse(&own, &document.document, &settings(plan.clone(), Some(rows))).unwrap_err().join("\n"));
     // A log without the turns, and not in the plan's order.
     let jumps = Stand { turn_deg_per_s: None, ..driven(3) };
     told.push(refused(&[0, 1, 2, 4, 5, 6, 7, 8, 9, 11], &jumps, &none));

@@ -76,9 +76,10 @@ impl AccelIntake {
             self.insert_between(late, counters);
             return;
         }
-        counters.accel_late += 1;
         if self.behind.len() < MAX_PENDING {
             self.behind.push_back(late);
+        } else {
+            counters.accel_late += 1;
         }
     }
 
@@ -128,9 +129,9 @@ impl AccelIntake {
 
     /// Notes that gyro ticks came which start no new series.
     #[inline]
-    pub(super) fn goes_on(&mut self) {
+    pub(super) fn goes_on(&mut self, counters: &mut Counters) {
         if !self.behind.is_empty() {
-            self.behind.clear();
+            counters.accel_late += self.behind.drain(..).count() as u64;
         }
         self.gyro_messages += 1;
         if self.pending.is_empty() && self.pending.capacity() > LONGEST_KEPT {
@@ -164,5 +165,35 @@ impl AccelIntake {
         while let Some(tick) = self.behind.pop_front() {
             self.insert_between(tick, counters);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Span;
+
+    #[test]
+    fn a_tick_after_its_time_is_late_unless_a_new_series_begins_with_it() {
+        let late = |starts_anew: bool| {
+            let (mut intake, mut counters) = (AccelIntake::default(), Counters::default());
+            let tick = |ms: i64| AccelTick {
+                sequence: ms.unsigned_abs() / 10,
+                end_time: Timestamp::from_ns(ms * 1_000_000),
+                duration: Span::from_ms(10),
+                readings: [0.0; 3].into_iter().collect(),
+            };
+            intake.admit(&tick(500), OutputKind::Mean, &mut counters);
+            intake.gyros_released(Timestamp::from_ns(500_000_000), 1);
+            intake.admit(&tick(10), OutputKind::Mean, &mut counters);
+            if starts_anew {
+                intake.sets_apart();
+                intake.starts_anew(Timestamp::from_ns(10_000_000), &mut counters);
+            } else {
+                intake.goes_on(&mut counters);
+            }
+            (counters.accel_late, intake.waiting().len())
+        };
+        assert_eq!((late(false), late(true)), ((1, 0), (0, 1)));
     }
 }

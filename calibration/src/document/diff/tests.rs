@@ -95,3 +95,40 @@ fn equal_documents_are_told_as_such() {
     insta::assert_snapshot!(changes.headline());
     assert!(changes.values.is_empty() && changes.axes.iter().all(|axis| axis.turned_arcsec == 0.0));
 }
+
+#[test]
+fn standard_errors_grow_away_from_the_temperature_that_a_curve_is_given_about() {
+    let about = |reference: f64| {
+        written(|document| {
+            let range = [-20.0, 60.0];
+            let bias = Shape::Polynomial { reference, coefficients: vec![reference, 0.1], range };
+            let accel = document.accel.as_mut().unwrap();
+            accel.orientation.thermal = Some(OrientationThermal {
+                channels: vec![document.temperature.channel[0].name.clone()],
+                reference_deg_c: reference,
+                range_deg_c: range,
+                slopes_arcsec_per_deg_c: vec![[0.0, 1.0, 0.0]; accel.sensor.len()],
+                hysteresis: Vec::new(),
+            });
+            document.gyro.sensor[0].set(Feature::One, Curve::new(bias));
+            let (mut details, mut sigmas) = (toml::Table::new(), Sigmas::default());
+            sigmas.put("accel", "x", "axis_arcsec", vec![0.0, 3.0, 4.0]);
+            sigmas.put("gyro", "x", "static_bias", vec![0.6, 0.01]);
+            sigmas.write(&mut details);
+            document.origin.get_or_insert_default().details = Some(details);
+        })
+    };
+    let sigmas = |before: f64| {
+        let changes = changes([&about(before), &about(20.0)], None).unwrap();
+        assert!((changes.reference_deg_c - 20.0).abs() < 1e-12);
+        let bias = changes.values.iter().find(|value| value.of == "gyro x bias");
+        let axis = changes.axes.iter().find(|axis| axis.of == "accelerometer x").unwrap();
+        (bias.map(|bias| bias.sigma.unwrap()), axis.sigma_arcsec)
+    };
+    // Eighty degrees further a slope known to 0.01 °/h per °C adds 0.8 °/h; of the axes' slopes no error is known.
+    let (bias, axis) = sigmas(-60.0);
+    assert!((bias.unwrap() - 1.36_f64.sqrt()).abs() < 1e-9, "{bias:?}");
+    assert_eq!(axis, [0.0; 3]);
+    let (_, axis) = sigmas(20.0);
+    assert!((axis[1] - 18.0_f64.sqrt()).abs() < 1e-9, "{axis:?}");
+}

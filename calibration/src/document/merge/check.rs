@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use isotherm_protocol::document::{AccelOutput, Document, GyroOutput};
 
-use super::Take;
-use super::sections::is_about;
+use super::sections::{Sections, is_about};
+use super::{Take, covers};
 use crate::document::Written;
 use crate::error::Error;
 
@@ -83,4 +83,33 @@ pub(super) fn check(base: &Written, parts: &[Written], take: &[Take]) -> Result<
         }
     }
     Ok(())
+}
+
+/// Refuses choices of keys that no document has.
+pub(super) fn chosen<'a>(
+    take: &[Take],
+    documents: impl Iterator<Item = &'a Sections> + Clone,
+) -> Result<(), Error> {
+    let keys = || documents.clone().flat_map(Sections::keys);
+    match take.iter().find(|take| !keys().any(|key| covers(&take.key, key))) {
+        None => Ok(()),
+        Some(take) => {
+            let parents = std::iter::successors(Some(take.key.as_str()), |key| Some(key.rsplit_once('.')?.0));
+            let below = |parent: &str| {
+                let rest =
+                    keys().filter(|key| covers(parent, key)).filter_map(|key| key.get(parent.len() + 1..));
+                rest.map(|rest| format!("{parent}.{}", rest.split('.').next().unwrap_or(rest))).collect()
+            };
+            let near: BTreeSet<String> = parents
+                .map(below)
+                .find(|near: &BTreeSet<_>| !near.is_empty())
+                .unwrap_or_else(|| keys().cloned().collect());
+            Err(Error::Usage(format!(
+                "--take {}={}: no document has this key; there are {}",
+                take.key,
+                take.from,
+                near.into_iter().collect::<Vec<_>>().join(", ")
+            )))
+        }
+    }
 }

@@ -5,15 +5,12 @@ use std::collections::BTreeMap;
 use isotherm_protocol::document::{Log, Origin};
 use toml::{Table, Value};
 
-use crate::document::provenance::{BASE, base_of};
+use crate::document::provenance::{BASE, MOST_LOGS, base_of};
 use crate::document::show::terms::tree;
 use crate::document::{TOOL, Written, command_line};
 use crate::error::Error;
 use crate::numbers::hull;
 use crate::report::Sigmas;
-
-/// Most logs that a document's origin lists; more are in the parts' own origins only.
-const MOST_LOGS: usize = 64;
 
 /// The origin of the merged document.
 pub(super) fn origin(
@@ -37,6 +34,7 @@ pub(super) fn origin(
             }
         }
     }
+    // The others are in the parts' own origins.
     log.truncate(MOST_LOGS);
     let parts = ("parts".to_owned(), Value::Table(kept));
     let mut details = Table::from_iter([parts, (BASE.to_owned(), base_of(Some(base)))]);
@@ -63,8 +61,9 @@ fn sigmas(documents: &[&Written], from: &BTreeMap<String, String>) -> Sigmas {
                 "axis_arcsec" => format!("{kind}.orientation.rows"),
                 "increment_weight_ppm" => {
                     let weight = format!("{kind}.sensor.{sensor}.increment_weight");
-                    let of = from.keys().find(|key| key.starts_with(&weight) && !key.ends_with("_error"));
-                    of.cloned().unwrap_or_default()
+                    let units = ["_rad_per_rad", "_arcsec_per_count"];
+                    let stated = units.map(|unit| format!("{weight}{unit}"));
+                    stated.into_iter().find(|key| from.contains_key(key)).unwrap_or_default()
                 }
                 term => format!("{kind}.sensor.{sensor}.{term}"),
             };

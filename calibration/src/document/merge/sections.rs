@@ -27,21 +27,19 @@ pub(super) fn is_about(key: &str) -> bool {
 
 /// What is replaced together with a section.
 pub(super) fn group(key: &str) -> String {
-    let parts: Vec<&str> = key.split('.').collect();
-    match parts.as_slice() {
-        ["gyro", "sensor", name, term] if *term == "trend" || is_bias(&GYRO_TERMS, term) => {
-            format!("gyro.sensor.{name} bias")
-        }
-        ["gyro", "sensor", name, term] if term.starts_with("increment_weight") => {
-            format!("gyro.sensor.{name} weight")
-        }
-        ["accel", "sensor", name, key]
-            if matches!(*key, "scale_factor" | "board_ratio_error") || is_bias(&ACCEL_TERMS, key) =>
-        {
-            format!("accel.sensor.{name} output")
-        }
-        [kind, "orientation", "rows" | "weights" | "thermal"] => format!("{kind}.orientation axes"),
-        _ => key.to_owned(),
+    // The name of a sensor may have dots.
+    let (path, term) = key.rsplit_once('.').unwrap_or(("", key));
+    let makes_output = matches!(term, "scale_factor" | "board_ratio_error") || is_bias(&ACCEL_TERMS, term);
+    if path.starts_with("gyro.sensor.") && (term == "trend" || is_bias(&GYRO_TERMS, term)) {
+        format!("{path} bias")
+    } else if path.starts_with("gyro.sensor.") && term.starts_with("increment_weight") {
+        format!("{path} weight")
+    } else if path.starts_with("accel.sensor.") && makes_output {
+        format!("{path} output")
+    } else if path.ends_with(".orientation") && matches!(term, "rows" | "weights" | "thermal") {
+        format!("{path} axes")
+    } else {
+        key.to_owned()
     }
 }
 

@@ -200,3 +200,57 @@ fn what_a_parts_own_base_never_had_is_a_conflict() {
     }
     insta::assert_snapshot!(told.join("\n"));
 }
+
+#[test]
+fn a_choice_of_a_key_that_nobody_has_is_refused_with_those_that_are_there() {
+    let base = named("base.toml", |_| ());
+    let part = named("a.toml", bias(7.0));
+    let told = ["accel.orientation.rowz", "gyro.sensor.x.static_bais", "giro"].map(|key| {
+        let take = Take { key: key.into(), from: "base.toml".into() };
+        merge(&base, std::slice::from_ref(&part), &[take]).unwrap_err().to_string()
+    });
+    insta::assert_snapshot!(told.join("\n"));
+}
+
+#[test]
+fn the_terms_of_a_sensor_with_a_dot_in_its_name_go_together() {
+    for (key, of) in [
+        ("gyro.sensor.g.x.lag", "gyro.sensor.g.x bias"),
+        ("gyro.sensor.g.x.increment_weight_over_rate", "gyro.sensor.g.x weight"),
+        ("accel.sensor.1.5g.scale_factor", "accel.sensor.1.5g output"),
+        ("accel.orientation.rows", "accel.orientation axes"),
+        ("gyro.sensor.g.x.channel", "gyro.sensor.g.x.channel"),
+    ] {
+        assert_eq!(group(key), of);
+    }
+}
+
+#[test]
+fn an_output_of_two_fits_is_warned_of_and_a_weight_has_the_error_of_its_document() {
+    let weighed = |weight: f64, ppm: f64| {
+        move |document: &mut Document| {
+            let gyro = &mut document.gyro.sensor[0];
+            gyro.increment_weight_rad_per_rad = Some(weight);
+            gyro.increment_weight_over_rate = None;
+            gyro.set(Feature::RateMagnitude, constant(30.0));
+            let (mut details, mut sigmas) = (toml::Table::new(), Sigmas::default());
+            sigmas.put("gyro", "x", "increment_weight_ppm", vec![ppm]);
+            sigmas.write(&mut details);
+            document.origin.get_or_insert_default().details = Some(details);
+        }
+    };
+    let base = named("base.toml", weighed(1.0, 5.0));
+    let merged = merge(&base, &[named("rates.toml", weighed(1.0016, 50.0))], &[]).unwrap();
+    let sigmas = Sigmas::of(&merged.written.document);
+    assert_eq!(sigmas.get("gyro", "x", "increment_weight_ppm"), Some([50.0].as_slice()));
+
+    let accel = |change: fn(&mut isotherm_protocol::document::AccelSensor)| {
+        move |document: &mut Document| change(&mut document.accel.as_mut().unwrap().sensor[0])
+    };
+    let plain = named("base.toml", |_| ());
+    let positions =
+        named("positions.toml", accel(|sensor| sensor.scale_factor = sensor.scale_factor.plus(1e-3)));
+    let thermal = named("thermal.toml", accel(|sensor| sensor.set(Feature::One, constant(0.02))));
+    let warnings = merge(&plain, &[positions, thermal], &[]).unwrap().warnings;
+    insta::assert_snapshot!(warnings.join("\n"));
+}

@@ -5,6 +5,7 @@ use isotherm_protocol::document::{AccelSensor, Document};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
+use crate::document::diff::about;
 use crate::document::{Written, accelerometers, tidy};
 use crate::error::Error;
 use crate::finding::AccelKind;
@@ -73,7 +74,8 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
         .enumerate()
         .map(|(index, sensor)| {
             let (rows, channels) = rows(wanted, &samples, index, sensor)?;
-            rows.fit(wanted.reference_deg_c, &channels)
+            let stated = about(sensor.board_ratio_error.as_ref());
+            rows.fit(wanted.reference_deg_c.or(stated), &channels)
         })
         .collect();
     if found.iter().all(Result::is_err) {
@@ -206,13 +208,17 @@ fn tell(
             }
         }
     }
-    report.notes.push(format!(
-        "Each of {} runs less its mean; r is 1 at {}.",
-        wanted.runs.len(),
-        wanted
-            .reference_deg_c
-            .map_or("the middle of the board's range".to_owned(), |t| format!("{} °C", short(t)))
-    ));
+    report.notes.push(format!("Each of {} runs less its mean.", wanted.runs.len()));
+    let chosen =
+        |sensor: &AccelSensor| wanted.reference_deg_c.or(about(sensor.board_ratio_error.as_ref())).is_none();
+    let middle = sensors.iter().zip(found).filter(|(sensor, _)| chosen(sensor));
+    if let Some(ratio) = middle.filter_map(|(_, found)| found.as_ref().ok()).next() {
+        report.warnings.push(format!(
+            "r is 1 at {} °C, the middle of the board's range: the scale factors of the document must hold there; if they were \
+             calibrated with the board at another temperature, give it with --reference",
+            short(ratio.reference_deg_c)
+        ));
+    }
     let panel = Panel::of("r − 1", "ppm", HEIGHT, curves);
     let x = Axis::of("temperature of the board", "°C");
     let chart = Chart::of("Ratio of the board over its temperature.", x, vec![panel]);

@@ -9,7 +9,7 @@ use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::solve::{Positions, Weights, guesses};
 use crate::document::by_name;
-use crate::limits::{above_0, from_0};
+use crate::limits::{above_0, from_0, within};
 use crate::numbers::{ARCSEC_PER_RAD, norm, real};
 use crate::report::{Report, counted, short};
 
@@ -32,16 +32,16 @@ pub struct Budget {
     #[arg(long, hide_short_help = true, value_name = "V", default_value_t = 1.0, requires = "budget", value_parser = above_0)]
     pub scale: f64,
     /// Planned: thermal expansion of housing and sensor (1e-6/°C)
-    #[arg(long, hide_short_help = true, value_name = "PPM", num_args = 2, default_values_t = [22.9, 15.0], requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "PPM", num_args = 2, default_values_t = [22.9, 15.0], requires = "budget", allow_negative_numbers = true, value_parser = within(-1000.0, 1000.0))]
     pub expansion: Vec<f64>,
     /// Planned: calibration temperature and highest temperature inside (°C)
-    #[arg(long, hide_short_help = true, value_name = "DEG_C", num_args = 2, default_values_t = [20.0, 85.0], requires = "budget", allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "DEG_C", num_args = 2, default_values_t = [20.0, 85.0], requires = "budget", allow_hyphen_values = true, value_parser = within(-100.0, 200.0))]
     pub temperatures: Vec<f64>,
     /// Planned: error of the measured temperature (°C)
-    #[arg(long, hide_short_help = true, value_name = "DEG_C", default_value_t = 0.2, requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "DEG_C", default_value_t = 0.2, requires = "budget", value_parser = from_0)]
     pub temperature_error: f64,
     /// Planned: turn of an axis with temperature (″/°C); quartz 1.5, silicon up to 6
-    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget")]
+    #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 1.5, requires = "budget", value_parser = from_0)]
     pub axis_rate: f64,
     /// Planned: hysteresis of an axis over thermal cycles (″); quartz 5 to 15, silicon 15 to 60, or as measured
     #[arg(long, hide_short_help = true, value_name = "ARCSEC", default_value_t = 5.0, requires = "budget", value_parser = from_0)]

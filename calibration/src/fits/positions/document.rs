@@ -1,26 +1,27 @@
 //! What was found, as a document.
 
-use isotherm_correction::thermal::Feature;
+use isotherm_correction::thermal::{ACCEL_TERMS, Feature};
 use isotherm_correction::units::Angle;
 use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationThermal, Shape, Unit};
 
 use super::fit::Analysis;
 use super::model::Sensor;
-use crate::document::tidy;
+use crate::document::{accel_name, accelerometers, tidy};
 use crate::numbers::{hull, unit};
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
 const ROOM_DEG_C: f64 = 1.0;
 
 /// Puts what was found into a document.
-pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Document {
-    let mut document = document.clone();
+pub fn complete(document_of: &Document, analysis: &Analysis, gravity: f64) -> Document {
+    let mut document = document_of.clone();
     let Some(accel) = &mut document.accel else { return document };
     let scale_unit = accel.output.scale_unit();
     let found = analysis.fit.sensors.iter().zip(&analysis.sensors_deg_c);
-    for (sensor, (found, deg_c)) in accel.sensor.iter_mut().zip(found) {
+    let signs = signs(document_of, analysis);
+    for ((sensor, sign), (found, deg_c)) in accel.sensor.iter_mut().zip(&signs).zip(found) {
         let range = with_room(deg_c.range);
-        let scale: Vec<f64> = found.scale.iter().map(|k| k / gravity).collect();
+        let scale: Vec<f64> = found.scale.iter().map(|k| sign * k / gravity).collect();
         if analysis.levels_deg_c.len() > 1 {
             sensor.scale_factor = curve(analysis, &scale, range).in_unit(scale_unit);
             sensor.set(Feature::One, curve(analysis, &found.bias, range));
@@ -28,8 +29,38 @@ pub fn complete(document: &Document, analysis: &Analysis, gravity: f64) -> Docum
             level(sensor, scale[0], found.bias[0], deg_c.mean, scale_unit);
         }
     }
-    orient(accel, analysis, with_room(analysis.range_deg_c));
+    orient(accel, analysis, &signs);
     document
+}
+
+/// What readings at rest have besides K·f + S by the document at hand, and would be held by S once more: the reasons not to fit.
+pub(crate) fn held_twice(document: &Document) -> Vec<String> {
+    let kept = [Feature::Play, Feature::Regressor, Feature::ForceSquared];
+    let of = |(index, sensor): (usize, &AccelSensor)| {
+        let terms =
+            ACCEL_TERMS.iter().filter(|term| kept.contains(&term.feature) && sensor.terms.has(term.feature));
+        let keys: Vec<&str> = terms.map(|term| term.key).collect();
+        (!keys.is_empty()).then(|| {
+            format!(
+                "accelerometer {}: the document has {}, whose part bias and scale factor would hold once more: take it out of the \
+                 document, fit, and fit it again afterwards",
+                accel_name(document, index),
+                keys.join(", ")
+            )
+        })
+    };
+    accelerometers(document).iter().enumerate().filter_map(of).collect()
+}
+
+/// Signs of the scale factors that a document states: what was found has them positive, and along the opposite axis is the same.
+fn signs(document: &Document, analysis: &Analysis) -> Vec<f64> {
+    let stated = accelerometers(document).iter().zip(&analysis.sensors_deg_c);
+    stated.map(|(sensor, deg_c)| scale_at(sensor, deg_c.mean).signum()).collect()
+}
+
+/// The scale factor that a document states at a temperature (°C); 1 where it states none there.
+pub(super) fn scale_at(sensor: &AccelSensor, deg_c: f64) -> f64 {
+    sensor.scale_factor.shape().at(deg_c).unwrap_or(1.0)
 }
 
 /// Range of the document (°C): of all curves, and of the axes.
@@ -90,21 +121,21 @@ fn times(shape: &Shape, factor: f64) -> Shape {
 
 /// Puts C into the document: rows at the reference, and slopes where there are several temperatures. With one, the slopes of the
 /// old document stay, and the rows at their reference follow.
-fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, range: [f64; 2]) {
+fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, signs: &[f64]) {
     let orientation = &mut accel.orientation;
-    let row = |sensor: &Sensor| sensor.axis.first().copied().unwrap_or_default();
+    let sensors = || analysis.fit.sensors.iter().zip(signs);
+    let axis = |(sensor, sign): (&Sensor, &f64), power: usize| {
+        sensor.axis.get(power).copied().unwrap_or_default().map(|c| sign * c)
+    };
     if analysis.levels_deg_c.len() > 1 {
-        orientation.rows = analysis.fit.sensors.iter().map(|sensor| row(sensor).map(tidy)).collect();
-        let slope = |sensor: &Sensor| {
-            let slope = sensor.axis.get(1).copied().unwrap_or_default();
-            slope.map(|c| tidy(Angle::from_rad(c / analysis.half_deg_c).as_arcsec()))
-        };
+        orientation.rows = sensors().map(|of| axis(of, 0).map(tidy)).collect();
+        let slope = |of| axis(of, 1).map(|c| tidy(Angle::from_rad(c / analysis.half_deg_c).as_arcsec()));
         let stated = orientation.thermal.take();
         orientation.thermal = Some(OrientationThermal {
             channels: analysis.channels.clone(),
             reference_deg_c: analysis.reference_deg_c,
-            range_deg_c: range,
-            slopes_arcsec_per_deg_c: analysis.fit.sensors.iter().map(slope).collect(),
+            range_deg_c: with_room(analysis.range_deg_c),
+            slopes_arcsec_per_deg_c: sensors().map(slope).collect(),
             hysteresis: stated.map(|thermal| thermal.hysteresis).unwrap_or_default(),
         });
         return;
@@ -116,10 +147,10 @@ fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, r
         let slope = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
         slope.map(|c| Angle::from_arcsec(c * away).as_rad())
     };
-    let at_reference = |(index, sensor): (usize, &Sensor)| {
-        let (found, turned) = (row(sensor), old(index));
+    let at_reference = |(index, of)| {
+        let (found, turned) = (axis(of, 0), old(index));
         let row = [0, 1, 2].map(|i| found[i] - turned[i]);
         unit(row).map(tidy)
     };
-    orientation.rows = analysis.fit.sensors.iter().enumerate().map(at_reference).collect();
+    orientation.rows = sensors().enumerate().map(at_reference).collect();
 }

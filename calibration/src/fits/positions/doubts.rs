@@ -1,8 +1,9 @@
 //! What is doubtful about a result, and what makes it none.
 
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{AccelSensor, Document};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::document::scale_at;
 use super::fit::{Analysis, Settings};
 use super::model::{Degrees, Sensor, Taken};
 use super::plan::Plan;
@@ -100,10 +101,10 @@ pub(super) fn few(
 
 /// Axes that lie far from where the document at hand has them: swapped columns, a sign, or another mounting.
 pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mut Vec<String>) {
-    let rows = document.accel.iter().flat_map(|accel| &accel.orientation.rows);
-    let of = |(sensor, stated): (&Sensor, &[f64; 3])| {
+    let rows = document.accel.iter().flat_map(|accel| accel.sensor.iter().zip(&accel.orientation.rows));
+    let of = |(sensor, (own, stated)): (&Sensor, (&AccelSensor, &[f64; 3]))| {
         Beside::new(
-            [sensor.scale[0] / gravity, 1.0],
+            [sensor.scale[0] / gravity, scale_at(own, document.temperature.assumed_deg_c)],
             [sensor.axis.first().copied().unwrap_or_default(), *stated],
         )
     };
@@ -117,9 +118,7 @@ pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mu
 pub(super) fn measures(fit: &Fit, document: &Document, settings: &Settings, own: &[Vec<f64>]) -> Vec<String> {
     let Some(accel) = &document.accel else { return Vec::new() };
     let stated =
-        accel.sensor.iter().zip(own).map(|(sensor, deg_c)| {
-            sensor.scale_factor.shape().at(Temperatures::of(deg_c).mean).unwrap_or(1.0)
-        });
+        accel.sensor.iter().zip(own).map(|(sensor, deg_c)| scale_at(sensor, Temperatures::of(deg_c).mean));
     let stated: Vec<f64> = stated.collect();
     let found: Vec<f64> = fit.sensors.iter().map(|sensor| sensor.scale[0] / settings.gravity).collect();
     let other = measure::Beside::accelerometers(accel.output, &found, &stated).words();

@@ -2,6 +2,7 @@
 
 use isotherm_protocol::document::Document;
 
+use super::document::held_twice;
 use super::doubts::{
     ACCIDENT, few, measures, no_solution, quadratic_terms, sound, spread, survival, turned, widening,
 };
@@ -86,7 +87,7 @@ pub struct Analysis {
 /// # Errors
 /// Every reason why it cannot be, with what to do.
 pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Result<Analysis, Vec<String>> {
-    let reasons = faults::dead(tracks);
+    let reasons = [faults::dead(tracks), held_twice(document)].concat();
     if !reasons.is_empty() {
         return Err(reasons);
     }

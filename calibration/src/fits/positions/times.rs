@@ -50,7 +50,16 @@ impl Times {
         let mut reasons = Vec::new();
         let mut found = Vec::new();
         let own = |log: &Option<String>| log.as_ref().is_none_or(|log| *log == track.run);
-        for (span, name, _) in self.rows.iter().filter(|(.., log)| own(log)) {
+        let rows = || self.rows.iter().filter(|(.., log)| own(log)).enumerate();
+        for (at, (span, name, _)) in rows() {
+            let overlaps = |other: &[f64; 2]| other[0] < span[1] - 1e-9 && span[0] < other[1] - 1e-9;
+            if let Some((_, (other, before, _))) = rows().take(at).find(|(_, (other, ..))| overlaps(other)) {
+                reasons.push(format!(
+                    "--times: {name} from {} to {} s overlaps {before} from {} to {} s: each tick counts once",
+                    span[0], span[1], other[0], other[1]
+                ));
+                continue;
+            }
             let Some(position) = plan.index_of(name) else {
                 let names: Vec<&str> = plan.positions.iter().map(|position| position.name.as_str()).collect();
                 reasons.push(format!(

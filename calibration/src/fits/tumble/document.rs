@@ -10,7 +10,7 @@ use super::fit::Tumble;
 use super::fit::odd::odd;
 use super::gyro::GyroFit;
 use crate::document::tidy;
-use crate::fits::positions::document::level;
+use crate::fits::positions::document::{held_twice, level};
 
 /// Puts what was found into a document; gives what is to be said of it.
 ///
@@ -19,6 +19,10 @@ use crate::fits::positions::document::level;
 /// # Errors
 /// Where the accelerometers show a mirror image of the case: no document may hold that.
 pub fn complete(document: &Document, tumble: &Tumble) -> Result<(Document, Vec<String>), Vec<String>> {
+    let reasons = held_twice(document);
+    if !reasons.is_empty() {
+        return Err(reasons);
+    }
     let base = document;
     let mut document = base.clone();
     let assumed = document.temperature.assumed_deg_c;

@@ -137,6 +137,13 @@ impl Arrivals {
         self.last.is_none_or(|last| now.saturating_duration_since(last) >= shortest)
     }
 
+    /// Goes on from other counters: what they had before did not come since.
+    pub(super) fn go_on_from(&mut self, now: Instant, counters: &[Counter]) {
+        let [gyro, accel, temperature] = COUNTERS.map(|name| value_of(counters, name));
+        self.looked = (now, [gyro, accel, temperature, self.messages]);
+        self.contradicting = CONTRADICTING.iter().map(|name| value_of(counters, name)).sum();
+    }
+
     /// Looks at what has come since the last look: measures the rates; in words where two producers are at work, which looks like an
     /// input of twice the rate and is none.
     #[expect(clippy::cast_precision_loss, reason = "fewer than 2⁵³ messages")]
@@ -234,6 +241,10 @@ mod tests {
         assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (200.0, 100.0));
         arrivals.look(start + Duration::from_millis(1500), &counters(110, 0));
         assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (10.0, 0.0));
+        // What the counters of another instance had before did not come here.
+        arrivals.go_on_from(start + Duration::from_millis(1500), &counters(9000, 50));
+        assert_eq!(arrivals.look(start + Duration::from_millis(2500), &counters(9020, 50)), None);
+        assert_eq!(arrivals.rates().gyro_ticks_per_s, 20.0);
     }
 
     #[test]

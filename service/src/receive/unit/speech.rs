@@ -178,6 +178,8 @@ impl UnitActor {
             tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the \
                 publishing instance");
         }
+        let counters = self.counters();
+        self.arrivals.go_on_from(now, &counters);
         self.status_due = true;
         self.look();
     }
