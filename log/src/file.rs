@@ -31,6 +31,29 @@ pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Erro
     })
 }
 
+/// Refuses a log that is no file: it would be gone when it is read the second time.
+///
+/// # Errors
+/// [`Error::Usage`]; what is not there is not refused.
+pub(crate) fn refuse_pipe(path: &Path) -> Result<(), Error> {
+    match std::fs::metadata(path) {
+        Ok(found) if !found.is_file() && !found.is_dir() => Err(Error::Usage(format!(
+            "{} is a pipe or a device: a log is read more than once; save it to a file",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Opens a file of a log.
+///
+/// # Errors
+/// As [`refuse_pipe`], and [`Error::File`].
+pub(crate) fn open_log(path: &Path, action: &'static str) -> Result<File, Error> {
+    refuse_pipe(path)?;
+    File::open(path).map_err(|source| Error::file(path, action, source))
+}
+
 /// Refuses an output that is one of the other files of the command, before anything is written.
 ///
 /// # Errors
@@ -276,6 +299,18 @@ mod tests {
     #[test]
     fn a_small_file_is_small() {
         insta::assert_snapshot!(read_small_text(Path::new("/dev/zero"), "read the mapping").unwrap_err());
+    }
+
+    #[test]
+    fn a_log_is_no_pipe() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("log.csv");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        // Nothing of it is opened, which would wait for a writer.
+        assert!(crate::part::are_recordings(std::slice::from_ref(&pipe)).unwrap_err().is_usage());
+        assert!(!crate::source::is_recording(&pipe));
+        assert!(crate::text::open_raw(&pipe, &std::sync::Arc::default()).is_err());
+        insta::assert_snapshot!(open_log(Path::new("/dev/null"), "open the log").unwrap_err());
     }
 
     #[test]
