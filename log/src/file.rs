@@ -123,6 +123,13 @@ pub fn remove_partials() {
     }
 }
 
+/// What a file is called until it is whole.
+pub(crate) fn partial_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    name.into()
+}
+
 /// A file that is written under another name until it is whole; removed when dropped before.
 #[derive(Debug)]
 pub struct Partial {
@@ -135,13 +142,12 @@ impl Partial {
     /// What will be at a path; a device is written to as it is.
     #[must_use]
     pub fn of(path: &Path) -> Self {
-        let mut writing = path.as_os_str().to_owned();
         let kept = path.exists() && !path.is_file();
+        let writing = if kept { path.to_owned() } else { partial_of(path) };
         if !kept {
-            writing.push(".partial");
-            self::writing().insert(writing.clone().into());
+            self::writing().insert(writing.clone());
         }
-        Self { path: path.to_owned(), writing: writing.into(), kept }
+        Self { path: path.to_owned(), writing, kept }
     }
 
     /// Where it is written to.
