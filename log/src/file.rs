@@ -31,6 +31,29 @@ pub fn read_small_text(path: &Path, action: &'static str) -> Result<String, Erro
     })
 }
 
+/// Refuses a log that is no file: it would be gone when it is read the second time.
+///
+/// # Errors
+/// [`Error::Usage`]; what is not there is not refused.
+pub(crate) fn refuse_pipe(path: &Path) -> Result<(), Error> {
+    match std::fs::metadata(path) {
+        Ok(found) if !found.is_file() && !found.is_dir() => Err(Error::Usage(format!(
+            "{} is a pipe or a device: a log is read more than once; save it to a file",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Opens a file of a log.
+///
+/// # Errors
+/// As [`refuse_pipe`], and [`Error::File`].
+pub(crate) fn open_log(path: &Path, action: &'static str) -> Result<File, Error> {
+    refuse_pipe(path)?;
+    File::open(path).map_err(|source| Error::file(path, action, source))
+}
+
 /// Refuses an output that is one of the other files of the command, before anything is written.
 ///
 /// # Errors
@@ -100,6 +123,13 @@ pub fn remove_partials() {
     }
 }
 
+/// What a file is called until it is whole.
+pub(crate) fn partial_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    name.into()
+}
+
 /// A file that is written under another name until it is whole; removed when dropped before.
 #[derive(Debug)]
 pub struct Partial {
@@ -112,13 +142,12 @@ impl Partial {
     /// What will be at a path; a device is written to as it is.
     #[must_use]
     pub fn of(path: &Path) -> Self {
-        let mut writing = path.as_os_str().to_owned();
         let kept = path.exists() && !path.is_file();
+        let writing = if kept { path.to_owned() } else { partial_of(path) };
         if !kept {
-            writing.push(".partial");
-            self::writing().insert(writing.clone().into());
+            self::writing().insert(writing.clone());
         }
-        Self { path: path.to_owned(), writing: writing.into(), kept }
+        Self { path: path.to_owned(), writing, kept }
     }
 
     /// Where it is written to.
@@ -276,6 +305,18 @@ mod tests {
     #[test]
     fn a_small_file_is_small() {
         insta::assert_snapshot!(read_small_text(Path::new("/dev/zero"), "read the mapping").unwrap_err());
+    }
+
+    #[test]
+    fn a_log_is_no_pipe() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("log.csv");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        // Nothing of it is opened, which would wait for a writer.
+        assert!(crate::part::are_recordings(std::slice::from_ref(&pipe)).unwrap_err().is_usage());
+        assert!(!crate::source::is_recording(&pipe));
+        assert!(crate::text::open_raw(&pipe, &std::sync::Arc::default()).is_err());
+        insta::assert_snapshot!(open_log(Path::new("/dev/null"), "open the log").unwrap_err());
     }
 
     #[test]

@@ -147,6 +147,8 @@ struct UnitSurvey {
     topics: BTreeMap<Topic, TopicSurvey>,
     /// Gyros, accelerometers give counts.
     counts: [bool; 2],
+    /// The newest series of the gyros: accelerometers state none.
+    series: Option<u64>,
     modes: Modes,
     corrected: CorrectedSurvey,
     status: StatusInfo,
@@ -277,9 +279,10 @@ impl UnitSurvey {
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
                 self.counts[0] = batch.output == OutputKind::Counts;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
-                match survey.ticks(first.series, first.sequence, received_ns, &times) {
+                match survey.ticks(Some(first.series), first.sequence, received_ns, &times) {
                     Place::Old => {}
                     place => {
+                        self.series = Some(first.series);
                         self.modes.take(&batch, place == Place::Start);
                         let readings = batch.ticks.iter().map(|tick| &tick.readings);
                         readings.for_each(|readings| ReadingInfo::tick(&mut self.info.gyros, readings));
@@ -290,7 +293,7 @@ impl UnitSurvey {
                 let Some(first) = batch.ticks.first() else { return Ok(()) };
                 self.counts[1] = batch.output == OutputKind::Counts;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
-                if survey.ticks(0, first.sequence, received_ns, &times) != Place::Old {
+                if survey.ticks(self.series, first.sequence, received_ns, &times) != Place::Old {
                     let readings = batch.ticks.iter().map(|tick| &tick.readings);
                     readings.for_each(|readings| ReadingInfo::tick(&mut self.info.accelerometers, readings));
                 }
@@ -311,12 +314,8 @@ impl UnitSurvey {
                 // A batch may have gaps between its ticks, and an output may stand for several raw ticks.
                 for tick in &batch.ticks {
                     let first = tick.sequence.saturating_sub(u64::from(tick.ticks.saturating_sub(1)));
-                    survey.outputs(
-                        first,
-                        u64::from(tick.ticks.max(1)),
-                        tick.end_time.as_ns(),
-                        length_ns(tick.duration),
-                    );
+                    let time = (tick.end_time.as_ns(), length_ns(tick.duration));
+                    survey.outputs(batch.series, first, u64::from(tick.ticks.max(1)), time);
                 }
                 if let Some(last) = batch.ticks.last() {
                     survey.received(received_ns, last.end_time.as_ns());

@@ -7,6 +7,7 @@ use isotherm_correction::units::Span;
 use isotherm_protocol::key::UnitId;
 
 use crate::error::Error;
+use crate::file::refuse_pipe;
 use crate::mapping::Mapping;
 use crate::message::Message;
 use crate::progress::Progress;
@@ -160,8 +161,9 @@ impl Messages {
 /// Whether these files are recordings; recordings and text logs do not go together.
 ///
 /// # Errors
-/// [`Error::Usage`] where some are recordings and others are not.
+/// [`Error::Usage`] where some are recordings and others are not, or one is a pipe.
 pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
+    paths.iter().try_for_each(|path| refuse_pipe(path))?;
     let recording = |path: &PathBuf| is_recording(Path::new(path));
     match (paths.iter().find(|path| recording(path)), paths.iter().find(|path| !recording(path))) {
         (Some(recording), Some(other)) => Err(Error::Usage(format!(

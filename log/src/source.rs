@@ -1,7 +1,6 @@
 //! A log of either kind as messages: recordings as they are, text logs put into batches.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -16,7 +15,7 @@ use serde::Serialize;
 
 use crate::diff::{CorrectedLog, LogTick, Ticks};
 use crate::error::Error;
-use crate::file::begins_with;
+use crate::file::{begins_with, open_log};
 use crate::mapping::Mapping;
 use crate::message::{Message, Topic};
 use crate::progress::Progress;
@@ -26,7 +25,7 @@ use crate::text::{LogEvent, LogReader, ReadReport, Window};
 /// Whether a file is a recording; what cannot be read is not.
 #[must_use]
 pub fn is_recording(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| begins_with(file, recording::MAGIC))
+    open_log(path, "open the log").is_ok_and(|file| begins_with(file, recording::MAGIC))
 }
 
 /// How the text logs of a command are read.

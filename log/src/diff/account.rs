@@ -142,6 +142,14 @@ impl Account {
         let in_a = self.only_b.between + self.only_b.behind.saturating_sub(self.unfinished);
         in_a + self.only_a.before + self.only_a.between
     }
+
+    /// Ticks that only the recorder missed: nothing else is other, and they lie between ticks that both have, which would announce
+    /// a gap if the service had not published them.
+    #[must_use]
+    pub fn unrecorded(&self) -> u64 {
+        let missed = self.only_a.between;
+        if self.different == 0 && self.missing() == missed { missed } else { 0 }
+    }
 }
 
 /// Compares the ticks of one unit, as they come.

@@ -49,7 +49,8 @@ pub struct Order {
 /// Consecutive ticks, as a batch has them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
-    pub(super) series: u64,
+    /// `None` where nothing says it.
+    pub(super) series: Option<u64>,
     pub(super) first: u64,
     pub(super) ticks: u64,
     /// End of the first tick (ns).
@@ -90,8 +91,8 @@ pub(super) struct Sequence {
 impl Sequence {
     /// Takes the next run.
     pub(super) fn take(&mut self, run: Run) -> Place {
-        if self.series.is_some_and(|series| series != run.series) {
-            if self.superseded == Some(run.series) {
+        if self.series.zip(run.series).is_some_and(|(series, of_run)| series != of_run) {
+            if self.superseded == run.series {
                 // Stragglers end; a run that goes on was interrupted by a stray tick of another.
                 let in_a_row = self.in_a_row(run);
                 self.order.late += run.ticks;
@@ -100,13 +101,18 @@ impl Sequence {
                     return Place::Old;
                 }
                 self.order.late = self.order.late.saturating_sub(in_a_row);
+            } else if let Some((next, ticks)) = self.old
+                && next == run.first
+            {
+                // Accelerometers may come before the gyros that state their series.
+                self.order.duplicates = self.order.duplicates.saturating_sub(ticks);
             }
             self.superseded = self.series;
             self.order.series_changes += 1;
-            self.series = Some(run.series);
+            self.series = run.series;
             return self.begin_anew(run);
         }
-        self.series = Some(run.series);
+        self.series = run.series.or(self.series);
         let end = run.first.saturating_add(run.ticks);
         let Some(next) = self.next else {
             self.go_on(run);
@@ -233,7 +239,7 @@ mod tests {
     /// Ticks of 10 ns whose time follows their number, in a run.
     fn run(first: u64, ticks: u64) -> Run {
         let end = |sequence: u64| i64::try_from(sequence).unwrap() * 10 + 10;
-        Run { series: 0, first, ticks, first_end_ns: end(first), last_end_ns: end(first + ticks - 1) }
+        Run { series: Some(0), first, ticks, first_end_ns: end(first), last_end_ns: end(first + ticks - 1) }
     }
 
     fn order(runs: &[Run]) -> Order {
@@ -264,7 +270,7 @@ mod tests {
     #[test]
     fn another_series_or_a_sequence_that_falls_back_begins_anew() {
         let mut other = run(0, 10);
-        other.series = 1;
+        other.series = Some(1);
         let found = order(&[run(100, 10), other, run(110, 5)]);
         assert_eq!((found.series_changes, found.restarts, found.late, found.gaps.count), (1, 1, 5, 0));
 

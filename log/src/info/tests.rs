@@ -6,7 +6,7 @@ use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::corrected::{CorrectedBatch, Revision, SigmaRun};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
 use isotherm_protocol::key::RawStream;
-use isotherm_protocol::raw::{GyroBatch, TemperatureBatch};
+use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use super::*;
 use crate::recording::{RecordingOptions, RecordingReport, RecordingWriter};
@@ -201,6 +201,43 @@ fn sensors_have_their_range_and_mean() {
     );
     assert!((gyros[1].mean - 61.0 / 30.0).abs() < 1e-12 && (gyros[2].mean - 3.0).abs() < 1e-12);
     assert!(info.units["ZLG-0001"].accelerometers.is_empty());
+}
+
+#[test]
+fn another_series_of_the_same_numbers_is_a_restart_for_every_topic() {
+    let mut messages = Vec::new();
+    for (series, index) in [7, 8, 9].into_iter().flat_map(|series| (0..10).map(move |index| (series, index)))
+    {
+        let mut raw = gyro(index * 10, 10, 0);
+        let mut batch: GyroBatch = codec::decode(&raw.frame).unwrap();
+        let accel = |tick: &core::GyroTick| core::AccelTick {
+            sequence: tick.sequence,
+            end_time: tick.end_time,
+            duration: tick.duration,
+            readings: std::iter::once(9.8).collect(),
+        };
+        let ticks = batch.ticks.iter().map(accel).collect();
+        let frame = codec::encode(&AccelBatch { output: OutputKind::Mean, ticks }).unwrap();
+        let topic = Topic::Raw(unit(), RawStream::Accel);
+        messages.push(Message { topic, received_ns: raw.received_ns, frame });
+        batch.ticks.iter_mut().for_each(|tick| tick.series = series);
+        raw.frame = codec::encode(&batch).unwrap();
+        messages.push(raw);
+        let mut made = corrected(&(index * 10..index * 10 + 10).collect::<Vec<_>>(), 0, 1);
+        let mut batch: CorrectedBatch = codec::decode(&made.frame).unwrap();
+        batch.series = series;
+        made.frame = codec::encode(&batch).unwrap();
+        messages.push(made);
+    }
+    let info = info_of(&messages);
+    for key in ["raw/gyro", "raw/accel", "corrected"] {
+        let topic = topic(&info, &format!("imu/ZLG-0001/{key}"));
+        let order = topic.order.unwrap();
+        assert_eq!((topic.ticks, order.duplicates, order.restarts), (300, 0, 2), "{key}");
+        assert!(topic.duration_s > 1.3, "{key}: {}", topic.duration_s);
+    }
+    // The first ten of a run come before anything says of which it is.
+    assert_eq!(info.units["ZLG-0001"].accelerometers[0].readings, 280);
 }
 
 #[test]

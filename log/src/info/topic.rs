@@ -100,7 +100,7 @@ impl TopicSurvey {
     /// Takes the consecutive ticks of a message.
     pub(super) fn ticks(
         &mut self,
-        series: u64,
+        series: Option<u64>,
         first: u64,
         received_ns: u64,
         times: &(impl Iterator<Item = TickTime> + Clone),
@@ -120,8 +120,8 @@ impl TopicSurvey {
     }
 
     /// Takes one output, which stands for so many raw ticks.
-    pub(super) fn outputs(&mut self, first: u64, ticks: u64, end_ns: i64, duration_ns: u64) {
-        let run = Run { series: 0, first, ticks, first_end_ns: end_ns, last_end_ns: end_ns };
+    pub(super) fn outputs(&mut self, series: u64, first: u64, ticks: u64, (end_ns, duration_ns): TickTime) {
+        let run = Run { series: Some(series), first, ticks, first_end_ns: end_ns, last_end_ns: end_ns };
         self.durations.add(duration_ns);
         self.run(run, 1, std::iter::once(end_ns));
     }

@@ -108,8 +108,13 @@ mod tests {
     }
 
     fn published() -> Published {
+        published_but(TICKS)
+    }
+
+    /// Without the batch that begins there.
+    fn published_but(missed: u64) -> Published {
         let mut published = Published::default();
-        for first in (0..TICKS).step_by(100) {
+        for first in (0..TICKS).step_by(100).filter(|first| *first != missed) {
             let batch = CorrectedBatch {
                 unit: "A-1".to_owned(),
                 series: 0,
@@ -143,6 +148,22 @@ mod tests {
             published.compare(&mut comparison, true);
             let account = comparison.finish();
             assert!(account.is_identical() && account.ticks == TICKS, "{account:#?}");
+        }
+    }
+
+    #[test]
+    fn what_only_the_recorder_missed_is_no_difference() {
+        for (missed, reproduced) in [(5000, TICKS), (5000, 90_000), (TICKS, 90_000)] {
+            let mut comparison = Comparison::new(DiffOptions::default(), false);
+            let mut published = published_but(missed);
+            for first in (0..reproduced).step_by(1000) {
+                make(&mut comparison, first..first + 1000);
+                published.compare(&mut comparison, false);
+            }
+            published.compare(&mut comparison, true);
+            let account = comparison.finish();
+            let alone = missed < TICKS && reproduced == TICKS;
+            assert_eq!((account.unrecorded(), account.agrees()), (if alone { 100 } else { 0 }, false));
         }
     }
 

@@ -68,7 +68,7 @@ fn occurred(bits: impl Iterator<Item = (&'static str, u32)>, counts: &[u64]) -> 
 }
 
 /// What the sums come to.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Raw ticks that are in the outputs.
     pub ticks: u64,

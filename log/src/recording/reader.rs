@@ -16,6 +16,7 @@ use super::record::{LONGEST_RECORD, chunk_records, parse};
 use super::skip::{Front, pass_over};
 use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, view};
 use crate::error::Error;
+use crate::file::open_log;
 use crate::message::{Message, Topic};
 
 /// What reading a recording came to.
@@ -182,7 +183,7 @@ enum Stop {
 impl Opened {
     fn open(path: PathBuf, before_ns: u64, read: &AtomicU64) -> Result<Self, Error> {
         let failed = |source| Error::file(&path, "open the recording", source);
-        let mut file = File::open(&path).map_err(failed)?;
+        let mut file = open_log(&path, "open the recording")?;
         let mut magic = [0; 8];
         let length = read_up_to(&mut file, &mut magic).map_err(failed)?;
         if magic.get(..length) != Some(super::MAGIC) {

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::RecordingOptions;
 use crate::error::Error;
-use crate::file::refuse_overwriting;
+use crate::file::{Partial, partial_of, refuse_overwriting, refuse_replacing};
 use crate::progress::Progress;
 use rescue::{Definitions, Rescue};
 use scan::{Piece, Scanner};
@@ -109,10 +109,11 @@ impl Recovery {
         Progress::new(Arc::clone(&self.read), self.length)
     }
 
-    /// Writes everything that is whole into a new file, with a summary; `watch` is called now and then.
+    /// Writes everything that is whole into a new file, with a summary, which has its name when it is whole; `watch` is called now
+    /// and then.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the new file is the old one, [`Error::File`] where one cannot be read or the other not be
+    /// [`Error::Usage`] where the new file, or what it is called before, is the old one, [`Error::File`] where one cannot be read or the other not be
     /// written, and where nothing in the old one is of a recording.
     pub fn run(
         &self,
@@ -120,25 +121,25 @@ impl Recovery {
         options: RecordingOptions,
         mut watch: impl FnMut(&RecoveryReport),
     ) -> Result<RecoveryReport, Error> {
-        refuse_overwriting(output, &[&self.input])?;
+        for new in [output, &partial_of(output)] {
+            refuse_overwriting(new, &[&self.input])?;
+        }
+        refuse_replacing(output, options.overwrite)?;
+        let options = RecordingOptions { overwrite: true, ..options };
+        let partial = Partial::of(output);
         let mut definitions = Definitions::default();
-        let mut report = self.pass(output, options, &mut definitions, &mut watch)?;
+        let mut report = self.pass(partial.writing(), options, &mut definitions, &mut watch)?;
         if report.nameless > 0 && definitions.are_more() {
             // The names stood behind the messages.
-            report = self.pass(
-                output,
-                RecordingOptions { overwrite: true, ..options },
-                &mut definitions,
-                &mut watch,
-            )?;
+            report = self.pass(partial.writing(), options, &mut definitions, &mut watch)?;
         }
         let is_damaged = report.damaged_places > 0 || !self.begins_well;
         if report.chunks + report.attachments == 0 && is_damaged {
             // What was written holds nothing.
-            let _ = std::fs::remove_file(output);
             let source = std::io::Error::other("nothing in it is intact, or it is not a recording");
             return Err(Error::file(&self.input, "recover the recording", source));
         }
+        partial.keep()?;
         Ok(report)
     }
 

@@ -1,6 +1,5 @@
 //! Bytes of a log: decompressed, counted, cut into lines.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
@@ -10,6 +9,7 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::bufread::MultiGzDecoder;
 
 use crate::error::Error;
+use crate::file::open_log;
 use crate::mapping::Encoding;
 
 /// Longest line (bytes).
@@ -44,7 +44,7 @@ impl<R: Read> Read for Counted<R> {
 /// Opens a file, decompressing it where it begins like gzip, and tells its size.
 pub(crate) fn open(path: &Path, count: &Arc<AtomicU64>) -> Result<(Source, u64), Error> {
     let failed = |source| Error::file(path, "open the log", source);
-    let file = File::open(path).map_err(failed)?;
+    let file = open_log(path, "open the log")?;
     let size = file.metadata().map_err(failed)?.len();
     let mut bytes = BufReader::with_capacity(BLOCK, Counted { inner: file, count: Arc::clone(count) });
     let start = bytes.fill_buf().map_err(failed)?;

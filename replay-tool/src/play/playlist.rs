@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 
 use isotherm_bus::outlet::{GyroTicks, new_series};
-use isotherm_correction::sample::ChannelName;
+use isotherm_correction::sample::{ChannelName, GyroTick};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::part::{LogFiles, Messages};
@@ -22,6 +22,8 @@ use crate::error::Error;
 
 /// How often health readings go out, in event time.
 const HEALTH_INTERVAL: Span = Span::from_ms(1000);
+/// A batch so many ticks behind the newest is of a producer whose numbers begin again: the service does not wait for one as late.
+const ANEW: u64 = 256;
 
 /// A message to be played.
 #[derive(Debug)]
@@ -189,7 +191,7 @@ impl<'a> Playlist<'a> {
         let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else {
             return (Load::Unreadable, frame.into(), None, false);
         };
-        let (series, begins) = self.series.number(unit, first.series);
+        let (series, begins) = self.series.number(unit, first, last);
         let times = Some((first.end_time, last.end_time));
         let ticks = GyroTicks { series, first: first.sequence, count: batch.ticks.len() as u64 };
         batch.ticks.iter_mut().for_each(|tick| tick.series = series);
@@ -234,13 +236,36 @@ pub(crate) fn wanted(topics: &[OwnedKeyExpr], topic: &Topic) -> bool {
     keyexpr::new(key.as_str()).is_ok_and(|key| topics.iter().any(|wanted| wanted.intersects(key)))
 }
 
-/// Numbers for the series of a log: each of its series becomes one of this player, in the order of their first batches.
+/// Numbers for the series of a log: each of its series becomes one of this player, in the order of their first batches; one whose
+/// ticks begin again becomes another.
 #[derive(Debug)]
 struct SeriesNumbers {
     next: u64,
     // Looked up only.
-    known: HashMap<(UnitId, u64), u64>,
+    known: HashMap<(UnitId, u64), Known>,
     last: HashMap<UnitId, u64>,
+}
+
+/// A series of the log.
+#[derive(Debug)]
+struct Known {
+    number: u64,
+    /// Sequence number of its first tick.
+    first: u64,
+    /// Sequence number and end of its newest.
+    newest: (u64, Timestamp),
+}
+
+impl Known {
+    /// Whether a batch of the series begins it again, rather than to come late or twice.
+    fn begins_again(&self, first: &GyroTick, last: &GyroTick) -> bool {
+        let (newest, end_time) = self.newest;
+        if first.sequence > newest || last.sequence == newest {
+            return false;
+        }
+        let behind = newest - if last.sequence < newest { last.sequence } else { first.sequence };
+        behind >= ANEW || first.sequence == self.first || first.end_time > end_time
+    }
 }
 
 impl SeriesNumbers {
@@ -248,13 +273,22 @@ impl SeriesNumbers {
         Self { next: first, known: HashMap::new(), last: HashMap::new() }
     }
 
-    /// The number of a unit's series, and whether it is another than the unit's last one.
-    fn number(&mut self, unit: &UnitId, series: u64) -> (u64, bool) {
-        let number = *self.known.entry((unit.clone(), series)).or_insert_with(|| {
-            let number = self.next;
-            self.next = self.next.wrapping_add(1);
-            number
-        });
+    /// The number of the series of a unit's batch, and whether it is another than the unit's last one.
+    fn number(&mut self, unit: &UnitId, first: &GyroTick, last: &GyroTick) -> (u64, bool) {
+        let newest = (last.sequence, last.end_time);
+        let series = (unit.clone(), first.series);
+        let number = match self.known.get_mut(&series) {
+            Some(known) if !known.begins_again(first, last) => {
+                known.newest = known.newest.max(newest);
+                known.number
+            }
+            _ => {
+                let number = self.next;
+                self.next = self.next.wrapping_add(1);
+                self.known.insert(series, Known { number, first: first.sequence, newest });
+                number
+            }
+        };
         (number, self.last.insert(unit.clone(), number) != Some(number))
     }
 
@@ -273,12 +307,34 @@ mod tests {
     fn a_restart_stays_one_and_another_pass_is_a_new_one() {
         let (a, b) = (UnitId::new("A").unwrap(), UnitId::new("B").unwrap());
         let mut numbers = SeriesNumbers::from(100);
-        let first: Vec<_> = [(&a, 0), (&b, 0), (&a, 0), (&a, 900), (&a, 0), (&a, 900)]
-            .map(|(unit, series)| numbers.number(unit, series))
-            .into();
+        let tick = |series, sequence| GyroTick { series, sequence, ..GyroTick::default() };
+        let first = [(&a, 0, 7), (&b, 0, 7), (&a, 0, 8), (&a, 900, 0), (&a, 0, 9), (&a, 900, 1)]
+            .map(|(unit, series, sequence)| (unit, tick(series, sequence)))
+            .map(|(unit, tick)| numbers.number(unit, &tick, &tick));
         assert_eq!(first, [(100, true), (101, true), (100, false), (102, true), (100, true), (102, true)]);
         numbers.begin_anew();
-        assert_eq!(numbers.number(&a, 0), (103, true));
+        assert_eq!(numbers.number(&a, &tick(0, 9), &tick(0, 9)), (103, true));
+    }
+
+    #[test]
+    fn a_log_whose_numbers_begin_again_goes_on_in_another_series() {
+        let unit = UnitId::new("A").unwrap();
+        // Number of a batch's first tick and its end (ms); batches are of ten ticks, one each millisecond.
+        let series = |batches: &[(u64, i64)]| {
+            let mut numbers = SeriesNumbers::from(0);
+            let tick = |sequence, ms| {
+                let end_time = Timestamp::from_ns(ms * 1_000_000);
+                GyroTick { sequence, end_time, ..GyroTick::default() }
+            };
+            let number = |&(first, ms): &(u64, i64)| {
+                numbers.number(&unit, &tick(first, ms), &tick(first + 9, ms + 9)).0
+            };
+            batches.iter().map(number).collect::<Vec<_>>()
+        };
+        assert_eq!(series(&[(50, 50), (60, 60), (50, 50), (60, 60)]), [0, 0, 1, 1], "a short log twice");
+        assert_eq!(series(&[(50, 50), (900, 900), (60, 60), (70, 70)]), [0, 0, 1, 1], "far behind");
+        assert_eq!(series(&[(50, 50), (90, 90), (0, 100), (10, 110)]), [0, 0, 1, 1], "time goes on");
+        assert_eq!(series(&[(50, 50), (50, 50), (60, 60), (80, 80), (70, 70), (70, 70), (90, 90)]), [0; 7]);
     }
 
     #[test]

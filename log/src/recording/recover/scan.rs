@@ -9,6 +9,7 @@ use mcap::records::{Record, op};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::file::open_log;
 use crate::recording::record::{LONGEST_RECORD, chunk_records, metadata_length, parse};
 use crate::recording::walk::{HEAD, RecordFile, head_of, number};
 use crate::recording::{MAGIC, METADATA};
@@ -65,7 +66,7 @@ impl Scanner {
     /// [`Error::File`].
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let failed = |source| Error::file(path, "open the recording", source);
-        let file = File::open(path).map_err(failed)?;
+        let file = open_log(path, "open the recording")?;
         let mut records = RecordFile::new(file, WINDOW).map_err(failed)?;
         let magic = records.load(0, MAGIC.len()).map_err(failed)?;
         let offset = if magic == MAGIC { MAGIC.len() as u64 } else { 0 };

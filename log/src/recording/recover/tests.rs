@@ -213,5 +213,21 @@ fn what_is_no_recording_is_refused_and_nothing_is_written_over() {
     assert!(recover(&input, &input, overwrite).is_err());
     std::fs::write(&output, "mine").unwrap();
     assert!(recover(&input, &output, RecordingOptions::default()).is_err());
+    // What fails leaves what is there.
+    assert!(recover(&input, &output, overwrite).is_err());
     assert_eq!(std::fs::read(&output).unwrap(), b"mine");
+    let partial = folder.path().join("y.partial");
+    std::fs::rename(&input, &partial).unwrap();
+    assert!(recover(&partial, &output, overwrite).is_err_and(|error| error.is_usage()));
+    assert!(partial.exists());
+}
+
+#[test]
+fn a_recording_has_its_name_when_it_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("x"), folder.path().join("y"));
+    write(&input, true);
+    let watch = |_: &RecoveryReport| assert!(!output.exists());
+    Recovery::open(&input).unwrap().run(&output, RecordingOptions::default(), watch).unwrap();
+    assert_eq!(read(&output).0, messages());
 }

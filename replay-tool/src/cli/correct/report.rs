@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use isotherm_log::diff::Account;
 use isotherm_log::offline::UnitReport;
 use isotherm_log::source::LogReport;
 use serde::Serialize;
@@ -23,11 +24,14 @@ pub(super) struct Report<'r> {
 
 impl<'r> Report<'r> {
     pub(super) fn new(units: &'r [UnitReport], log: &'r LogReport) -> Self {
-        let mut compared = units.iter().filter_map(|unit| unit.published.as_ref()).peekable();
-        let identical = compared.peek().is_some().then(|| compared.all(isotherm_log::diff::Account::agrees));
-        let unfinished =
-            units.iter().filter_map(|unit| unit.published.as_ref()).map(|account| account.unfinished).sum();
-        Self { units, log, identical, unfinished }
+        let mut report = Self { units, log, identical: None, unfinished: 0 };
+        report.identical = report.compared().next().is_some().then(|| report.compared().all(Account::agrees));
+        report.unfinished = report.compared().map(|account| account.unfinished).sum();
+        report
+    }
+
+    fn compared(&self) -> impl Iterator<Item = &'r Account> + use<'r> {
+        self.units.iter().filter_map(|unit| unit.published.as_ref())
     }
 
     pub(super) fn lost_data(&self) -> bool {
@@ -72,24 +76,41 @@ impl<'r> Report<'r> {
         };
         let mut text = show::grid(head, self.units.iter().map(row), 1..6);
         for unit in self.units {
-            let first = unit.published.as_ref().filter(|account| !account.agrees());
+            let first = unit.published.as_ref().filter(|_| !agrees_where_recorded(unit));
             if let Some(first) = first.and_then(|account| account.first.as_ref()) {
                 let _ = writeln!(text, "\nunit {}: the first difference", unit.unit);
                 text += &first_difference(first, ["corrected", "published"]);
             }
         }
+        text + &self.verdict()
+    }
+
+    /// Whether what was published is reproduced; nothing where nothing was compared.
+    fn verdict(&self) -> String {
         match self.identical {
             Some(true) if self.unfinished > 0 => {
-                text += "identical as far as the recording has raw ticks: every other tick that the service published is reproduced to the bit\n";
+                "identical as far as the recording has raw ticks: every other tick that the service published is reproduced to the bit\n".to_owned()
             }
-            Some(true) => {
-                text += "identical: every tick that the service published is reproduced to the bit\n";
+            Some(true) => "identical: every tick that the service published is reproduced to the bit\n".to_owned(),
+            Some(false) if self.units.iter().all(agrees_where_recorded) => {
+                let unrecorded: u64 = self.compared().map(Account::unrecorded).sum();
+                format!(
+                    "incomplete: {unrecorded} ticks are not in the recording (dropped on the way to the recorder: congestion = \"block\" \
+                     keeps them); every other is reproduced to the bit\n"
+                )
             }
-            Some(false) => text += "different: not every tick that the service published is reproduced\n",
-            None => {}
+            Some(false) => "different: not every tick that the service published is reproduced\n".to_owned(),
+            None => String::new(),
         }
-        text
     }
+}
+
+/// Whether every published tick that the recording has is reproduced, and only the recorder can have missed others: a service that
+/// did not run would have heard less than it.
+fn agrees_where_recorded(unit: &UnitReport) -> bool {
+    let agrees =
+        |account: &Account| account.agrees() || (account.unrecorded() > 0 && unit.replica.is_exact());
+    unit.published.as_ref().is_none_or(agrees)
 }
 
 /// What became of the journal, in a few words.
@@ -118,6 +139,35 @@ fn published(unit: &UnitReport) -> String {
     if account.agrees() {
         return format!("{} identical{tail}", account.ticks);
     }
+    if agrees_where_recorded(unit) {
+        return format!("{} identical, {} not recorded{tail}", account.ticks, account.unrecorded());
+    }
     let missing = account.missing();
     format!("{} of {} differ, {missing} in one alone{tail}", account.different, account.ticks)
+}
+
+#[cfg(test)]
+mod tests {
+    use isotherm_log::diff::Only;
+    use isotherm_log::text::ReadReport;
+
+    use super::*;
+
+    #[test]
+    fn what_only_the_recorder_missed_is_not_said_to_be_different() {
+        let only_a = Only { between: 244, ..Only::default() };
+        let account = Account { ticks: 4756, only_a, ..Account::default() };
+        let unit = UnitReport {
+            unit: isotherm_protocol::key::UnitId::new("A-1").unwrap(),
+            by_journal: true,
+            summary: isotherm_log::offline::sums::Summary::default(),
+            counters: std::collections::BTreeMap::new(),
+            replica: isotherm_log::replica::ReplicaReport::default(),
+            published: Some(account),
+        };
+        let log = LogReport::Text(ReadReport::default());
+        insta::assert_snapshot!(
+            published(&unit) + "\n" + &Report::new(std::slice::from_ref(&unit), &log).verdict()
+        );
+    }
 }
