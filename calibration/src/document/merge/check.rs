@@ -100,10 +100,10 @@ pub(super) fn chosen<'a>(
                     keys().filter(|key| covers(parent, key)).filter_map(|key| key.get(parent.len() + 1..));
                 rest.map(|rest| format!("{parent}.{}", rest.split('.').next().unwrap_or(rest))).collect()
             };
-            let near: BTreeSet<String> = parents
-                .map(below)
-                .find(|near: &BTreeSet<_>| !near.is_empty())
-                .unwrap_or_else(|| keys().cloned().collect());
+            let near: BTreeSet<String> =
+                parents.map(below).find(|near: &BTreeSet<_>| !near.is_empty()).unwrap_or_else(|| {
+                    keys().map(|key| key.split('.').next().unwrap_or(key).to_owned()).collect()
+                });
             Err(Error::Usage(format!(
                 "--take {}={}: no document has this key; there are {}",
                 take.key,
