@@ -123,7 +123,7 @@ impl StepSum {
         tick: &CorrectedTick,
         emit: &mut E,
     ) {
-        if self.sums(step) {
+        if self.sums(*step) {
             self.sum(*step, tick, emit);
         } else {
             emit(tick);
@@ -132,7 +132,7 @@ impl StepSum {
 
     /// Whether the next tick is summed, and not a step by itself.
     #[inline]
-    pub(crate) fn sums(&self, step: &NavigationStep) -> bool {
+    pub(crate) const fn sums(&self, step: NavigationStep) -> bool {
         step.ticks > 1 || step.coning_sculling || self.open.is_some()
     }
 

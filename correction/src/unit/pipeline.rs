@@ -215,7 +215,7 @@ impl Pipeline {
         let mut untold = run.before.after(core::mem::take(&mut self.unannounced));
         let mut unseen = run.before.after(core::mem::take(&mut self.unseen));
         let mut accels = run.accels.iter();
-        let sums = self.steps.sums(&self.settings.navigation);
+        let sums = self.steps.sums(self.settings.navigation);
         if let Some(active) = &self.active {
             let out = &mut self.corrected;
             (out.ticks, out.series, out.revision) = (1, first.series, active.revision);
