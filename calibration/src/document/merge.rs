@@ -60,7 +60,7 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
     let old = sections(&tree(&base.document)?);
     let new: Vec<Sections> =
         parts.iter().map(|part| Ok(sections(&tree(&part.document)?))).collect::<Result<_, Error>>()?;
-    chosen(take, new.iter().chain([&old]))?;
+    chosen(take, (&old, &new))?;
     let mut picked = Picked { sections: old.clone(), ..Picked::default() };
     for key in old.keys() {
         picked.from.insert(key.clone(), base.name.clone());

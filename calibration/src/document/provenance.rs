@@ -48,7 +48,7 @@ fn log_of(path: &Path) -> Result<Log, Error> {
 
 /// Whether two files have the same contents. What cannot be read is told by who reads it next.
 pub(crate) fn are_copies(one: &Path, other: &Path) -> bool {
-    let length = |path: &Path| Some(path.metadata().ok().filter(|about| about.is_file())?.len());
+    let length = |path: &Path| Some(path.metadata().ok().filter(std::fs::Metadata::is_file)?.len());
     let lengths = [one, other].map(length);
     lengths[0].is_some() && lengths[0] == lengths[1] && of_file(one).ok() == of_file(other).ok()
 }

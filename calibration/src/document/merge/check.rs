@@ -86,11 +86,8 @@ pub(super) fn check(base: &Written, parts: &[Written], take: &[Take]) -> Result<
 }
 
 /// Refuses choices of keys that no document has.
-pub(super) fn chosen<'a>(
-    take: &[Take],
-    documents: impl Iterator<Item = &'a Sections> + Clone,
-) -> Result<(), Error> {
-    let keys = || documents.clone().flat_map(Sections::keys);
+pub(super) fn chosen(take: &[Take], (base, parts): (&Sections, &[Sections])) -> Result<(), Error> {
+    let keys = || parts.iter().chain([base]).flat_map(Sections::keys);
     match take.iter().find(|take| !keys().any(|key| covers(&take.key, key))) {
         None => Ok(()),
         Some(take) => {

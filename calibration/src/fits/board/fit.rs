@@ -211,8 +211,8 @@ fn tell(
     report.notes.push(format!("Each of {} runs less its mean.", wanted.runs.len()));
     let chosen =
         |sensor: &AccelSensor| wanted.reference_deg_c.or(about(sensor.board_ratio_error.as_ref())).is_none();
-    let middle = sensors.iter().zip(found).filter(|(sensor, _)| chosen(sensor));
-    if let Some(ratio) = middle.filter_map(|(_, found)| found.as_ref().ok()).next() {
+    let mut middle = sensors.iter().zip(found).filter(|(sensor, _)| chosen(sensor));
+    if let Some(ratio) = middle.find_map(|(_, found)| found.as_ref().ok()) {
         report.warnings.push(format!(
             "r is 1 at {} °C, the middle of the board's range: the scale factors of the document must hold there; if they were \
              calibrated with the board at another temperature, give it with --reference",

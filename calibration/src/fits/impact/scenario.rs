@@ -168,7 +168,7 @@ impl Voyage {
         let mut ins = Ins::new(self.latitude_deg, self.turn_ratio, step_s);
         let (mut points, mut kept) = (Vec::new(), Vec::new());
         let mut hours = 0.0;
-        let steps = alone.len() / STEP_TICKS;
+        let last = alone.len() / STEP_TICKS;
         for (index, step) in alone.chunks_exact(STEP_TICKS).enumerate() {
             let mut mean = [0.0; 3];
             for drift in step {
@@ -176,7 +176,7 @@ impl Voyage {
             }
             ins.step(mean);
             hours += step_s / 3600.0;
-            if (index + 1) % POINT_STEPS == 0 || index + 1 == steps {
+            if (index + 1) % POINT_STEPS == 0 || index + 1 == last {
                 points.push((hours, ins.errors()));
                 kept.push(mean);
             }

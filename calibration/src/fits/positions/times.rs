@@ -52,11 +52,13 @@ impl Times {
         let own = |log: &Option<String>| log.as_ref().is_none_or(|log| *log == track.run);
         let rows = || self.rows.iter().filter(|(.., log)| own(log)).enumerate();
         for (at, (span, name, _)) in rows() {
-            let overlaps = |other: &[f64; 2]| other[0] < span[1] - 1e-9 && span[0] < other[1] - 1e-9;
-            if let Some((_, (other, before, _))) = rows().take(at).find(|(_, (other, ..))| overlaps(other)) {
+            let [start, end] = *span;
+            let overlaps = |[from, to]: [f64; 2]| from < end - 1e-9 && start < to - 1e-9;
+            if let Some((_, ([from, to], before, _))) =
+                rows().take(at).find(|(_, (other, ..))| overlaps(*other))
+            {
                 reasons.push(format!(
-                    "--times: {name} from {} to {} s overlaps {before} from {} to {} s: each tick counts once",
-                    span[0], span[1], other[0], other[1]
+                    "--times: {name} from {start} to {end} s overlaps {before} from {from} to {to} s: each tick counts once"
                 ));
                 continue;
             }
