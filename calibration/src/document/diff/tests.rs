@@ -129,7 +129,7 @@ fn standard_errors_grow_away_from_the_temperature_that_a_curve_is_given_about() 
     // Eighty degrees further a slope known to 0.01 °/h per °C adds 0.8 °/h; of the axes' slopes no error is known.
     let (bias, axis) = sigmas(-60.0);
     assert!((bias.unwrap() - 1.36_f64.sqrt()).abs() < 1e-9, "{bias:?}");
-    assert_eq!(axis, [0.0; 3]);
+    assert!(axis.iter().all(|sigma| sigma.abs() < 1e-12), "{axis:?}");
     let (_, axis) = sigmas(20.0);
     assert!((axis[1] - 18.0_f64.sqrt()).abs() < 1e-9, "{axis:?}");
 }
