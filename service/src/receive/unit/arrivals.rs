@@ -244,7 +244,7 @@ mod tests {
         // What the counters of another instance had before did not come here.
         arrivals.go_on_from(start + Duration::from_millis(1500), &counters(9000, 50));
         assert_eq!(arrivals.look(start + Duration::from_millis(2500), &counters(9020, 50)), None);
-        assert_eq!(arrivals.rates().gyro_ticks_per_s, 20.0);
+        assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (20.0, 0.0));
     }
 
     #[test]
