@@ -15,7 +15,7 @@ mod provenance;
 pub mod show;
 mod written;
 
-use isotherm_protocol::document::{AccelSensor, Document};
+use isotherm_protocol::document::{AccelSensor, Curve, Document, Shape};
 
 pub use fitted::{About, Fitted};
 pub(crate) use fitted::{by_name, rows};
@@ -38,4 +38,17 @@ pub(crate) fn accel_name(document: &Document, index: usize) -> &str {
 /// The accelerometers of a document.
 pub fn accelerometers(document: &Document) -> &[AccelSensor] {
     document.accel.as_ref().map_or(&[], |accel| &accel.sensor)
+}
+
+/// The scale factor that a document states of an accelerometer at a temperature (°C); 1 where it states none there.
+pub(crate) fn scale_at(sensor: &AccelSensor, deg_c: f64) -> f64 {
+    sensor.scale_factor.shape().at(deg_c).unwrap_or(1.0)
+}
+
+/// Temperature that a polynomial is given about (°C).
+pub(crate) fn about(curve: Option<&Curve>) -> Option<f64> {
+    match curve?.shape() {
+        Shape::Polynomial { reference, .. } => Some(*reference),
+        _ => None,
+    }
 }

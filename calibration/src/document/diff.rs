@@ -13,12 +13,12 @@ use isotherm_correction::calibration::Steady;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 use isotherm_protocol::control::DocumentChange;
-use isotherm_protocol::document::{Curve, Document, OrientationThermal, Shape, difference, turn_rad};
+use isotherm_protocol::document::{Document, OrientationThermal, difference, turn_rad};
 use serde::Serialize;
 
 use crate::document::show::terms::{terms, tree};
 use crate::document::show::{places, range_of, steady};
-use crate::document::{Written, accelerometers};
+use crate::document::{Written, about, accelerometers};
 use crate::error::Error;
 use crate::numbers::norm;
 use crate::report::Sigmas;
@@ -153,14 +153,6 @@ fn axes_over<'a>(document: &'a Document, kind: &str) -> Option<&'a OrientationTh
         return document.gyro.orientation.thermal.as_ref();
     }
     document.accel.as_ref()?.orientation.thermal.as_ref()
-}
-
-/// Temperature that a polynomial is given about (°C).
-pub(crate) fn about(curve: Option<&Curve>) -> Option<f64> {
-    match curve?.shape() {
-        Shape::Polynomial { reference, .. } => Some(*reference),
-        _ => None,
-    }
 }
 
 struct Compared<'a> {

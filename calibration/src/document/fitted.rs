@@ -64,12 +64,9 @@ impl About {
         if let Some(before) = before.filter(|before| before.tool.is_some() || before.method.is_some()) {
             // What the rest of the document rests on.
             let [tool, method] = [before.tool, before.method].map(Option::unwrap_or_default);
-            let earlier = json!({ "tool": tool, "method": method, "log": before.log });
-            let mut earlier = kept(earlier).unwrap_or_else(|| toml::Table::new().into());
-            if let (Some(earlier), Some(still)) = (earlier.as_table_mut(), details.remove(BEFORE)) {
-                earlier.insert(BEFORE.to_owned(), still);
-            }
-            details.insert(BEFORE.to_owned(), earlier);
+            let still = details.remove(BEFORE);
+            let earlier = json!({ "tool": tool, "method": method, "log": before.log, (BEFORE): still });
+            details.extend(kept(earlier).map(|earlier| (BEFORE.to_owned(), earlier)));
         }
         let mut own = json!({
             "verdict": report.headline(),

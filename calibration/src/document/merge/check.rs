@@ -88,25 +88,21 @@ pub(super) fn check(base: &Written, parts: &[Written], take: &[Take]) -> Result<
 /// Refuses choices of keys that no document has.
 pub(super) fn chosen(take: &[Take], (base, parts): (&Sections, &[Sections])) -> Result<(), Error> {
     let keys = || parts.iter().chain([base]).flat_map(Sections::keys);
-    match take.iter().find(|take| !keys().any(|key| covers(&take.key, key))) {
-        None => Ok(()),
-        Some(take) => {
-            let parents = std::iter::successors(Some(take.key.as_str()), |key| Some(key.rsplit_once('.')?.0));
-            let below = |parent: &str| {
-                let rest =
-                    keys().filter(|key| covers(parent, key)).filter_map(|key| key.get(parent.len() + 1..));
-                rest.map(|rest| format!("{parent}.{}", rest.split('.').next().unwrap_or(rest))).collect()
-            };
-            let near: BTreeSet<String> =
-                parents.map(below).find(|near: &BTreeSet<_>| !near.is_empty()).unwrap_or_else(|| {
-                    keys().map(|key| key.split('.').next().unwrap_or(key).to_owned()).collect()
-                });
-            Err(Error::Usage(format!(
-                "--take {}={}: no document has this key; there are {}",
-                take.key,
-                take.from,
-                near.into_iter().collect::<Vec<_>>().join(", ")
-            )))
-        }
-    }
+    let Some(take) = take.iter().find(|take| !keys().any(|key| covers(&take.key, key))) else {
+        return Ok(());
+    };
+    let parents = std::iter::successors(Some(take.key.as_str()), |key| Some(key.rsplit_once('.')?.0));
+    let first = |key: &str| key.split('.').next().unwrap_or(key).to_owned();
+    let below = |parent: &str| -> BTreeSet<String> {
+        let rest = keys().filter(|key| covers(parent, key)).filter_map(|key| key.get(parent.len() + 1..));
+        rest.map(|rest| format!("{parent}.{}", first(rest))).collect()
+    };
+    let near = parents.map(below).find(|near| !near.is_empty());
+    let near = near.unwrap_or_else(|| keys().map(|key| first(key)).collect());
+    Err(Error::Usage(format!(
+        "--take {}={}: no document has this key; there are {}",
+        take.key,
+        take.from,
+        near.into_iter().collect::<Vec<_>>().join(", ")
+    )))
 }

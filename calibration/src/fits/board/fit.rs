@@ -5,8 +5,7 @@ use isotherm_protocol::document::{AccelSensor, Document};
 
 use super::model::{Ratio, Rows};
 use crate::axes::{main_axis, output_name};
-use crate::document::diff::about;
-use crate::document::{Written, accelerometers, tidy};
+use crate::document::{Written, about, accelerometers, tidy};
 use crate::error::Error;
 use crate::finding::AccelKind;
 use crate::fits::thermal::samples::Samples;
@@ -33,10 +32,17 @@ pub struct Wanted<'a> {
     pub stands: &'a [Stand],
     /// Document with the accelerometers and the channel of their board.
     pub base: &'a Document,
-    /// Temperature of the board at which r is 1 (°C); the middle of what was seen where absent.
+    /// Temperature of the board at which r is 1 (°C); where absent that of the base, or the middle of what was seen.
     pub reference_deg_c: Option<f64>,
     /// Windows (s).
     pub window_s: f64,
+}
+
+impl Wanted<'_> {
+    /// Temperature of the board at which r of an accelerometer is 1 (°C): the stated one, else where it was.
+    fn reference_of(&self, sensor: &AccelSensor) -> Option<f64> {
+        self.reference_deg_c.or(about(sensor.board_ratio_error.as_ref()))
+    }
 }
 
 /// What came of it.
@@ -74,8 +80,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
         .enumerate()
         .map(|(index, sensor)| {
             let (rows, channels) = rows(wanted, &samples, index, sensor)?;
-            let stated = about(sensor.board_ratio_error.as_ref());
-            rows.fit(wanted.reference_deg_c.or(stated), &channels)
+            rows.fit(wanted.reference_of(sensor), &channels)
         })
         .collect();
     if found.iter().all(Result::is_err) {
@@ -209,9 +214,7 @@ fn tell(
         }
     }
     report.notes.push(format!("Each of {} runs less its mean.", wanted.runs.len()));
-    let chosen =
-        |sensor: &AccelSensor| wanted.reference_deg_c.or(about(sensor.board_ratio_error.as_ref())).is_none();
-    let mut middle = sensors.iter().zip(found).filter(|(sensor, _)| chosen(sensor));
+    let mut middle = sensors.iter().zip(found).filter(|(sensor, _)| wanted.reference_of(sensor).is_none());
     if let Some(ratio) = middle.find_map(|(_, found)| found.as_ref().ok()) {
         report.warnings.push(format!(
             "r is 1 at {} °C, the middle of the board's range: the scale factors of the document must hold there; if they were \

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::fit::{Made, ServoFit};
 use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
-use crate::document::{by_name, rows, tidy};
+use crate::document::{about, by_name, rows, tidy};
 use crate::numbers::unit;
 use crate::report::{Sigmas, gyros as gyros_in_words};
 
@@ -109,10 +109,7 @@ pub(crate) fn widened([low, high]: [f64; 2]) -> [f64; 2] {
 pub fn reference_of(base: &Document) -> f64 {
     let of = |sensor: &GyroSensor| {
         let curves = [Feature::One, Feature::LasingMode].map(|feature| sensor.terms.curve(feature));
-        curves.into_iter().flatten().find_map(|curve| match curve.shape() {
-            Shape::Polynomial { reference, .. } => Some(*reference),
-            _ => None,
-        })
+        curves.into_iter().find_map(about)
     };
     base.gyro.sensor.iter().find_map(of).unwrap_or(REFERENCE_DEG_C)
 }

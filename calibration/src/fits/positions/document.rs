@@ -6,19 +6,19 @@ use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationTherm
 
 use super::fit::Analysis;
 use super::model::Sensor;
-use crate::document::{accel_name, accelerometers, tidy};
+use crate::document::{accel_name, accelerometers, scale_at, tidy};
 use crate::numbers::{hull, unit};
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
 const ROOM_DEG_C: f64 = 1.0;
 
 /// Puts what was found into a document.
-pub fn complete(document_of: &Document, analysis: &Analysis, gravity: f64) -> Document {
-    let mut document = document_of.clone();
+pub fn complete(base: &Document, analysis: &Analysis, gravity: f64) -> Document {
+    let mut document = base.clone();
     let Some(accel) = &mut document.accel else { return document };
     let scale_unit = accel.output.scale_unit();
     let found = analysis.fit.sensors.iter().zip(&analysis.sensors_deg_c);
-    let signs = signs(document_of, analysis);
+    let signs = signs(base, analysis);
     for ((sensor, sign), (found, deg_c)) in accel.sensor.iter_mut().zip(&signs).zip(found) {
         let range = with_room(deg_c.range);
         let scale: Vec<f64> = found.scale.iter().map(|k| sign * k / gravity).collect();
@@ -56,11 +56,6 @@ pub(crate) fn held_twice(document: &Document) -> Vec<String> {
 fn signs(document: &Document, analysis: &Analysis) -> Vec<f64> {
     let stated = accelerometers(document).iter().zip(&analysis.sensors_deg_c);
     stated.map(|(sensor, deg_c)| scale_at(sensor, deg_c.mean).signum()).collect()
-}
-
-/// The scale factor that a document states at a temperature (°C); 1 where it states none there.
-pub(super) fn scale_at(sensor: &AccelSensor, deg_c: f64) -> f64 {
-    sensor.scale_factor.shape().at(deg_c).unwrap_or(1.0)
 }
 
 /// Range of the document (°C): of all curves, and of the axes.

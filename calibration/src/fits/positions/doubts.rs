@@ -3,7 +3,6 @@
 use isotherm_protocol::document::{AccelSensor, Document};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::document::scale_at;
 use super::fit::{Analysis, Settings};
 use super::model::{Degrees, Sensor, Taken};
 use super::plan::Plan;
@@ -12,6 +11,7 @@ use super::solve::Fit;
 use super::temperature::Temperatures;
 use super::{measure, model};
 use crate::axes::{AXES, sensor_name, several};
+use crate::document::scale_at;
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
 use crate::numbers::{ARCSEC_PER_RAD, real};

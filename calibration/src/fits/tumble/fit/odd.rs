@@ -4,6 +4,7 @@ use isotherm_protocol::document::Document;
 
 use super::Tumble;
 use crate::axes::{AXES, several};
+use crate::document::scale_at;
 use crate::fits::positions::measure;
 use crate::fits::positions::sense::{Beside, elsewhere, out_of_place, places};
 use crate::report::short;
@@ -45,7 +46,7 @@ pub(in crate::fits::tumble) fn odd(
     let mut words = Vec::new();
     if let Some(accel) = &base.accel {
         let stated: Vec<f64> = (accel.sensor.iter())
-            .map(|sensor| sensor.scale_factor.shape().at(temperature(sensor.channel.as_ref())).unwrap_or(1.0))
+            .map(|sensor| scale_at(sensor, temperature(sensor.channel.as_ref())))
             .collect();
         let found = tumble.accel.scale.iter().zip(&tumble.accel.rows);
         let beside = found
