@@ -113,8 +113,8 @@ impl Recovery {
     /// and then.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the new file, or what it is called before, is the old one, [`Error::File`] where one cannot be read or the other not be
-    /// written, and where nothing in the old one is of a recording.
+    /// [`Error::Usage`] where the new file, or what it is called before, is the old one, [`Error::File`] where one cannot be read or
+    /// the other not be written, and where nothing in the old one is of a recording.
     pub fn run(
         &self,
         output: &Path,
