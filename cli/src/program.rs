@@ -46,22 +46,26 @@ impl Common {
         match self {
             Self::Completions { shell } => {
                 let name = command.get_name().to_owned();
-                clap_complete::generate(*shell, &mut command, name, &mut printed);
+                clap_complete::generate(*shell, &mut command, &name, &mut printed);
+                if *shell == Shell::Bash {
+                    // It spells the hyphen of a program's name in two ways (clap_complete 4.6).
+                    let script = String::from_utf8_lossy(&printed);
+                    let one_way = script.replace(&name.replace('-', "__subcmd__"), &name.replace('-', "__"));
+                    printed = one_way.into_bytes();
+                }
             }
             Self::Man { out } => {
-                clap_mangen::generate_to(with_versions(command), out)
-                    .map_err(|error| (out.clone(), error))?;
+                clap_mangen::generate_to(for_pages(command), out).map_err(|error| (out.clone(), error))?;
             }
         }
         Ok(printed)
     }
 }
 
-/// Has every command show the version, which its page names.
-fn with_versions(command: Command) -> Command {
-    let names: Vec<_> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
-    let with_version = |sub: Command| sub.version(env!("CARGO_PKG_VERSION")).disable_version_flag(true);
-    names.into_iter().fold(command, |command, name| command.mut_subcommand(name, with_version))
+/// Has every command show the version, which its page names, and describe its rare options there too.
+fn for_pages(command: Command) -> Command {
+    let whole = |sub: Command| for_pages(sub.version(env!("CARGO_PKG_VERSION")).disable_version_flag(true));
+    command.mut_args(|arg| arg.hide_short_help(false)).mut_subcommands(whole)
 }
 
 #[cfg(test)]
@@ -106,14 +110,32 @@ mod tests {
         pages.sort();
         assert_eq!(pages, ["program-act.1", "program-completions.1", "program-man.1", "program.1"]);
         let page = std::fs::read_to_string(folder.path().join("program-act.1")).unwrap();
-        assert!(page.contains("rarely") && page.contains(env!("CARGO_PKG_VERSION")), "{page}");
+        assert!(page.contains("How rarely") && page.contains(env!("CARGO_PKG_VERSION")), "{page}");
         let (folder, error) = run(&["program", "man", "--out", "/no/such/folder"]).unwrap_err();
         assert_eq!((folder.to_str(), error.kind()), (Some("/no/such/folder"), io::ErrorKind::NotFound));
     }
 
+    #[derive(Debug, Parser)]
+    #[command(name = "two-words", version)]
+    struct TwoWords {
+        #[command(subcommand)]
+        command: Common,
+    }
+
+    /// What the script calls a command, and the cases in which it completes one.
     #[test]
-    fn completions_name_the_commands() {
-        let script = run(&["program", "completions", "bash"]).unwrap();
-        assert!(String::from_utf8(script).unwrap().contains("program__subcmd__act"));
+    fn bash_completes_every_command_that_it_recognises() {
+        let completions = Common::Completions { shell: Shell::Bash };
+        for (script, commands) in [(completions.made::<Cli>(), 4), (completions.made::<TwoWords>(), 3)] {
+            let script = String::from_utf8(script.unwrap()).unwrap();
+            let names: Vec<_> =
+                script.lines().filter_map(|line| line.trim().strip_prefix("cmd=\"")).collect();
+            let names: Vec<_> =
+                names.iter().map(|name| name.trim_end_matches('"')).filter(|n| !n.is_empty()).collect();
+            assert!(names.len() >= commands, "{script}");
+            for name in names {
+                assert!(script.contains(&format!("\n        {name})")), "{name}:\n{script}");
+            }
+        }
     }
 }

@@ -160,7 +160,10 @@ async fn change(
     let key = key::calibration(&unit);
     let sent = name.map(|name| (key.as_str(), name));
     tell(&preview, sent);
-    if consent.dry_run || preview.outcome != SwapOutcome::WouldBeAccepted {
+    // An order that will be refused is given too, where nobody needs to be asked: history and alerts know of it.
+    let is_refused = preview.outcome == SwapOutcome::Refused;
+    let is_wanted = preview.outcome == SwapOutcome::WouldBeAccepted || is_refused && consent.yes;
+    if consent.dry_run || !is_wanted {
         return Ok(result(&preview, consent.json));
     }
     if !consent.yes {
@@ -171,7 +174,7 @@ async fn change(
     let reply = wish.ask(&client, &unit, false).await?;
     if reply.outcome == SwapOutcome::Accepted {
         say(wait(&mut follow, &reply, client.timeout).await);
-    } else {
+    } else if !is_refused {
         tell(&reply, sent);
     }
     client.close().await;

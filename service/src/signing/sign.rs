@@ -1,5 +1,6 @@
 //! The `sign` command.
 
+use std::fs::canonicalize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -35,7 +36,7 @@ pub struct SignArgs {
     /// Signed document to write, instead of changing the original; for a single document
     #[arg(long = "out", alias = "output", value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Replace an existing signature, valid or not
+    /// Replace an existing signature, valid or not, and the file of --out
     #[arg(long = "overwrite", alias = "replace")]
     pub replace: bool,
     /// Print one JSON object on stdout instead
@@ -69,6 +70,10 @@ pub fn run(args: &SignArgs) -> Exit {
         say("isotherm: --out names one file, so one document can be given with it");
         return Exit::Usage;
     }
+    if let Some(words) = args.output.as_deref().and_then(|output| kept(args, output)) {
+        say(words);
+        return Exit::Usage;
+    }
     let key = match private_key::read(&args.key) {
         Ok((key, warning)) => {
             say_problems(&[], warning.as_slice());
@@ -92,6 +97,21 @@ pub fn run(args: &SignArgs) -> Exit {
     }
     let outcomes: Vec<_> = prepared.into_iter().map(|(outcome, _)| outcome).collect();
     report(&outcomes, key.public().id(), args.json)
+}
+
+/// Why the file of --out is not written over; `None` where it may be. The document itself is signed in its place.
+fn kept(args: &SignArgs, output: &Path) -> Option<String> {
+    let is = |other: &PathBuf| {
+        canonicalize(output).is_ok_and(|out| canonicalize(other).is_ok_and(|other| other == out))
+    };
+    let why = if is(&args.key) {
+        "is the private key: give another name"
+    } else if output.is_file() && !args.replace && !args.files.iter().any(is) {
+        "exists: give another name, or --overwrite"
+    } else {
+        return None;
+    };
+    Some(format!("isotherm: {} {why}", output.display()))
 }
 
 /// Validates one document and signs its text, without writing it yet.
