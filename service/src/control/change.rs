@@ -219,8 +219,11 @@ impl Worker {
         }
         record.plan.change(change.clone());
         record.counter = *revision;
-        // A rollback to an overlaid document asks for no signature either; a document under it was asked for one.
-        record.untrusted = None;
+        // An overlay's own signature says nothing of the document that it lies on; that one's was asked for by a rollback to both.
+        let is_overlay = change.next.document.layers.is_some() && !matches!(source, Source::Rollback { .. });
+        if !is_overlay {
+            record.untrusted = None;
+        }
         record.accepted += u64::from(!first);
         self.accepted += u64::from(!first);
         let account = record.account();

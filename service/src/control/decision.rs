@@ -54,7 +54,7 @@ impl Worker {
             Err(problems) => return Decision { problems, ..asked },
         };
         let (mut problems, mut warnings) = (Vec::new(), Vec::new());
-        if request.needs_signature() {
+        if request.needs_signature() && request.overlay.is_none() {
             check_signature(&self.swap, text, &request.name, &mut problems, &mut warnings);
         }
         let unit = request.unit.clone().or_else(|| unit_of(text));
@@ -86,7 +86,13 @@ impl Worker {
         let named = if document.layers.is_some() { unit_of(text) } else { UnitId::new(&document.unit).ok() };
         problems.extend(self.other_serial(request, named, text));
         let document = match request.overlay {
-            Some(overlay) => document.over(Layers::stored(&self.store, overlay)),
+            Some(overlay) => {
+                let document = document.over(Layers::stored(&self.store, overlay));
+                if let Some(signed) = document.signed() {
+                    check_signature(&self.swap, &signed.read(), &request.name, &mut problems, &mut warnings);
+                }
+                document
+            }
             None => document,
         };
         let present = self.intake.present(&unit);

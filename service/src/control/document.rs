@@ -119,6 +119,11 @@ impl Document {
         document::Document::parse(&text, None).ok().map(|parsed| parsed.document)
     }
 
+    /// The text that was signed: an overlaid document lost its own signature, what the overlay lies on has one.
+    pub(super) fn signed(&self) -> Option<&CompressedText> {
+        self.layers.as_ref().map(|layers| &layers.base).or(self.text.as_ref())
+    }
+
     /// Text of the document that an overlay may lie on, by the digest that the overlay names: this one, or the one below the
     /// overlay.
     pub(super) fn base(&self, named: &str) -> Option<&CompressedText> {

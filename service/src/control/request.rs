@@ -35,9 +35,9 @@ pub(super) struct Request {
 }
 
 impl Request {
-    /// Whether a signature can be asked for: what the service has made itself has none, an overlaid document lost its own.
+    /// Whether a signature can be asked for: what the service has made itself has none.
     pub(super) fn needs_signature(&self) -> bool {
-        !matches!(self.source, Source::PreLaunch) && self.overlay.is_none()
+        !matches!(self.source, Source::PreLaunch)
     }
 
     /// Whether the text was judged when it was first accepted, or made by the service itself.

@@ -127,13 +127,11 @@ impl Worker {
 
     /// Why a calibration that is put in force again would be refused today for want of a signature, where signatures are
     /// asked for. It is put in force all the same: a unit does not lose its calibration by a key that was taken away.
-    ///
-    /// What an overlay lies on is what was signed; the overlay may be the service's own.
     fn distrust(&self, unit: &UnitId, revision: u64, document: &Document) -> Option<String> {
         if !self.swap.require_signature {
             return None;
         }
-        let signed = document.layers.as_ref().map(|layers| &layers.base).or(document.text.as_ref())?.read();
+        let signed = document.signed()?.read();
         let name = format!("revision {revision}");
         let (mut problems, mut warnings) = (Vec::new(), Vec::new());
         check_signature(&self.swap, &signed, &name, &mut problems, &mut warnings);

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use isotherm_protocol::control::{SwapOptions, SwapOutcome};
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::signature::{Existing, PrivateKey, sign};
 use isotherm_service::Settings;
 use isotherm_service::config::Severity;
@@ -109,19 +110,24 @@ async fn the_jump_of_a_unit_that_was_not_heard_is_judged_at_the_assumed_temperat
     stand.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_refused() {
-    let folders = Folders::new();
+/// A service that asks for signatures, with the folder of the key that it trusts.
+async fn signed_stand(folders: &Folders) -> (Stand, tempfile::TempDir, PrivateKey) {
     let keys = tempfile::tempdir().unwrap();
     let trusted = PrivateKey::from_seed(&[7; 32]);
-    let pem = trusted.public().to_pem().unwrap();
-    std::fs::write(keys.path().join("bench.pub"), pem).unwrap();
+    std::fs::write(keys.path().join("bench.pub"), trusted.public().to_pem().unwrap()).unwrap();
     let mut settings = folders.settings();
     settings.swap.require_signature = true;
     settings.swap.downgrade = Severity::Refuse;
     settings.swap.trusted_keys = Some(keys.path().to_owned());
     let mut stand = Stand::start(settings).await;
     stand.revisions(UNIT, 10).await;
+    (stand, keys, trusted)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_refused() {
+    let folders = Folders::new();
+    let (stand, keys, trusted) = signed_stand(&folders).await;
 
     let text = document(UNIT, 1.0);
     let signed = sign(&text, &trusted, Existing::Refuse).unwrap();
@@ -157,5 +163,28 @@ async fn with_a_required_signature_an_unsigned_or_wrongly_signed_document_is_ref
     std::fs::remove_file(keys.path().join("bench.pub")).unwrap();
     let third = sign(&document(UNIT, 3.0), &trusted, Existing::Refuse).unwrap();
     assert_refused(&stand.swap(UNIT, &third, &PLAIN).await, &[&id(&trusted)]);
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_rollback_to_an_overlaid_document_asks_for_the_signature_of_that_document() {
+    let folders = Folders::new();
+    let (stand, keys, trusted) = signed_stand(&folders).await;
+    let base = sign(&document(UNIT, 1.0), &trusted, Existing::Refuse).unwrap();
+    let overlay = format!(
+        "schema = 1\noverlay_of = \"{}\"\nunit = \"{UNIT}\"\n\n[[gyro]]\nname = \"x\"\n\
+         static_bias_change_deg_per_h = 0.031\nstatic_bias_sigma_deg_per_h = 0.004\n",
+        Digest::of(base.as_bytes())
+    );
+    let overlay = sign(&overlay, &trusted, Existing::Refuse).unwrap();
+    let other = sign(&document(UNIT, 2.0), &trusted, Existing::Refuse).unwrap();
+    for (text, revision) in [(&base, 1), (&overlay, 2), (&other, 3)] {
+        assert_accepted(&stand.swap(UNIT, text, &PLAIN).await, revision);
+    }
+    let back = r#"{"command":"rollback","revision":2}"#;
+    assert_accepted(&stand.command(UNIT, back).await.swap.unwrap(), 4);
+    assert_accepted(&stand.swap(UNIT, &other, &PLAIN).await, 5);
+    std::fs::remove_file(keys.path().join("bench.pub")).unwrap();
+    assert_refused(&stand.command(UNIT, back).await.swap.unwrap(), &[&trusted.public().id().to_string()]);
     stand.stop().await;
 }
