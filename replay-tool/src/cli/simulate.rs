@@ -31,7 +31,7 @@ pub(super) struct SimulateArgs {
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// List the presets
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["out", "truth", "json", "seed", "duration"])]
     list_presets: bool,
     /// Print a preset as TOML, with --seed and --duration applied
     #[arg(long, value_name = "NAME", conflicts_with_all = ["out", "truth", "json"])]
@@ -46,7 +46,7 @@ pub(super) struct SimulateArgs {
     #[arg(long)]
     overwrite: bool,
     /// Seed of all noise (default: the scenario's)
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(..=LARGEST_SEED))]
     seed: Option<u64>,
     /// Duration (s) (default: the scenario's)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
@@ -55,6 +55,9 @@ pub(super) struct SimulateArgs {
     #[arg(long)]
     json: bool,
 }
+
+/// Largest seed that a scenario can state: TOML has no larger whole numbers.
+const LARGEST_SEED: u64 = i64::MAX.cast_unsigned();
 
 /// A ready-made scenario.
 struct Preset {
