@@ -120,7 +120,7 @@ impl Conversion {
             found.documents.extend(attachments.iter().filter_map(document));
             Ok(())
         })?;
-        Ok(found)
+        if found.contents.units.is_empty() { Err(Error::Nothing("convert")) } else { Ok(found) }
     }
 
     /// Reads the log's part; `each` gets every message, and the files that stand before it in a recording.

@@ -28,6 +28,9 @@ pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
         }
         writer.write(message)
     })?;
+    if topics.is_empty() {
+        return Err(Error::Nothing("convert"));
+    }
     let rows = topics.iter().map(|topic| writer.messages(topic)).sum();
     writer.finish()?;
     let path = partial.path().to_owned();

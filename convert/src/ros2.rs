@@ -35,6 +35,15 @@ pub struct Ros2Options {
 
 pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {
     let mut notes = Vec::new();
+    let units_of_log = found.contents.units.keys();
+    let strange = |document: &&Document| !units_of_log.clone().any(|unit| unit.as_str() == document.unit);
+    if let Some(document) = conversion.ros2.documents.iter().find(strange) {
+        let there = units_of_log.map(UnitId::as_str).collect::<Vec<_>>().join(", ");
+        return Err(Error::Usage(format!(
+            "--calibration is for unit {}, the log has {there}: give the document of one of these",
+            document.unit
+        )));
+    }
     let names = Names::of(found.contents.units.keys().map(UnitId::as_str), "unit");
     let mut units = BTreeMap::new();
     for (unit, contents) in &found.contents.units {
@@ -46,12 +55,7 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
         units.insert(unit.clone(), units_own);
     }
     if !units.values().any(|unit| unit.corrected || unit.raw.is_some()) {
-        let words = "the log has nothing for a ROS 2 bag";
-        return Err(Error::Usage(if notes.is_empty() {
-            format!("{words}: it has no units")
-        } else {
-            format!("{words}:\n{}", notes.join("\n"))
-        }));
+        return Err(Error::Usage(format!("the log has nothing for a ROS 2 bag:\n{}", notes.join("\n"))));
     }
     let folder = conversion.out.file_name().map_or("bag".into(), |name| name.to_string_lossy().into_owned());
     let file = format!("{folder}_0.mcap");

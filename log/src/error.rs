@@ -67,9 +67,9 @@ pub enum Error {
         /// The file.
         path: String,
     },
-    /// A log without a tick to plot.
-    #[error("the log has nothing to draw: no raw and no corrected ticks of the chosen units")]
-    NothingDrawn,
+    /// A log without anything that a command could work on: what it would do.
+    #[error("the log has nothing to {0}: no raw and no corrected ticks of the chosen units and times")]
+    Nothing(&'static str),
     /// What was given does not go together.
     #[error("{0}")]
     Usage(String),

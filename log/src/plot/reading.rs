@@ -254,7 +254,7 @@ impl Plot {
             }
         }
         let units: Vec<_> = self.units.into_iter().collect();
-        let page = layout::page(units, &summary).ok_or(Error::NothingDrawn)?;
+        let page = layout::page(units, &summary).ok_or(Error::Nothing("draw"))?;
         Ok((page, summary))
     }
 

@@ -84,7 +84,7 @@ fn a_log_without_ticks_is_refused_in_words() {
     let path = folder.path().join("empty.mcap");
     RecordingWriter::create(&path, RecordingOptions::default()).unwrap().finish().unwrap();
     let error = plot(vec![log(&path)], &PlotOptions::default(), &mut |_| {}).unwrap_err();
-    assert!(matches!(error, Error::NothingDrawn), "{error}");
+    assert!(matches!(error, Error::Nothing("draw")), "{error}");
 }
 
 #[test]

@@ -195,11 +195,18 @@ fn a_stream_that_is_empty_is_read_back_as_empty() {
     assert_eq!((tick.sequence, tick.readings[1].to_bits()), (7, (-0.0f64).to_bits()));
 
     record(&path("none.mcap"), &[]);
-    for target in ["text", "parquet"] {
-        let summary = convert(folder.path(), &["none.mcap", "--out", target, "--to", target], 0);
-        assert_eq!(files(&summary), []);
-    }
-    insta::assert_snapshot!(told(folder.path(), &["convert", "none.mcap", "--out", "bag", "--to", "ros2"]));
+    let mut words: String = ["text", "parquet", "ros2"]
+        .map(|target| told(folder.path(), &["convert", "none.mcap", "--out", "out", "--to", target]))
+        .concat();
+    let again = ["convert", "accel.csv", "-m", "accel.mapping.toml", "-u", "A-1", "--out", "later.mcap"];
+    words += &told(folder.path(), &[&again[..], &["--start", "100"]].concat());
+    insta::assert_snapshot!(words);
+    assert!(!path("later.mcap").exists() && !path("out").exists());
+
+    // A document of another unit would say nothing of these readings.
+    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
+    let bag = ["convert", "accel.mcap", "--to", "ros2", "--out", "bag", "--calibration", document];
+    insta::assert_snapshot!(stderr(&replay(folder.path(), &bag)));
 }
 
 #[test]
