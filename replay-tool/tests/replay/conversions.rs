@@ -15,7 +15,7 @@ use isotherm_protocol::raw::{
 };
 use serde_json::Value;
 
-use crate::common::{check, mapping, replay, stdout, told};
+use crate::common::{check, mapping, replay, stderr, stdout, told};
 use crate::real_logs::data;
 
 /// All events of a text log.
