@@ -5,45 +5,33 @@ use super::names::Kind;
 /// As the mapping spells it, and how much of it a reading of 1 is.
 pub(super) type Unit = (&'static str, f64);
 
-/// Spellings of one thing.
-const SPELLINGS: [(&str, &str); 30] = [
-    ("degrees", "deg"),
-    ("degree", "deg"),
-    ("grad", "deg"),
-    ("°", "deg"),
-    ("º", "deg"),
-    ("˚", "deg"),
-    ("micro", "u"),
-    ("milli", "m"),
-    ("µ", "u"),
-    ("μ", "u"),
-    ("²", "2"),
-    ("per", ""),
-    ("seconds", "s"),
-    ("second", "s"),
-    ("sec", "s"),
-    ("minutes", "min"),
-    ("minute", "min"),
-    ("mins", "min"),
-    ("hours", "h"),
-    ("hour", "h"),
-    ("hrs", "h"),
-    ("hr", "h"),
-    ("degps", "degs"),
-    ("degph", "degh"),
-    ("radps", "rads"),
-    ("mps2", "ms2"),
-    ("celsius", "degc"),
-    ("fahrenheit", "degf"),
-    ("kelvin", "k"),
-    ("volt", "v"),
+/// Each part of a unit as it is read, and its other spellings.
+const SPELLINGS: [(&str, &[&str]); 16] = [
+    ("deg", &["degrees", "degree", "grad", "°", "º", "˚"]),
+    ("u", &["micro", "µ", "μ"]),
+    ("m", &["milli"]),
+    ("2", &["²"]),
+    ("", &["per"]),
+    ("s", &["seconds", "second", "sec"]),
+    ("min", &["minutes", "minute", "mins"]),
+    ("h", &["hours", "hour", "hrs", "hr"]),
+    ("degs", &["degps"]),
+    ("degh", &["degph"]),
+    ("rads", &["radps"]),
+    ("ms2", &["mps2"]),
+    ("degc", &["celsius"]),
+    ("degf", &["fahrenheit"]),
+    ("k", &["kelvin"]),
+    ("v", &["volt"]),
 ];
 
 /// A unit in small letters, without points, strokes and brackets.
 fn plain(text: &str) -> String {
     let left_out = |c: &char| c.is_whitespace() || matches!(c, '.' | '(' | ')' | '/' | '^' | '*' | '·' | '_');
     let text: String = text.to_lowercase().chars().filter(|c| !left_out(c)).collect();
-    SPELLINGS.iter().fold(text, |text, (spelling, plain)| text.replace(spelling, plain))
+    let spellings =
+        SPELLINGS.iter().flat_map(|(plain, others)| others.iter().map(move |other| (other, plain)));
+    spellings.fold(text, |text, (spelling, plain)| text.replace(spelling, plain))
 }
 
 /// The unit that a text is.
