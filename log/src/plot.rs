@@ -70,7 +70,7 @@ impl Default for PlotOptions {
 }
 
 /// How two logs of a unit differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct DifferenceSummary {
     /// Corrected ticks that both logs have.
     pub common_ticks: u64,

@@ -144,7 +144,7 @@ impl Replica {
     pub fn without_journal(id: UnitId, settings: UnitSettings, calibration: Option<&Loaded>) -> Self {
         let mut stream = UnitStream::new(id.clone(), settings).keeping_ticks();
         if let Some(loaded) = calibration {
-            stream.install(Arc::clone(&loaded.calibration), loaded.digest);
+            stream = loaded.installed(stream);
         }
         Self::with(id, Some(stream), Sequencer::without_journal(), Changes::default(), true)
     }

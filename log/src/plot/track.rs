@@ -216,21 +216,9 @@ impl Track {
         self.ticks
     }
 
-    /// All bits that occurred.
-    pub(super) fn occurred(&self) -> u32 {
-        self.bits
-    }
-
     /// First and last time (ns); `None` while it is empty.
     pub(super) fn range(&self) -> Option<[i64; 2]> {
         self.range
-    }
-
-    /// Figures of one of its values, `scale` times what was taken; `None` where there is no number.
-    pub(super) fn overall(&self, index: usize, scale: f64) -> Option<Overall> {
-        let cell = self.total.get(index).filter(|cell| cell.count > 0)?;
-        let (a, b) = (cell.min * scale, cell.max * scale);
-        Some(Overall { min: a.min(b), max: a.max(b), mean: cell.mean() * scale })
     }
 
     /// What a page shows of it; times become seconds after `origin_ns`.
@@ -254,6 +242,8 @@ impl Track {
                     columns: (0..width).map(column).collect(),
                     bits: Arc::new(Bits(flags)),
                     places: Places::Points(x),
+                    total: self.total,
+                    occurred: self.bits,
                 }
             }
             Form::Bins { shift, first, cells, bits } => {
@@ -264,7 +254,13 @@ impl Track {
                 let column = |number: usize| {
                     Column::Bins(cells.iter().skip(number).step_by(width.max(1)).copied().collect())
                 };
-                Finished { columns: (0..width).map(column).collect(), bits: Arc::new(Bits(bits)), places }
+                Finished {
+                    columns: (0..width).map(column).collect(),
+                    bits: Arc::new(Bits(bits)),
+                    places,
+                    total: self.total,
+                    occurred: self.bits,
+                }
             }
         }
     }
@@ -285,9 +281,20 @@ pub(super) struct Finished {
     pub(super) bits: Arc<Bits>,
     /// Where they are.
     pub(super) places: Places,
+    /// Of all ticks.
+    total: Vec<Cell>,
+    /// All bits that occurred.
+    pub(super) occurred: u32,
 }
 
 impl Finished {
+    /// Figures of one of its values, `scale` times what was taken; `None` where there is no number.
+    pub(super) fn overall(&self, index: usize, scale: f64) -> Option<Overall> {
+        let cell = self.total.get(index).filter(|cell| cell.count > 0)?;
+        let (a, b) = (cell.min * scale, cell.max * scale);
+        Some(Overall { min: a.min(b), max: a.max(b), mean: cell.mean() * scale })
+    }
+
     /// One of its values, `scale` times what was taken; `None` where it has no such value.
     pub(super) fn samples(&self, index: usize, scale: f64) -> Option<Samples> {
         match (self.columns.get(index)?, &self.places) {

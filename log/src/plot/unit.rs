@@ -62,7 +62,7 @@ pub(super) struct RawTrack {
 }
 
 /// One unit.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct UnitPlot {
     detail: usize,
     pub(super) clock: Clock,
@@ -89,24 +89,7 @@ pub(super) struct UnitPlot {
 impl UnitPlot {
     /// Nothing seen; its time is moved by so much on the axis.
     pub(super) fn new(detail: usize, nominal: Option<Nominal>, moved_ns: i64) -> Self {
-        Self {
-            detail,
-            clock: Clock::moved(moved_ns),
-            corrected: None,
-            gyro: None,
-            accel: None,
-            readings: BTreeMap::new(),
-            applied: BTreeMap::new(),
-            states: Vec::new(),
-            revisions: Vec::new(),
-            happenings: Vec::new(),
-            unlisted: 0,
-            nominal,
-            missed: 0,
-            unreadable: 0,
-            revision: None,
-            joiner: Joiner::new(),
-        }
+        Self { detail, clock: Clock::moved(moved_ns), nominal, ..Self::default() }
     }
 
     /// Takes a message of the unit; corrected ticks are handed on with their time on the axis (ns).
