@@ -27,8 +27,7 @@ pub struct Row {
 pub struct Aligner {
     a: VecDeque<LogTick>,
     b: VecDeque<LogTick>,
-    a_over: bool,
-    b_over: bool,
+    over: bool,
 }
 
 /// Which of two fronts has no partner.
@@ -56,7 +55,7 @@ impl Aligner {
 
     /// Nothing more comes from either log.
     pub fn finish(&mut self) {
-        (self.a_over, self.b_over) = (true, true);
+        self.over = true;
     }
 
     /// Ticks that wait for the other log: of the first and of the second.
@@ -69,8 +68,8 @@ impl Aligner {
     pub fn next_row(&mut self) -> Option<Row> {
         let step = match (self.a.front(), self.b.front()) {
             (Some(a), Some(b)) => self.compare(key(a), key(b)),
-            (Some(_), None) if self.b_over || self.a.len() > MOST_WAITING => Step::OnlyA,
-            (None, Some(_)) if self.a_over || self.b.len() > MOST_WAITING => Step::OnlyB,
+            (Some(_), None) if self.over || self.a.len() > MOST_WAITING => Step::OnlyA,
+            (None, Some(_)) if self.over || self.b.len() > MOST_WAITING => Step::OnlyB,
             _ => Step::Wait,
         };
         match step {
@@ -100,8 +99,7 @@ impl Aligner {
             (None, Some(_)) => return Step::OnlyA,
             (None, None) => {}
         }
-        let seen = |ticks: &VecDeque<LogTick>, over| over || ticks.len() >= LOOK_AHEAD;
-        if !seen(&self.a, self.a_over) || !seen(&self.b, self.b_over) {
+        if !self.over && self.a.len().min(self.b.len()) < LOOK_AHEAD {
             return Step::Wait;
         }
         match (a.0.cmp(&b.0), a.1.cmp(&b.1)) {
