@@ -68,14 +68,7 @@ impl FileReader {
             header: Vec::new(),
             layout: mapping.layout.clone(),
             time: mapping.time.clone(),
-            columns: Columns {
-                stamps: None,
-                gyro: None,
-                accel: None,
-                temperatures: Vec::new(),
-                status: None,
-                select: None,
-            },
+            columns: Columns::default(),
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
             days_ns: 0,
@@ -239,9 +232,8 @@ impl FileReader {
         let row = Row::new(self.lines.line(), &self.cells, &self.layout);
         // Of a row without a cell nobody knows.
         let has = |cells: &TickCells| !cells.may_be_empty || row.has_readings(cells).unwrap_or(false);
-        let gyro = self.columns.gyro.as_ref().is_some_and(|gyro| has(&gyro.ticks));
-        let accel = self.columns.accel.as_ref().is_some_and(has);
-        self.assembler.skip(stamp, [gyro, accel], &self.columns);
+        let had = self.columns.ticks().map(|ticks| ticks.is_some_and(has));
+        self.assembler.skip(stamp, had, &self.columns);
     }
 
     /// There are no further rows: everything can be given.
@@ -264,9 +256,7 @@ impl FileReader {
     /// The step of time to a row, where it is longer than any tick can be and the mapping knows of no gaps.
     fn gap(&self, now: i64) -> Option<Reason> {
         let tick = self.time.tick?.as_ns();
-        let counted = |ticks: &TickCells| ticks.sequence.is_none();
-        let gyro = self.columns.gyro.as_ref().map(|gyro| &gyro.ticks);
-        let numbered_by_rows = gyro.or(self.columns.accel.as_ref()).is_some_and(counted);
+        let numbered_by_rows = self.columns.leading().is_some_and(|ticks| ticks.sequence.is_none());
         let step = Span::from_ns(now.saturating_sub(self.last_stamp?));
         let most = i64::try_from(LONGEST_STEP + self.bad_since).unwrap_or(i64::MAX);
         let gap = self.time.gap_after_ticks.is_none()
