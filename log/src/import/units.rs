@@ -1,5 +1,6 @@
 //! Units of measure as headers spell them.
 
+use super::NUMBER_UNITS;
 use super::names::Kind;
 
 /// As the mapping spells it, and how much of it a reading of 1 is.
@@ -80,12 +81,7 @@ fn known(kind: Kind, increment: bool, plain: &str) -> Option<Unit> {
         (Kind::Accel, "g" | "gs") => ("g", 1.0),
         (Kind::Accel, "mg") => ("mg", 1.0),
         (Kind::Accel | Kind::Temperature, "v") => ("volt", 1.0),
-        (Kind::Time, "ns") => ("ns", 1.0),
-        (Kind::Time, "us") => ("us", 1.0),
-        (Kind::Time, "ms") => ("ms", 1.0),
-        (Kind::Time, "s") => ("s", 1.0),
-        (Kind::Time, "min") => ("min", 1.0),
-        (Kind::Time, "h") => ("h", 1.0),
+        (Kind::Time, word) => (*NUMBER_UNITS.iter().find(|unit| **unit == word)?, 1.0),
         (Kind::Temperature, "degc" | "c") => ("deg_c", 1.0),
         (Kind::Temperature, "degf" | "f") => ("deg_f", 1.0),
         (Kind::Temperature, "k") => ("kelvin", 1.0),

@@ -6,10 +6,8 @@ use isotherm_correction::sigma::Causes;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use serde::Serialize;
 
+use super::MAX_LISTED;
 use crate::offline::sums::FlagCounts;
-
-/// Most revisions and channels that are told one by one.
-const MAX_LISTED: usize = 1024;
 
 /// The first tick of a calibration revision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
