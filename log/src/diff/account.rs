@@ -190,10 +190,7 @@ impl Comparison {
 
     /// Takes a tick of one log.
     pub fn push(&mut self, side: Side, tick: LogTick) {
-        match side {
-            Side::A => self.aligner.push_a(tick),
-            Side::B => self.aligner.push_b(tick),
-        }
+        self.aligner.push(side, tick);
     }
 
     /// Ticks that wait for the other log: of the first and of the second.

@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 
+use super::account::Side;
 use super::tick::LogTick;
 
 /// How many ticks are searched where sequence number and time contradict each other.
@@ -43,14 +44,12 @@ fn key(tick: &LogTick) -> (u64, i64) {
 }
 
 impl Aligner {
-    /// Takes a tick of the first log.
-    pub fn push_a(&mut self, tick: LogTick) {
-        self.a.push_back(tick);
-    }
-
-    /// Takes a tick of the second log.
-    pub fn push_b(&mut self, tick: LogTick) {
-        self.b.push_back(tick);
+    /// Takes a tick of one log.
+    pub fn push(&mut self, side: Side, tick: LogTick) {
+        match side {
+            Side::A => self.a.push_back(tick),
+            Side::B => self.b.push_back(tick),
+        }
     }
 
     /// Nothing more comes from either log.
@@ -128,10 +127,10 @@ mod tests {
     fn align(a: &[(u64, i64)], b: &[(u64, i64)]) -> String {
         let mut aligner = Aligner::default();
         for key in a {
-            aligner.push_a(tick(*key));
+            aligner.push(Side::A, tick(*key));
         }
         for key in b {
-            aligner.push_b(tick(*key));
+            aligner.push(Side::B, tick(*key));
         }
         aligner.finish();
         let mut words = String::new();

@@ -6,6 +6,7 @@ use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
+use isotherm_protocol::digest::Digits;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
@@ -346,6 +347,5 @@ fn flags(tick: &CorrectedTick) -> u32 {
 
 /// A revision's counter and the first digits of its digest.
 fn named(revision: Revision) -> String {
-    let digits: Vec<_> = revision.digest.iter().take(4).map(|byte| format!("{byte:02x}")).collect();
-    format!("{} ({})", revision.counter, digits.concat())
+    format!("{} ({})", revision.counter, Digits(revision.digest.split_at(4).0))
 }
