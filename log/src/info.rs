@@ -284,8 +284,10 @@ impl UnitSurvey {
                     place => {
                         self.series = Some(first.series);
                         self.modes.take(&batch, place == Place::Start);
-                        let readings = batch.ticks.iter().map(|tick| &tick.readings);
-                        readings.for_each(|readings| ReadingInfo::tick(&mut self.info.gyros, readings));
+                        ReadingInfo::ticks(
+                            &mut self.info.gyros,
+                            batch.ticks.iter().map(|tick| &*tick.readings),
+                        );
                     }
                 }
             }
@@ -294,8 +296,8 @@ impl UnitSurvey {
                 self.counts[1] = batch.output == OutputKind::Counts;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 if survey.ticks(self.series, first.sequence, received_ns, &times) != Place::Old {
-                    let readings = batch.ticks.iter().map(|tick| &tick.readings);
-                    readings.for_each(|readings| ReadingInfo::tick(&mut self.info.accelerometers, readings));
+                    let readings = batch.ticks.iter().map(|tick| &*tick.readings);
+                    ReadingInfo::ticks(&mut self.info.accelerometers, readings);
                 }
             }
             Decoded::Temperature(batch) => {

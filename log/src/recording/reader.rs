@@ -134,7 +134,9 @@ impl RecordingReader {
             let Some(opened) = &mut self.current else { return Ok(None) };
             let before = opened.at;
             let next = opened.next();
-            self.read.fetch_add(opened.at - before, Ordering::Relaxed);
+            if opened.at > before {
+                self.read.fetch_add(opened.at - before, Ordering::Relaxed);
+            }
             match next {
                 Ok(Some(Found::Message(Some(message)))) => {
                     self.report.messages += 1;

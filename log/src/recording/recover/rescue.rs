@@ -88,7 +88,7 @@ impl<'a> Rescue<'a> {
             file,
             definitions,
             targets: HashMap::new(),
-            journal: Documents::new(),
+            journal: Documents::default(),
             documents: BTreeMap::new(),
             attached: BTreeSet::new(),
             stated: None,
