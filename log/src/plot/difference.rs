@@ -5,11 +5,10 @@ use std::collections::VecDeque;
 use isotherm_protocol::corrected::CorrectedTick;
 
 use super::DifferenceSummary;
+use super::nominal::ARCSEC;
 use super::track::Track;
 use super::unit::increments;
 
-/// Radians in seconds of arc.
-const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 /// Most ticks of one log that wait for the other's.
 const MAX_WAITING: usize = 1 << 16;
 

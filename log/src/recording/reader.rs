@@ -44,6 +44,7 @@ const CHUNK_TIMES: usize = 16;
 /// Reads the messages of one or several recordings, one after the other, as they were written.
 ///
 /// A file that ends in the middle, as after a kill, is read to its last whole chunk; the report says so.
+#[derive(Debug)]
 pub struct RecordingReader {
     /// Files still to be opened, the next one last.
     waiting: Vec<PathBuf>,
@@ -57,6 +58,7 @@ pub struct RecordingReader {
 }
 
 /// A file that is being read.
+#[derive(Debug)]
 struct Opened {
     path: PathBuf,
     records: RecordFile,
@@ -70,12 +72,6 @@ struct Opened {
     topics: HashMap<u16, Carries>,
     /// The end of the messages has been seen.
     ended: bool,
-}
-
-impl std::fmt::Debug for RecordingReader {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("RecordingReader").field("report", &self.report).finish_non_exhaustive()
-    }
 }
 
 impl RecordingReader {
@@ -173,6 +169,7 @@ impl RecordingReader {
 }
 
 /// What a channel carries.
+#[derive(Debug)]
 enum Carries {
     /// Frames of a topic.
     Frames(Topic),
@@ -183,6 +180,7 @@ enum Carries {
 }
 
 /// One record that is of use.
+#[derive(Debug)]
 enum Found {
     /// A message; `None` for one of something else.
     Message(Option<Message>),
