@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 use isotherm_log::error::Error;
 use isotherm_log::recording::io_error;
-use isotherm_log::ros2::RosMessage;
+use isotherm_log::ros2::{RosMessage, to_cdr};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use serde::Serialize;
@@ -120,7 +120,7 @@ impl BagWriter {
             None => self.declare::<M>(topic, origin())?,
         };
         let write = |source| Error::file(&self.path, "write the bag", source);
-        let bytes = message.to_cdr().map_err(|error| write(io::Error::other(error)))?;
+        let bytes = to_cdr(message).map_err(|error| write(io::Error::other(error)))?;
         // Sequence 0 is "not known", as ros2 bag writes it.
         let header = MessageHeader { channel_id, sequence: 0, log_time: time_ns, publish_time: time_ns };
         self.writer.write_to_known_channel(&header, &bytes).map_err(|source| failed(&self.path, source))?;

@@ -19,7 +19,6 @@ mod names;
 mod propose;
 mod units;
 mod words;
-mod written;
 
 use std::fmt;
 use std::path::Path;
@@ -67,66 +66,28 @@ pub struct Proposal {
 
 /// Something that a log does not say.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Question {
-    /// Which columns hold what; the first rows.
-    Columns {
-        /// The file.
-        file: String,
-        /// Columns of a row.
-        width: usize,
-        /// The first row, and the header if there is one.
-        rows: Vec<String>,
-    },
-    /// Of which unit the log is to be.
-    Serial {
-        /// The file.
-        file: String,
-        /// The column.
-        column: String,
-        /// Its cells.
-        serials: Vec<String>,
-    },
+pub struct Question {
+    words: String,
+    asked: Asked,
+}
+
+/// What an answer says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Asked {
+    /// Which of so many columns hold what.
+    Columns(usize),
+    /// Of which of these units the log is to be.
+    Serial(Vec<String>),
     /// The unit of the gyros.
-    GyroUnit {
-        /// Their columns.
-        columns: String,
-        /// What they state, which is no unit of theirs that is known.
-        unknown: Option<String>,
-        /// Largest reading.
-        largest: String,
-    },
+    GyroUnit,
     /// The unit of the accelerometers.
-    AccelUnit {
-        /// Their columns.
-        columns: String,
-        /// What they state, which is no unit of theirs that is known.
-        unknown: Option<String>,
-        /// Largest reading.
-        largest: String,
-    },
+    AccelUnit,
     /// The unit of the stamps.
-    TimeUnit {
-        /// Their column.
-        column: String,
-        /// What it states, which is no unit of time that is known.
-        unknown: Option<String>,
-        /// The usual step, in that unit.
-        step: String,
-    },
+    TimeUnit,
     /// Whether dates begin with the day or with the month.
-    DateOrder {
-        /// Their column.
-        column: String,
-        /// The first one.
-        first: String,
-    },
+    DateOrder,
     /// Ticks per second.
-    Rate {
-        /// The file.
-        file: String,
-        /// Why its time cannot be used, where it has one.
-        why: Option<String>,
-    },
+    Rate,
 }
 
 /// Units of gyros, as the mapping spells them.
@@ -157,18 +118,32 @@ impl Hints {
     }
 }
 
+impl Asked {
+    /// The option that answers it, and the words that it takes, where these are few.
+    fn option(&self) -> (&'static str, Vec<&str>) {
+        match self {
+            Self::Columns(_) => ("--columns", Vec::new()),
+            Self::Serial(serials) => ("--serial", serials.iter().map(String::as_str).collect()),
+            Self::GyroUnit => ("--gyro-unit", GYRO_UNITS.to_vec()),
+            Self::AccelUnit => ("--accel-unit", ACCEL_UNITS.to_vec()),
+            Self::TimeUnit => ("--time-unit", NUMBER_UNITS.to_vec()),
+            Self::DateOrder => ("--time-unit", DATE_ORDERS.to_vec()),
+            Self::Rate => ("--rate-hz", Vec::new()),
+        }
+    }
+}
+
 impl Question {
     /// The option that answers it, with what it takes.
     #[must_use]
     pub fn option(&self) -> String {
-        match self {
-            Self::Columns { .. } => "--columns NAME,NAME,… (such as 'time [s],gx [deg/s],gy,gz,ax [g],ay,az,temp [degC]'; - for others)".to_owned(),
-            Self::Serial { serials, .. } => format!("--serial {}", serials.join("|")),
-            Self::GyroUnit { .. } => format!("--gyro-unit {}", GYRO_UNITS.join("|")),
-            Self::AccelUnit { .. } => format!("--accel-unit {}", ACCEL_UNITS.join("|")),
-            Self::TimeUnit { .. } => format!("--time-unit {}", NUMBER_UNITS.join("|")),
-            Self::DateOrder { .. } => format!("--time-unit {}", DATE_ORDERS.join("|")),
-            Self::Rate { .. } => "--rate-hz HZ".to_owned(),
+        let (name, words) = self.asked.option();
+        match self.asked {
+            Asked::Columns(_) => format!(
+                "{name} NAME,NAME,… (such as 'time [s],gx [deg/s],gy,gz,ax [g],ay,az,temp [degC]'; - for others)"
+            ),
+            Asked::Rate => format!("{name} HZ"),
+            _ => format!("{name} {}", words.join("|")),
         }
     }
 
@@ -178,27 +153,24 @@ impl Question {
     /// What the answer must be.
     pub fn answer(&self, text: &str, hints: &mut Hints) -> Result<(), String> {
         let text = text.trim();
-        let one_of = |words: &[&str]| match words.iter().find(|word| **word == text) {
+        let (_, words) = self.asked.option();
+        let word = || match words.iter().find(|word| **word == text) {
             Some(_) => Ok(Some(text.to_owned())),
             None => Err(format!("must be one of {}", words.join(", "))),
         };
-        match self {
-            Self::Columns { width, .. } => {
+        match self.asked {
+            Asked::Columns(width) => {
                 let columns: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
                 if !columns.iter().any(|column| names::is_gyro(column)) {
                     return Err(format!("names no gyro; name the log's {width} columns in order"));
                 }
                 hints.columns = columns;
             }
-            Self::Serial { serials, .. } => {
-                let serials: Vec<_> = serials.iter().map(String::as_str).collect();
-                hints.serial = one_of(&serials)?;
-            }
-            Self::GyroUnit { .. } => hints.gyro_unit = one_of(&GYRO_UNITS)?,
-            Self::AccelUnit { .. } => hints.accel_unit = one_of(&ACCEL_UNITS)?,
-            Self::TimeUnit { .. } => hints.time_unit = one_of(NUMBER_UNITS)?,
-            Self::DateOrder { .. } => hints.time_unit = one_of(&DATE_ORDERS)?,
-            Self::Rate { .. } => {
+            Asked::Serial(_) => hints.serial = word()?,
+            Asked::GyroUnit => hints.gyro_unit = word()?,
+            Asked::AccelUnit => hints.accel_unit = word()?,
+            Asked::TimeUnit | Asked::DateOrder => hints.time_unit = word()?,
+            Asked::Rate => {
                 let rate = text.parse().ok().filter(|rate: &f64| (1e-3..=1e6).contains(rate));
                 hints.rate_hz = Some(rate.ok_or("must be a number of ticks per second, 0.001 to 1000000")?);
             }
@@ -209,41 +181,14 @@ impl Question {
 
 impl fmt::Display for Question {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Columns { file, width, rows } => {
-                write!(
-                    f,
-                    "{file}: which of the {width} columns are gyros, accelerometers, temperatures and the time? "
-                )?;
-                write!(f, "The first rows: {}", rows.join(" ⏎ "))
-            }
-            Self::Serial { file, column, serials } => {
-                let serials = serials.join(", ");
-                write!(f, "{file} has rows of several units, {serials} in column {column}: of which unit?")
-            }
-            Self::GyroUnit { columns, unknown, largest } => {
-                let stated = states(unknown.as_ref(), SCALE);
-                write!(f, "what is the unit of the gyros {columns}?{stated} The largest reading is {largest}")
-            }
-            Self::AccelUnit { columns, unknown, largest } => {
-                let stated = states(unknown.as_ref(), SCALE);
-                write!(
-                    f,
-                    "what is the unit of the accelerometers {columns}?{stated} The largest reading is {largest}"
-                )
-            }
-            Self::TimeUnit { column, unknown, step } => {
-                let stated = states(unknown.as_ref(), "");
-                write!(f, "what is the unit of the time {column}?{stated} It usually grows by {step}")
-            }
-            Self::DateOrder { column, first } => {
-                write!(f, "does {first:?} in {column} begin with the day (dmy) or with the month (mdy)?")
-            }
-            Self::Rate { file, why } => {
-                let why = why.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
-                write!(f, "{file} has no usable time{why}: how many rows per second?")
-            }
-        }
+        f.write_str(&self.words)
+    }
+}
+
+impl Proposal {
+    /// Asks something.
+    fn ask(&mut self, asked: Asked, words: String) {
+        self.open.push(Question { words, asked });
     }
 }
 
@@ -252,9 +197,6 @@ fn states(unknown: Option<&String>, help: &str) -> String {
     let words = |text| format!(" The header states {text:?}, which import does not know{help}.");
     unknown.map_or_else(String::new, words)
 }
-
-/// What helps where a mapping takes a scale.
-const SCALE: &str = ": for other units, give the nearest and set `scale` in the mapping";
 
 /// Refuses a log whose form no mapping can describe, in a sentence.
 fn refuse(path: &Path, words: impl Into<String>) -> Error {

@@ -57,7 +57,7 @@ use sent::Sent;
 use sequence::Place;
 use topic::TopicSurvey;
 
-/// Most topics of no unit, attachments and metadata records that are told one by one.
+/// Most entries of each list: topics of no unit, attachments, swaps, revisions and the like.
 const MAX_LISTED: usize = 1024;
 
 /// A file inside a recording.
@@ -187,7 +187,7 @@ impl Survey {
         topic.message(&message.frame);
         if let Topic::Service(_) = message.topic {
             match codec::decode::<ServiceStatus>(&message.frame) {
-                Ok(status) => remember(&mut self.service_versions, status.version),
+                Ok(status) => remember(&mut self.service_versions, &status.version),
                 Err(error) => topic.unreadable(&error),
             }
         }
@@ -284,8 +284,10 @@ impl UnitSurvey {
                     place => {
                         self.series = Some(first.series);
                         self.modes.take(&batch, place == Place::Start);
-                        let readings = batch.ticks.iter().map(|tick| &tick.readings);
-                        readings.for_each(|readings| ReadingInfo::tick(&mut self.info.gyros, readings));
+                        ReadingInfo::ticks(
+                            &mut self.info.gyros,
+                            batch.ticks.iter().map(|tick| &*tick.readings),
+                        );
                     }
                 }
             }
@@ -294,8 +296,8 @@ impl UnitSurvey {
                 self.counts[1] = batch.output == OutputKind::Counts;
                 let times = batch.ticks.iter().map(|tick| (tick.end_time.as_ns(), length_ns(tick.duration)));
                 if survey.ticks(self.series, first.sequence, received_ns, &times) != Place::Old {
-                    let readings = batch.ticks.iter().map(|tick| &tick.readings);
-                    readings.for_each(|readings| ReadingInfo::tick(&mut self.info.accelerometers, readings));
+                    let readings = batch.ticks.iter().map(|tick| &*tick.readings);
+                    ReadingInfo::ticks(&mut self.info.accelerometers, readings);
                 }
             }
             Decoded::Temperature(batch) => {
@@ -335,8 +337,8 @@ fn length_ns(span: Span) -> u64 {
 }
 
 /// Notes a value that is not in the list yet.
-fn remember(list: &mut Vec<String>, value: String) {
-    if !list.contains(&value) && list.len() < MAX_LISTED {
-        list.push(value);
+fn remember(list: &mut Vec<String>, value: &str) {
+    if list.len() < MAX_LISTED && !list.iter().any(|known| known == value) {
+        list.push(value.to_owned());
     }
 }

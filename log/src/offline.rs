@@ -60,13 +60,28 @@ pub fn read_document(path: &Path) -> Result<Parsed, Error> {
 /// # Errors
 /// Those of [`read_document`], [`Error::Unit`].
 pub fn load_calibration(path: &Path) -> Result<Loaded, Error> {
-    let parsed = read_document(path)?;
-    Ok(Loaded {
-        calibration: Arc::new(parsed.calibration),
-        digest: parsed.digest.first_chunk().copied().unwrap_or_default(),
-        unit: unit_id(&parsed.document.unit)?,
-        warnings: parsed.warnings,
-    })
+    Loaded::of(read_document(path)?)
+}
+
+impl Loaded {
+    /// Of a document that was read.
+    ///
+    /// # Errors
+    /// [`Error::Unit`].
+    pub(crate) fn of(parsed: Parsed) -> Result<Self, Error> {
+        Ok(Self {
+            calibration: Arc::new(parsed.calibration),
+            digest: parsed.digest.first_chunk().copied().unwrap_or_default(),
+            unit: unit_id(&parsed.document.unit)?,
+            warnings: parsed.warnings,
+        })
+    }
+
+    /// The stream of a unit with it, as the service has it after its start.
+    pub(crate) fn installed(&self, mut stream: UnitStream) -> UnitStream {
+        stream.install(Arc::clone(&self.calibration), self.digest);
+        stream
+    }
 }
 
 /// A serial from its text.
@@ -88,9 +103,7 @@ impl Offline {
     /// A unit with a calibration, as the service has it after its start.
     #[must_use]
     pub fn new(loaded: &Loaded, settings: UnitSettings) -> Self {
-        let mut stream = UnitStream::new(loaded.unit.clone(), settings).keeping_ticks();
-        stream.install(Arc::clone(&loaded.calibration), loaded.digest);
-        Self { stream }
+        Self { stream: loaded.installed(UnitStream::new(loaded.unit.clone(), settings).keeping_ticks()) }
     }
 
     /// Takes one event.

@@ -11,7 +11,7 @@ use crate::file::refuse_pipe;
 use crate::mapping::Mapping;
 use crate::message::Message;
 use crate::progress::Progress;
-use crate::source::{Log, LogReport, TextOptions, is_recording};
+use crate::source::{Log, LogReport, is_recording};
 
 /// The files of a log, and how they are read.
 #[derive(Debug, Clone)]
@@ -77,14 +77,7 @@ impl LogFiles {
                 (Log::recordings_at(paths, before_ns)?, part.window())
             }
             Self::Text { paths, mapping, unit, batch_ticks } => {
-                let options = TextOptions {
-                    mapping,
-                    unit,
-                    batch_ticks: *batch_ticks,
-                    start: part.start,
-                    duration: part.duration(),
-                };
-                (Log::text(paths, options)?, None)
+                (Log::text(paths, mapping, unit, *batch_ticks, part)?, None)
             }
         };
         Ok(Messages { log, units: part.units.clone(), window, beginning_ns, over: false })

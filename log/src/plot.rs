@@ -29,6 +29,7 @@ use isotherm_protocol::document::Parsed;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
+use crate::diff::AXES;
 use crate::error::Error;
 use crate::part::Messages;
 use crate::source::LogReport;
@@ -36,8 +37,6 @@ use crate::source::LogReport;
 use isotherm_pages::Page;
 use reading::Plot;
 
-/// Names of the case axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Most units on a page.
 pub const MAX_UNITS: usize = 16;
 
@@ -70,7 +69,7 @@ impl Default for PlotOptions {
 }
 
 /// How two logs of a unit differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct DifferenceSummary {
     /// Corrected ticks that both logs have.
     pub common_ticks: u64,

@@ -19,7 +19,6 @@ mod reader;
 mod record;
 pub mod recover;
 mod schema;
-mod skip;
 mod view;
 pub(crate) mod walk;
 mod writer;

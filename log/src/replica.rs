@@ -136,7 +136,15 @@ impl Replica {
     /// Of a unit whose journal was recorded.
     #[must_use]
     pub fn new(id: UnitId, outline: Outline, changes: Changes) -> Self {
-        Self::with(id, None, Sequencer::new(outline), changes, false)
+        Self {
+            id,
+            stream: None,
+            sequencer: Sequencer::new(outline),
+            joiner: Joiner::new(),
+            changes,
+            flush_due: false,
+            report: ReplicaReport::default(),
+        }
     }
 
     /// Of a unit without a journal: with these settings, and a calibration that is in force from the first tick on.
@@ -144,27 +152,11 @@ impl Replica {
     pub fn without_journal(id: UnitId, settings: UnitSettings, calibration: Option<&Loaded>) -> Self {
         let mut stream = UnitStream::new(id.clone(), settings).keeping_ticks();
         if let Some(loaded) = calibration {
-            stream.install(Arc::clone(&loaded.calibration), loaded.digest);
+            stream = loaded.installed(stream);
         }
-        Self::with(id, Some(stream), Sequencer::without_journal(), Changes::default(), true)
-    }
-
-    fn with(
-        id: UnitId,
-        stream: Option<UnitStream>,
-        sequencer: Sequencer,
-        changes: Changes,
-        flush_due: bool,
-    ) -> Self {
-        Self {
-            id,
-            stream,
-            sequencer,
-            joiner: Joiner::new(),
-            changes,
-            flush_due,
-            report: ReplicaReport::default(),
-        }
+        let sequencer = Sequencer::without_journal();
+        let unchanged = Self::new(id, Outline::default(), Changes::default());
+        Self { stream: Some(stream), sequencer, flush_due: true, ..unchanged }
     }
 
     /// Takes a message of the unit, in recorded order; [`Replica::step`] then says what comes of it.

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use arrayvec::ArrayVec;
-use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision, SigmaRun};
 use isotherm_protocol::key::UnitId;
@@ -18,6 +17,7 @@ use crate::error::Error;
 use crate::file::{begins_with, open_log};
 use crate::mapping::Mapping;
 use crate::message::{Message, Topic};
+use crate::part::Part;
 use crate::progress::Progress;
 use crate::recording::{self, RecordingReader, RecordingReport};
 use crate::text::{LogEvent, LogReader, ReadReport, Window};
@@ -26,21 +26,6 @@ use crate::text::{LogEvent, LogReader, ReadReport, Window};
 #[must_use]
 pub fn is_recording(path: &Path) -> bool {
     open_log(path, "open the log").is_ok_and(|file| begins_with(file, recording::MAGIC))
-}
-
-/// How the text logs of a command are read.
-#[derive(Debug, Clone, Copy)]
-pub struct TextOptions<'a> {
-    /// Which column is what.
-    pub mapping: &'a Mapping,
-    /// The unit that the log is of.
-    pub unit: &'a UnitId,
-    /// Gyro ticks in one batch (1…4096).
-    pub batch_ticks: usize,
-    /// Begin this long after the log's beginning.
-    pub start: Span,
-    /// Take this much of it; `None` is to the end.
-    pub duration: Option<Span>,
 }
 
 /// A log, read message by message in constant memory.
@@ -102,16 +87,21 @@ impl Log {
         Ok(Self { source: Source::Recording(Box::new(reader)), progress: Progress::new(read, total) })
     }
 
-    /// Opens a text log.
+    /// Opens a part of a text log of a unit, to be put into batches of so many gyro ticks.
     ///
     /// # Errors
     /// As [`LogReader::open`].
-    pub fn text(paths: &[PathBuf], options: TextOptions<'_>) -> Result<Self, Error> {
-        let events = LogReader::open(options.mapping, paths)?;
+    pub(crate) fn text(
+        paths: &[PathBuf],
+        mapping: &Mapping,
+        unit: &UnitId,
+        batch_ticks: usize,
+        part: &Part,
+    ) -> Result<Self, Error> {
+        let events = LogReader::open(mapping, paths)?;
         let progress = events.progress();
-        let events = Window::new(events, options.start, options.duration);
-        let unit = options.unit.clone();
-        let text = TextLog { events, unit, batcher: Batcher::new(options.batch_ticks), over: false };
+        let events = Window::new(events, part.start, part.duration());
+        let text = TextLog { events, unit: unit.clone(), batcher: Batcher::new(batch_ticks), over: false };
         Ok(Self { source: Source::Text(Box::new(text)), progress })
     }
 

@@ -153,7 +153,7 @@ impl Account {
 }
 
 /// Compares the ticks of one unit, as they come.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Comparison {
     options: DiffOptions,
     /// Whether ticks before and behind those that both have are differences: not where one log is a part of the other.
@@ -185,27 +185,12 @@ impl Comparison {
     /// Of two whole logs; or (`whole` false) of what was made of a recording and what that has: see [`Account::agrees`].
     #[must_use]
     pub fn new(options: DiffOptions, whole: bool) -> Self {
-        Self {
-            options,
-            whole,
-            aligner: Aligner::default(),
-            account: Account::default(),
-            since: (0, 0),
-            alone_in_b: None,
-            suspect: None,
-            recent: VecDeque::new(),
-            behind: 0,
-            happened: Default::default(),
-            before: (None, None),
-        }
+        Self { options, whole, ..Self::default() }
     }
 
     /// Takes a tick of one log.
     pub fn push(&mut self, side: Side, tick: LogTick) {
-        match side {
-            Side::A => self.aligner.push_a(tick),
-            Side::B => self.aligner.push_b(tick),
-        }
+        self.aligner.push(side, tick);
     }
 
     /// Ticks that wait for the other log: of the first and of the second.
@@ -398,9 +383,7 @@ fn happened(tick: &LogTick, before: &mut Option<Known>, event: &mut Option<Strin
             if last.mode != now.mode {
                 what.push(format!("the mode went from {} to {}", mode(last.mode), mode(now.mode)));
             }
-            let of = |flags: TickFlags| {
-                (!flags.is_empty()).then(|| words(flags.iter_names().map(|(name, _)| name)))
-            };
+            let of = |flags: TickFlags| (!flags.is_empty()).then(|| words(flags.iter_names()));
             let announced = TickFlags::GAP | TickFlags::RESTART;
             what.extend(of(now.flags - last.flags - announced).map(|names| format!("{names} set")));
             what.extend(of(last.flags - now.flags - announced - EACH).map(|names| format!("{names} ended")));

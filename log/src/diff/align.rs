@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 
+use super::account::Side;
 use super::tick::LogTick;
 
 /// How many ticks are searched where sequence number and time contradict each other.
@@ -27,8 +28,7 @@ pub struct Row {
 pub struct Aligner {
     a: VecDeque<LogTick>,
     b: VecDeque<LogTick>,
-    a_over: bool,
-    b_over: bool,
+    over: bool,
 }
 
 /// Which of two fronts has no partner.
@@ -44,19 +44,17 @@ fn key(tick: &LogTick) -> (u64, i64) {
 }
 
 impl Aligner {
-    /// Takes a tick of the first log.
-    pub fn push_a(&mut self, tick: LogTick) {
-        self.a.push_back(tick);
-    }
-
-    /// Takes a tick of the second log.
-    pub fn push_b(&mut self, tick: LogTick) {
-        self.b.push_back(tick);
+    /// Takes a tick of one log.
+    pub fn push(&mut self, side: Side, tick: LogTick) {
+        match side {
+            Side::A => self.a.push_back(tick),
+            Side::B => self.b.push_back(tick),
+        }
     }
 
     /// Nothing more comes from either log.
     pub fn finish(&mut self) {
-        (self.a_over, self.b_over) = (true, true);
+        self.over = true;
     }
 
     /// Ticks that wait for the other log: of the first and of the second.
@@ -69,8 +67,8 @@ impl Aligner {
     pub fn next_row(&mut self) -> Option<Row> {
         let step = match (self.a.front(), self.b.front()) {
             (Some(a), Some(b)) => self.compare(key(a), key(b)),
-            (Some(_), None) if self.b_over || self.a.len() > MOST_WAITING => Step::OnlyA,
-            (None, Some(_)) if self.a_over || self.b.len() > MOST_WAITING => Step::OnlyB,
+            (Some(_), None) if self.over || self.a.len() > MOST_WAITING => Step::OnlyA,
+            (None, Some(_)) if self.over || self.b.len() > MOST_WAITING => Step::OnlyB,
             _ => Step::Wait,
         };
         match step {
@@ -100,8 +98,7 @@ impl Aligner {
             (None, Some(_)) => return Step::OnlyA,
             (None, None) => {}
         }
-        let seen = |ticks: &VecDeque<LogTick>, over| over || ticks.len() >= LOOK_AHEAD;
-        if !seen(&self.a, self.a_over) || !seen(&self.b, self.b_over) {
+        if !self.over && self.a.len().min(self.b.len()) < LOOK_AHEAD {
             return Step::Wait;
         }
         match (a.0.cmp(&b.0), a.1.cmp(&b.1)) {
@@ -130,10 +127,10 @@ mod tests {
     fn align(a: &[(u64, i64)], b: &[(u64, i64)]) -> String {
         let mut aligner = Aligner::default();
         for key in a {
-            aligner.push_a(tick(*key));
+            aligner.push(Side::A, tick(*key));
         }
         for key in b {
-            aligner.push_b(tick(*key));
+            aligner.push(Side::B, tick(*key));
         }
         aligner.finish();
         let mut words = String::new();

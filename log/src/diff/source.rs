@@ -77,30 +77,23 @@ impl CorrectedLog {
     /// # Errors
     /// [`Error::File`] where it cannot be opened.
     pub fn open(path: &Path, units: &BTreeSet<UnitId>, unnamed: &UnitId) -> Result<Self, Error> {
-        if is_recording(path) {
+        let read = Arc::default();
+        let (source, progress) = if is_recording(path) {
             let part = Part { units: units.clone(), ..Part::default() };
             let messages = LogFiles::Recordings(vec![path.to_owned()]).open(&part)?;
-            let progress = messages.progress();
-            let recording = Recording {
-                messages,
-                joiner: Joiner::new(),
-                events: BTreeMap::new(),
-                ready: VecDeque::new(),
-            };
-            return Ok(Self {
-                path: path.to_owned(),
-                source: Source::Recording(Box::new(recording)),
-                progress,
-            });
-        }
-        let csv = is_csv(path);
-        let read = Arc::default();
-        let (bytes, length) = open_raw(path, &read)?;
-        let (bytes, progress) = (BufReader::new(bytes), Progress::new(read, length));
-        let source = if csv {
-            Source::Csv { lines: bytes, unit: units.first().unwrap_or(unnamed).clone(), line: 0 }
+            let (progress, joiner) = (messages.progress(), Joiner::new());
+            let recording = Recording { messages, joiner, events: BTreeMap::new(), ready: VecDeque::new() };
+            (Source::Recording(Box::new(recording)), progress)
         } else {
-            Source::Wire { bytes, units: units.clone(), frame: Vec::new(), begun: false }
+            let csv = is_csv(path);
+            let (bytes, length) = open_raw(path, &read)?;
+            let bytes = BufReader::new(bytes);
+            let source = if csv {
+                Source::Csv { lines: bytes, unit: units.first().unwrap_or(unnamed).clone(), line: 0 }
+            } else {
+                Source::Wire { bytes, units: units.clone(), frame: Vec::new(), begun: false }
+            };
+            (source, Progress::new(read, length))
         };
         Ok(Self { path: path.to_owned(), source, progress })
     }

@@ -96,7 +96,7 @@ pub fn differences(a: &LogTick, b: &LogTick, tolerance: &Tolerance) -> Vec<Field
         found.number(name, (*a, b), tolerance.velocity_m_per_s, &|d| force(d / seconds));
     }
     found.plain("mode", mode(a.mode), mode(b.mode));
-    found.words("flags", a.flags, b.flags, |flags| words(flags.iter_names().map(|(name, _)| name)));
+    found.words("flags", a.flags, b.flags, |flags| words(flags.iter_names()));
     found.sensors("gyro_flags", &a.gyro_flags, &b.gyro_flags);
     found.sensors("accel_flags", &a.accel_flags, &b.accel_flags);
     found.numbers(
@@ -109,30 +109,19 @@ pub fn differences(a: &LogTick, b: &LogTick, tolerance: &Tolerance) -> Vec<Field
     let limit = tolerance.velocity_m_per_s / seconds;
     found.numbers("accel_parity", "m_per_s2", (&a.accel_parity, &b.accel_parity), limit, &force);
     found.plain("revision", a.revision, b.revision);
-    found.words("sigma", SigmaRun::of([a]), SigmaRun::of([b]), |runs| match &*runs {
-        [run] => format!("{:?} rad, {:?} m/s", run.sigma().angle.all(), run.sigma().velocity.all()),
-        _ => "none".to_owned(),
-    });
+    if a.sigma.is_some() || b.sigma.is_some() {
+        found.words("sigma", SigmaRun::of([a]), SigmaRun::of([b]), |runs| match &*runs {
+            [run] => format!("{:?} rad, {:?} m/s", run.sigma().angle.all(), run.sigma().velocity.all()),
+            _ => "none".to_owned(),
+        });
+    }
     found.fields
 }
 
 /// Whether two ticks are the same, bit for bit, whichever document made them.
 #[must_use]
 pub fn identical(a: &LogTick, b: &LogTick) -> bool {
-    // As bits: zero has a sign, and what is not a number may still be the same.
-    let same =
-        |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
-    let (a, b) = (&a.tick, &b.tick);
-    (a.sequence, a.end_time, a.duration, a.ticks, a.missed)
-        == (b.sequence, b.end_time, b.duration, b.ticks, b.missed)
-        && same(&a.delta_angle, &b.delta_angle)
-        && same(&a.delta_velocity, &b.delta_velocity)
-        && (a.mode, a.flags, a.revision) == (b.mode, b.flags, b.revision)
-        && a.gyro_flags == b.gyro_flags
-        && a.accel_flags == b.accel_flags
-        && same(&a.gyro_parity, &b.gyro_parity)
-        && same(&a.accel_parity, &b.accel_parity)
-        && (a.sigma.is_none() && b.sigma.is_none() || SigmaRun::of([a]) == SigmaRun::of([b]))
+    differences(a, b, &Tolerance::default()).is_empty()
 }
 
 /// Differences being gathered.
@@ -184,24 +173,32 @@ impl Found<'_> {
         absolute: f64,
         equivalent: &dyn Fn(f64) -> Equivalent,
     ) {
-        self.plain(&format!("{field} (number of)"), a.len(), b.len());
+        self.lengths(field, a.len(), b.len());
         for (number, pair) in (1..).zip(a.iter().copied().zip(b.iter().copied())) {
             self.number(|| format!("{field}_{number}_{unit_of_measure}"), pair, absolute, equivalent);
         }
     }
 
+    /// Nothing is put into words where ticks are the same: most are.
+    fn lengths(&mut self, field: &str, a: usize, b: usize) {
+        if a != b {
+            self.plain(&format!("{field} (number of)"), a, b);
+        }
+    }
+
     fn sensors(&mut self, field: &str, a: &[SensorFlags], b: &[SensorFlags]) {
-        self.plain(&format!("{field} (number of)"), a.len(), b.len());
+        self.lengths(field, a.len(), b.len());
         for (number, (a, b)) in (1..).zip(a.iter().zip(b)) {
-            let named = |flags: SensorFlags| words(flags.iter_names().map(|(name, _)| name));
-            self.words(&format!("{field}_{number}"), *a, *b, named);
+            if a != b {
+                self.words(&format!("{field}_{number}"), *a, *b, |flags| words(flags.iter_names()));
+            }
         }
     }
 }
 
 /// Names of flags; "none" without any.
-pub(super) fn words<'n>(names: impl Iterator<Item = &'n str>) -> String {
-    let names: Vec<_> = names.collect();
+pub(super) fn words<'n, F>(names: impl Iterator<Item = (&'n str, F)>) -> String {
+    let names: Vec<_> = names.map(|(name, _)| name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(" ") }
 }
 

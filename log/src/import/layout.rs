@@ -80,18 +80,10 @@ pub(super) fn find(path: &Path, hints: &Hints) -> Result<Found, Error> {
         Some(_) => vec![b'.'],
         None => vec![b'.', b','],
     };
-    let mut best: Option<(Score, Block)> = None;
-    for (name, delimiter) in delimiters {
-        for &mark in &marks {
-            if delimiter == Delimiter::Character(mark) {
-                continue;
-            }
-            let Some((score, block)) = block(&lines, name, delimiter, mark) else { continue };
-            if best.as_ref().is_none_or(|(before, _)| score > *before) {
-                best = Some((score, block));
-            }
-        }
-    }
+    let both = delimiters.into_iter().flat_map(|split| marks.iter().map(move |mark| (split, *mark)));
+    let apart = both.filter(|((_, delimiter), mark)| *delimiter != Delimiter::Character(*mark));
+    let best =
+        apart.filter_map(|((name, delimiter), mark)| block(&lines, name, delimiter, mark)).reduce(better);
     let (_, block) = best.ok_or_else(|| {
         refuse(path, format!("no rows of numbers in the first {} lines: is it a text log?", lines.len()))
     })?;
@@ -111,39 +103,34 @@ struct Block {
     width: usize,
 }
 
-/// Where a run of rows begins, its width, its rows, and the sum of their shares of numbers.
-type Run = (usize, usize, usize, usize);
+/// The better of two, the first where they are as good.
+fn better(first: (Score, Block), second: (Score, Block)) -> (Score, Block) {
+    if second.0 > first.0 { second } else { first }
+}
 
 /// The longest run of lines that are rows of numbers of one width.
 fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -> Option<(Score, Block)> {
-    let (mut best, mut run): (Option<(Score, Block)>, Option<Run>) = (None, None);
-    let mut close = |run: &mut Option<Run>| {
-        let Some((start, width, rows, share)) = run.take() else { return };
-        let score = (rows, share / rows.max(1));
-        if best.as_ref().is_none_or(|(before, _)| score > *before) {
-            best = Some((score, Block { name, delimiter, mark, start, width }));
-        }
-    };
-    for (index, line) in lines.iter().enumerate() {
-        if line.trim().is_empty() {
-            continue;
-        }
+    // Where a run begins, its width, its rows, and the sum of their shares of numbers.
+    let mut runs: Vec<(usize, usize, usize, usize)> = Vec::new();
+    let mut goes_on = false;
+    for (index, line) in lines.iter().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         match numeric(line, delimiter, mark) {
             Some((width, share)) => {
-                if run.is_some_and(|(_, of_run, _, _)| of_run != width) {
-                    close(&mut run);
+                match runs.last_mut().filter(|(_, of_run, ..)| goes_on && *of_run == width) {
+                    Some((.., rows, sum)) => (*rows, *sum) = (*rows + 1, *sum + share),
+                    None => runs.push((index, width, 1, share)),
                 }
-                let (_, _, rows, sum) = run.get_or_insert((index, width, 0, 0));
-                *rows += 1;
-                *sum += share;
+                goes_on = true;
             }
             // A comment between rows ends no run.
             None if comments(delimiter).any(|prefix| line.trim_start().starts_with(prefix)) => {}
-            None => close(&mut run),
+            None => goes_on = false,
         }
     }
-    close(&mut run);
-    best
+    let scored = runs
+        .into_iter()
+        .map(|(start, width, rows, sum)| ((rows, sum / rows), Block { name, delimiter, mark, start, width }));
+    scored.reduce(better)
 }
 
 /// Width of a row of numbers, and the share of its filled cells that are numbers (in thousandths); `None` for another line.

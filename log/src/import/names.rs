@@ -58,30 +58,8 @@ const GYROS_ALONE: [&str; 4] = ["gyro", "gyros", "gyroscope", "angrate"];
 const ACCELS: [&str; 9] =
     ["accel", "acc", "accl", "acceleration", "accelerometer", "accelerometers", "acel", "a", "f"];
 /// Parts that are of no sensor's reading.
-const OTHERS: [&str; 22] = [
-    "mag",
-    "euler",
-    "quat",
-    "covariance",
-    "status",
-    "clipping",
-    "dt",
-    "integral",
-    "bias",
-    "range",
-    "free",
-    "valid",
-    "relative",
-    "std",
-    "sigma",
-    "orientation",
-    "mat",
-    "gravity",
-    "error",
-    "sat",
-    "lat",
-    "lon",
-];
+const OTHERS: &str = "mag euler quat covariance status clipping dt integral bias range free valid relative std sigma \
+    orientation mat gravity error sat lat lon";
 
 /// What a name means, with its unit from brackets, from a row of units, or from its own parts.
 pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
@@ -126,7 +104,7 @@ pub(super) fn meaning(name: &str, of_row: Option<&str>) -> Option<Meaning> {
     } else if parts == ["value"] && axis == Some(0) {
         // LabVIEW's X_Value: the time, whatever the columns beside it are.
         (Kind::Time, false)
-    } else if has(&OTHERS) {
+    } else if OTHERS.split(' ').any(|other| has(&[other])) {
         return None;
     } else if angle && axis.is_some() {
         (Kind::Gyro, true)

@@ -2,6 +2,7 @@
 
 mod rows;
 mod time;
+mod written;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,10 +10,10 @@ use std::path::Path;
 use super::figures::{Column, Figures, usual_size};
 use super::layout::{self, Found};
 use super::names::{Kind, Meaning, kind_by_unit, meaning};
-use super::written::{FileText, Sensors, Temperature, name_line};
-use super::{Hints, Proposal, Question, refuse};
+use super::{Asked, Hints, Proposal, refuse, states};
 use crate::error::Error;
 use crate::streams::raw_text::RawColumns;
+use written::name_line;
 
 /// Standard gravity in the units that an accelerometer may have.
 const GRAVITY: [(&str, f64); 3] = [("m_per_s2", 9.80665), ("g", 1.0), ("mg", 1000.0)];
@@ -31,15 +32,19 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
         .collect();
     for (path, name) in paths.iter().zip(&names) {
         let found = layout::find(path.as_ref(), hints)?;
-        let mut figures = Figures::of(path.as_ref(), &found, hints.date_order(), None)?;
-        let serials = File { name, found: &found, figures: &figures, hints, select: None }.serials();
-        let select = rows::select(path.as_ref(), serials.as_ref(), hints, &mut proposal)?;
-        if select.is_some() {
-            figures = Figures::of(path.as_ref(), &found, hints.date_order(), select)?;
-        } else if serials.is_some() {
+        let figures_of = |select| Figures::of(path.as_ref(), &found, hints.date_order(), select);
+        let of_all = figures_of(None)?;
+        let of_one;
+        let mut file = File { name, found: &found, figures: &of_all, hints, select: None };
+        let asked = proposal.open.len();
+        let select = file.select(path.as_ref(), &mut proposal)?;
+        if proposal.open.len() > asked {
             continue;
         }
-        let file = File { name, found: &found, figures: &figures, hints, select };
+        if select.is_some() {
+            of_one = figures_of(select)?;
+            file = File { figures: &of_one, select, ..file };
+        }
         let several = paths.len() > 1;
         let text = match file.own() {
             Some(columns) => {
@@ -47,16 +52,13 @@ pub fn propose(paths: &[impl AsRef<Path>], hints: &Hints) -> Result<Proposal, Er
                 let line = if several { name_line(name) + "\n" } else { String::new() };
                 columns.file_text(&line, hints.skip_bad_rows)
             }
-            None => file.text(several, &mut proposal).text(),
+            None => file.text(several, &mut proposal),
         };
         proposal.mapping.push_str(&text);
     }
     let has_gyros = proposal.mapping.contains("[file.gyro]");
     if !has_gyros
-        && !proposal
-            .open
-            .iter()
-            .any(|open| matches!(open, Question::Columns { .. } | Question::Serial { .. }))
+        && !proposal.open.iter().any(|open| matches!(open.asked, Asked::Columns(_) | Asked::Serial(_)))
     {
         let first = paths.first().map_or(Path::new("the log"), AsRef::as_ref);
         return Err(refuse(first, "has no gyro columns with known names: name the columns with --columns"));
@@ -85,6 +87,27 @@ struct File<'a> {
 /// The columns of x, y and z.
 type Axes<'m> = [Option<(usize, &'m Meaning)>; 3];
 
+/// Sensors of one kind.
+struct Sensors {
+    kind: &'static str,
+    /// Of x, y and z; `None` for an axis that the log does not have.
+    columns: [Option<usize>; 3],
+    /// Of each; and how much of the unit a reading of 1 is, where it is not one.
+    units: [(String, Option<f64>); 3],
+    /// Whose name begins with a minus: the other way round.
+    turned: [bool; 3],
+    counter: Option<usize>,
+    may_be_empty: bool,
+}
+
+/// A temperature channel.
+struct Temperature {
+    channel: String,
+    column: usize,
+    unit: &'static str,
+    may_be_empty: bool,
+}
+
 /// Columns that mean something.
 type Meanings = Vec<(usize, Meaning)>;
 
@@ -104,7 +127,8 @@ impl<'a> File<'a> {
         (*self.hints == said).then(|| RawColumns::of_header(header, whole)).flatten()
     }
 
-    fn text(self, named: bool, proposal: &mut Proposal) -> FileText<'a> {
+    /// The file's part of the mapping.
+    fn text(self, named: bool, proposal: &mut Proposal) -> String {
         let Found { encoding, delimiter, decimal_mark, .. } = self.found;
         let header = if self.found.header.is_some() { "a header" } else { "no header" };
         proposal.notes.push(format!(
@@ -119,7 +143,7 @@ impl<'a> File<'a> {
         let groups = [Kind::Gyro, Kind::Accel].map(|kind| Self::group(&meanings, kind));
         let of_temperatures = named && meanings.iter().any(|(_, meaning)| meaning.kind == Kind::Temperature);
         if groups.iter().all(Option::is_none) && !of_temperatures {
-            proposal.open.push(self.ask_columns());
+            self.ask_columns(proposal);
         }
         let counter = self.counter(&meanings, proposal);
         let time = self.time(&meanings, counter.is_some(), proposal);
@@ -162,16 +186,7 @@ impl<'a> File<'a> {
         let used = of_sensors.chain(temperatures.iter().map(|it| it.column)).chain(counter).chain(time.date);
         self.note_states(proposal);
         self.unused(&used.chain(time.column).collect::<Vec<_>>(), &sensors, proposal);
-        let name = named.then(|| self.name.to_owned());
-        FileText {
-            name,
-            found: self.found,
-            skip_bad_rows: self.hints.skip_bad_rows,
-            select: self.select,
-            time,
-            sensors,
-            temperatures,
-        }
+        self.written(named, &time, &sensors, &temperatures)
     }
 
     /// Notes which columns with numbers are not used, and asks where one states a sensor's unit and such sensors lack.
@@ -188,14 +203,14 @@ impl<'a> File<'a> {
             let found = sensors.iter().find(|sensors| sensors.kind == kind);
             found.is_none_or(|sensors| sensors.columns.iter().any(Option::is_none))
         };
-        let asked = proposal.open.iter().any(|open| matches!(open, Question::Columns { .. }));
+        let asked = proposal.open.iter().any(|open| matches!(open.asked, Asked::Columns(_)));
         let is_sensor = |index: &usize| match kind_by_unit(&names[*index], self.row_unit(*index)) {
             Some(Kind::Gyro) => lacks("gyro"),
             Some(Kind::Accel) => lacks("accel"),
             _ => false,
         };
         if self.hints.columns.is_empty() && !asked && left.iter().any(is_sensor) {
-            proposal.open.push(self.ask_columns());
+            self.ask_columns(proposal);
         }
     }
 
@@ -264,7 +279,7 @@ impl<'a> File<'a> {
     fn sensor_units(self, axes: Axes<'_>, kind: &str, proposal: &mut Proposal) -> [(String, Option<f64>); 3] {
         let hint = if kind == "gyro" { &self.hints.gyro_unit } else { &self.hints.accel_unit };
         let there = || axes.iter().flatten();
-        let unknown = there().find_map(|(_, meaning)| meaning.unknown.clone());
+        let unknown = there().find_map(|(_, meaning)| meaning.unknown.as_ref());
         // Where only the first of three names its unit, the others have it too.
         let first = there().find(|(_, meaning)| meaning.unit.is_some()).map(|(_, meaning)| *meaning);
         match (hint, first) {
@@ -284,7 +299,7 @@ impl<'a> File<'a> {
     fn guessed_unit(
         self,
         axes: Axes<'_>,
-        unknown: Option<String>,
+        unknown: Option<&String>,
         kind: &str,
         proposal: &mut Proposal,
     ) -> &'static str {
@@ -309,11 +324,16 @@ impl<'a> File<'a> {
         let largest = columns.iter().filter_map(|column| self.figures.columns.get(*column));
         let largest = largest.fold(0.0_f64, |largest, column| largest.max(column.largest)).to_string();
         let columns = self.listed(&columns);
-        proposal.open.push(if kind == "gyro" {
-            Question::GyroUnit { columns, unknown, largest }
-        } else {
-            Question::AccelUnit { columns, unknown, largest }
-        });
+        let (asked, sensors) = match kind {
+            "gyro" => (Asked::GyroUnit, "gyros"),
+            _ => (Asked::AccelUnit, "accelerometers"),
+        };
+        let help = ": for other units, give the nearest and set `scale` in the mapping";
+        let stated = states(unknown, help);
+        proposal.ask(
+            asked,
+            format!("what is the unit of the {sensors} {columns}?{stated} The largest reading is {largest}"),
+        );
         "raw"
     }
 
@@ -372,21 +392,22 @@ impl<'a> File<'a> {
         found
     }
 
-    fn ask_columns(self) -> Question {
+    fn ask_columns(self, proposal: &mut Proposal) {
+        let (name, width) = (self.name, self.found.width);
         let header = self.found.header.as_ref().map(|names| names.join(" | "));
-        let rows = header.into_iter().chain(self.found.rows.first().cloned()).collect();
-        Question::Columns { file: self.name.to_owned(), width: self.found.width, rows }
+        let rows: Vec<_> = header.into_iter().chain(self.found.rows.first().cloned()).collect();
+        let words = format!(
+            "{name}: which of the {width} columns are gyros, accelerometers, temperatures and the time? \
+             The first rows: {}",
+            rows.join(" ⏎ ")
+        );
+        proposal.ask(Asked::Columns(width), words);
     }
 
     /// Columns for people.
     fn listed(self, columns: &[usize]) -> String {
         let name = |column: &usize| {
-            let name = self
-                .found
-                .header
-                .as_ref()
-                .and_then(|names| names.get(*column))
-                .filter(|name| !name.is_empty());
+            let name = self.found.header.iter().flatten().nth(*column).filter(|name| !name.is_empty());
             name.map_or_else(|| format!("column {}", column + 1), Clone::clone)
         };
         columns.iter().map(name).collect::<Vec<_>>().join(", ")

@@ -1,49 +1,38 @@
 //! Units of measure as headers spell them.
 
+use super::NUMBER_UNITS;
 use super::names::Kind;
 
 /// As the mapping spells it, and how much of it a reading of 1 is.
 pub(super) type Unit = (&'static str, f64);
 
-/// Spellings of one thing.
-const SPELLINGS: [(&str, &str); 30] = [
-    ("degrees", "deg"),
-    ("degree", "deg"),
-    ("grad", "deg"),
-    ("°", "deg"),
-    ("º", "deg"),
-    ("˚", "deg"),
-    ("micro", "u"),
-    ("milli", "m"),
-    ("µ", "u"),
-    ("μ", "u"),
-    ("²", "2"),
-    ("per", ""),
-    ("seconds", "s"),
-    ("second", "s"),
-    ("sec", "s"),
-    ("minutes", "min"),
-    ("minute", "min"),
-    ("mins", "min"),
-    ("hours", "h"),
-    ("hour", "h"),
-    ("hrs", "h"),
-    ("hr", "h"),
-    ("degps", "degs"),
-    ("degph", "degh"),
-    ("radps", "rads"),
-    ("mps2", "ms2"),
-    ("celsius", "degc"),
-    ("fahrenheit", "degf"),
-    ("kelvin", "k"),
-    ("volt", "v"),
+/// Each part of a unit as it is read, and its other spellings.
+const SPELLINGS: [(&str, &[&str]); 16] = [
+    ("deg", &["degrees", "degree", "grad", "°", "º", "˚"]),
+    ("u", &["micro", "µ", "μ"]),
+    ("m", &["milli"]),
+    ("2", &["²"]),
+    ("", &["per"]),
+    ("s", &["seconds", "second", "sec"]),
+    ("min", &["minutes", "minute", "mins"]),
+    ("h", &["hours", "hour", "hrs", "hr"]),
+    ("degs", &["degps"]),
+    ("degh", &["degph"]),
+    ("rads", &["radps"]),
+    ("ms2", &["mps2"]),
+    ("degc", &["celsius"]),
+    ("degf", &["fahrenheit"]),
+    ("k", &["kelvin"]),
+    ("v", &["volt"]),
 ];
 
 /// A unit in small letters, without points, strokes and brackets.
 fn plain(text: &str) -> String {
     let left_out = |c: &char| c.is_whitespace() || matches!(c, '.' | '(' | ')' | '/' | '^' | '*' | '·' | '_');
     let text: String = text.to_lowercase().chars().filter(|c| !left_out(c)).collect();
-    SPELLINGS.iter().fold(text, |text, (spelling, plain)| text.replace(spelling, plain))
+    let spellings =
+        SPELLINGS.iter().flat_map(|(plain, others)| others.iter().map(move |other| (other, plain)));
+    spellings.fold(text, |text, (spelling, plain)| text.replace(spelling, plain))
 }
 
 /// The unit that a text is.
@@ -92,12 +81,7 @@ fn known(kind: Kind, increment: bool, plain: &str) -> Option<Unit> {
         (Kind::Accel, "g" | "gs") => ("g", 1.0),
         (Kind::Accel, "mg") => ("mg", 1.0),
         (Kind::Accel | Kind::Temperature, "v") => ("volt", 1.0),
-        (Kind::Time, "ns") => ("ns", 1.0),
-        (Kind::Time, "us") => ("us", 1.0),
-        (Kind::Time, "ms") => ("ms", 1.0),
-        (Kind::Time, "s") => ("s", 1.0),
-        (Kind::Time, "min") => ("min", 1.0),
-        (Kind::Time, "h") => ("h", 1.0),
+        (Kind::Time, word) => (*NUMBER_UNITS.iter().find(|unit| **unit == word)?, 1.0),
         (Kind::Temperature, "degc" | "c") => ("deg_c", 1.0),
         (Kind::Temperature, "degf" | "f") => ("deg_f", 1.0),
         (Kind::Temperature, "k") => ("kelvin", 1.0),

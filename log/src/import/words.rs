@@ -1,49 +1,22 @@
 //! Names of columns as words.
 
 /// How words of other languages begin, and what they are here.
-const WORDS: [(&str, &str); 42] = [
-    ("drehrate", "gyro"),
-    ("drehgeschw", "gyro"),
-    ("winkelgeschw", "gyro"),
-    ("kreisel", "gyro"),
-    ("gyroskop", "gyro"),
-    ("giroscop", "gyro"),
-    ("角速度", "gyro"),
-    ("rollrate", "gyrox"),
-    ("nickrate", "gyroy"),
-    ("gierrate", "gyroz"),
-    ("nick", "pitch"),
-    ("gier", "yaw"),
-    ("beschl", "acceleration"),
-    ("accélér", "acceleration"),
-    ("accelerazion", "acceleration"),
-    ("aceler", "acceleration"),
-    ("加速度", "acceleration"),
-    ("温度", "temperature"),
-    ("zeit", "time"),
-    ("zeitstempel", "timestamp"),
-    ("uhrzeit", "time"),
-    ("messzeit", "time"),
-    ("temps", "time"),
-    ("tempo", "time"),
-    ("tiempo", "time"),
-    ("heure", "time"),
-    ("hora", "time"),
-    ("tijd", "time"),
-    ("时间", "time"),
-    ("時間", "time"),
-    ("時刻", "time"),
-    ("zähler", "counter"),
-    ("zaehler", "counter"),
-    ("compteur", "counter"),
-    ("contador", "counter"),
-    ("contatore", "counter"),
-    ("序号", "counter"),
-    ("angulaire", "angular"),
-    ("angolare", "angular"),
-    ("lineare", "linear"),
-    ("vitesse", "velocity"),
-    ("velocid", "velocity"),
+const WORDS: [(&str, &[&str]); 15] = [
+    ("gyro", &["drehrate", "drehgeschw", "winkelgeschw", "kreisel", "gyroskop", "giroscop", "角速度"]),
+    ("gyrox", &["rollrate"]),
+    ("gyroy", &["nickrate"]),
+    ("gyroz", &["gierrate"]),
+    ("pitch", &["nick"]),
+    ("yaw", &["gier"]),
+    ("acceleration", &["beschl", "accélér", "accelerazion", "aceler", "加速度"]),
+    ("temperature", &["温度"]),
+    ("time", &["zeit", "uhrzeit", "messzeit", "temps", "tempo", "tiempo", "heure", "hora", "tijd"]),
+    ("time", &["时间", "時間", "時刻"]),
+    ("timestamp", &["zeitstempel"]),
+    ("counter", &["zähler", "zaehler", "compteur", "contador", "contatore", "序号"]),
+    ("angular", &["angulaire", "angolare"]),
+    ("linear", &["lineare"]),
+    ("velocity", &["vitesse", "velocid"]),
 ];
 
 /// Letters of words that stand for themselves alone.
@@ -69,7 +42,8 @@ pub(super) fn parts(name: &str) -> Vec<String> {
     parts.retain(|part| !part.is_empty());
     for part in &mut parts {
         let is_axis = |rest: &str| ["x", "y", "z"].contains(&rest);
-        let word = WORDS.iter().find_map(|(begin, word)| {
+        let words = WORDS.iter().flat_map(|(word, others)| others.iter().map(move |begin| (*begin, word)));
+        let word = words.into_iter().find_map(|(begin, word)| {
             let rest = part.strip_prefix(begin)?;
             // The short ones could be the beginning of anything.
             let whole = rest.is_empty() || is_axis(rest);

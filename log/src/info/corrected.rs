@@ -6,10 +6,8 @@ use isotherm_correction::sigma::Causes;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use serde::Serialize;
 
+use super::MAX_LISTED;
 use crate::offline::sums::FlagCounts;
-
-/// Most revisions and channels that are told one by one.
-const MAX_LISTED: usize = 1024;
 
 /// The first tick of a calibration revision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -145,8 +143,8 @@ impl CorrectedSurvey {
     }
 
     pub(super) fn finish(self) -> Option<CorrectedInfo> {
-        let mut info = self.info;
-        [info.flags, info.sensor_flags] = self.flags.named();
+        let FlagCounts { ticks, sensors } = self.flags;
+        let mut info = CorrectedInfo { flags: ticks, sensor_flags: sensors, ..self.info };
         let sigmas = [&mut info.angle_sigma_rad, &mut info.velocity_sigma_m_per_s];
         sigmas.into_iter().flatten().for_each(SigmaInfo::finish);
         (info.outputs > 0).then_some(info)

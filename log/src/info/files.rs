@@ -78,7 +78,7 @@ fn layout(path: &Path) -> io::Result<ChunksInfo> {
 }
 
 /// Reads the head of a chunk: start and end time, uncompressed size, checksum, compression, size.
-fn chunk(records: &mut RecordFile<File>, chunk: &Head, info: &mut ChunksInfo) -> io::Result<()> {
+fn chunk(records: &mut RecordFile, chunk: &Head, info: &mut ChunksInfo) -> io::Result<()> {
     let head = records.load(chunk.begin, 32 + 64)?;
     let Some(name_length) = head.get(28..).and_then(|from| from.first_chunk()) else { return Ok(()) };
     let name = head.get(32..).unwrap_or_default();

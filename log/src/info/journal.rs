@@ -10,8 +10,7 @@ use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
 use isotherm_protocol::status::{Output, State, Status};
 use serde::Serialize;
 
-/// Most swaps, commands or changes of state that are told one by one.
-const MAX_LISTED: usize = 1024;
+use super::{MAX_LISTED, remember};
 
 /// A calibration that was given to the unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -158,11 +157,7 @@ impl StatusInfo {
                 self.states.push(StateInfo { received_ns, last_tick_ns, state, output });
             }
         }
-        for (list, value) in [(&mut self.versions, &status.version), (&mut self.instances, &status.instance)]
-        {
-            if !list.contains(value) && list.len() < MAX_LISTED {
-                list.push(value.clone());
-            }
-        }
+        remember(&mut self.versions, &status.version);
+        remember(&mut self.instances, &status.instance);
     }
 }

@@ -63,10 +63,12 @@ impl ReadingInfo {
         (self.min, self.max, self.last) = (self.min.min(value), self.max.max(value), value);
     }
 
-    /// Takes the readings of a tick, one of each sensor.
-    pub(super) fn tick(sensors: &mut Vec<Self>, readings: &[f64]) {
-        sensors.resize(sensors.len().max(readings.len()), Self::default());
-        sensors.iter_mut().zip(readings).for_each(|(sensor, reading)| sensor.add(*reading));
+    /// Notes the readings of ticks, one for each sensor.
+    pub(super) fn ticks<'r>(sensors: &mut Vec<Self>, ticks: impl Iterator<Item = &'r [f64]>) {
+        for readings in ticks {
+            sensors.resize(sensors.len().max(readings.len()), Self::default());
+            sensors.iter_mut().zip(readings).for_each(|(sensor, reading)| sensor.add(*reading));
+        }
     }
 }
 

@@ -44,85 +44,76 @@ pub enum GyroUnit {
 
 /// Unit of an accelerometer's readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 #[schemars(inline)]
 pub enum AccelUnit {
     /// Counts of the tick.
     #[default]
-    #[serde(rename = "counts")]
     Counts,
     /// m/s².
-    #[serde(rename = "m_per_s2")]
     MPerS2,
     /// Standard gravity.
-    #[serde(rename = "g")]
     G,
     /// Thousandth of standard gravity.
-    #[serde(rename = "mg")]
     Mg,
     /// m/s, over the tick.
-    #[serde(rename = "m_per_s")]
     MPerS,
     /// V.
-    #[serde(rename = "volt")]
     Volt,
     /// Whatever the calibration document takes.
-    #[serde(rename = "raw")]
     Raw,
     /// The same, over the tick.
-    #[serde(rename = "raw_per_tick")]
     RawPerTick,
 }
 
 /// The unit of a sensor's column.
 pub trait SensorUnit: Copy + Default {
+    /// How much it is in SI, whether it is an increment over the tick, and what its readings are sent in; counts are sent as
+    /// they are.
+    fn measure(self) -> (f64, bool, &'static str);
+
     /// How much it is in SI, and whether it is an increment over the tick; `None` for counts.
-    fn in_si(self) -> Option<(f64, bool)>;
-
-    /// What its readings are sent in.
-    fn sent(self) -> &'static str;
-}
-
-impl SensorUnit for GyroUnit {
     fn in_si(self) -> Option<(f64, bool)> {
-        Some(match self {
-            Self::Counts => return None,
-            Self::RadPerS | Self::Raw => (1.0, false),
-            Self::DegPerS => (AngularRate::from_deg_per_s(1.0).as_rad_per_s(), false),
-            Self::DegPerH => (AngularRate::from_deg_per_h(1.0).as_rad_per_s(), false),
-            Self::Rad | Self::RawPerTick => (1.0, true),
-            Self::Deg => (PI / 180.0, true),
-            Self::Arcsec => (Angle::from_arcsec(1.0).as_rad(), true),
-        })
+        let (factor, per_tick, sent) = self.measure();
+        (sent != COUNTS).then_some((factor, per_tick))
     }
 
+    /// What its readings are sent in.
     fn sent(self) -> &'static str {
+        self.measure().2
+    }
+}
+
+/// What counts are sent in.
+const COUNTS: &str = "counts";
+
+impl SensorUnit for GyroUnit {
+    fn measure(self) -> (f64, bool, &'static str) {
         match self {
-            Self::Counts => "counts",
-            Self::RadPerS | Self::DegPerS | Self::DegPerH | Self::Rad | Self::Deg | Self::Arcsec => "rad/s",
-            Self::Raw => "raw",
-            Self::RawPerTick => "raw/s",
+            Self::Counts => (1.0, false, COUNTS),
+            Self::RadPerS => (1.0, false, "rad/s"),
+            Self::DegPerS => (AngularRate::from_deg_per_s(1.0).as_rad_per_s(), false, "rad/s"),
+            Self::DegPerH => (AngularRate::from_deg_per_h(1.0).as_rad_per_s(), false, "rad/s"),
+            Self::Rad => (1.0, true, "rad/s"),
+            Self::Deg => (PI / 180.0, true, "rad/s"),
+            Self::Arcsec => (Angle::from_arcsec(1.0).as_rad(), true, "rad/s"),
+            Self::Raw => (1.0, false, "raw"),
+            Self::RawPerTick => (1.0, true, "raw/s"),
         }
     }
 }
 
 impl SensorUnit for AccelUnit {
-    fn in_si(self) -> Option<(f64, bool)> {
-        Some(match self {
-            Self::Counts => return None,
-            Self::MPerS2 | Self::Volt | Self::Raw => (1.0, false),
-            Self::G => (SpecificForce::from_g(1.0).as_m_per_s2(), false),
-            Self::Mg => (SpecificForce::from_g(0.001).as_m_per_s2(), false),
-            Self::MPerS | Self::RawPerTick => (1.0, true),
-        })
-    }
-
-    fn sent(self) -> &'static str {
+    fn measure(self) -> (f64, bool, &'static str) {
         match self {
-            Self::Counts => "counts",
-            Self::MPerS2 | Self::G | Self::Mg | Self::MPerS => "m/s²",
-            Self::Volt => "V",
-            Self::Raw => "raw",
-            Self::RawPerTick => "raw/s",
+            Self::Counts => (1.0, false, COUNTS),
+            Self::MPerS2 => (1.0, false, "m/s²"),
+            Self::G => (SpecificForce::from_g(1.0).as_m_per_s2(), false, "m/s²"),
+            Self::Mg => (SpecificForce::from_g(0.001).as_m_per_s2(), false, "m/s²"),
+            Self::MPerS => (1.0, true, "m/s²"),
+            Self::Volt => (1.0, false, "V"),
+            Self::Raw => (1.0, false, "raw"),
+            Self::RawPerTick => (1.0, true, "raw/s"),
         }
     }
 }

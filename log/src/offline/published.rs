@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
-use isotherm_protocol::key::RawStream;
-use isotherm_protocol::raw::{AccelBatch, GyroBatch};
+use isotherm_protocol::key::{Input, RawStream};
 
 use crate::diff::{Comparison, Side, ticks_of};
+use crate::streams::decoded::Decoded;
 
 /// How many ticks the published ones are kept ahead of those made again; more than the comparison looks ahead.
 const AHEAD: usize = 4096;
@@ -79,12 +79,8 @@ impl RawEnd {
 
     /// Whether the recording has what a tick is made of, that ends then; `made` is the end of the last tick that was made.
     pub(super) fn reaches(&self, end_time: Timestamp, made: Option<Timestamp>) -> bool {
-        let gyro =
-            codec::decode::<GyroBatch>(&self.gyro).ok().and_then(|batch| Some(batch.ticks.last()?.end_time));
-        let accel = codec::decode::<AccelBatch>(&self.accel)
-            .ok()
-            .and_then(|batch| Some(batch.ticks.last()?.end_time));
-        // A unit that starts anew sets its clock back: what was made of all of them leaves nothing to make.
+        let last = |stream, frame| Some(Decoded::of_input(Input::Raw(stream), frame).ok()?.times()?[1]);
+        let (gyro, accel) = (last(RawStream::Gyro, &self.gyro), last(RawStream::Accel, &self.accel));
         gyro != made
             && gyro.is_some_and(|gyro| gyro >= end_time)
             && accel.is_none_or(|accel| accel >= end_time)

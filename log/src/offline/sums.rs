@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{CorrectedTick, SensorFlags, TickFlags};
+use isotherm_correction::sample::{CorrectedTick, SensorFlags};
 use isotherm_correction::units::{AngularRate, Span};
 use serde::Serialize;
 
@@ -37,34 +37,24 @@ pub struct Sums {
 /// Outputs by their flags.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FlagCounts {
-    /// With each flag, by its bit.
-    ticks: [u64; 16],
-    /// In which any sensor has a flag other than `VALID`, by its bit.
-    sensors: [u64; 8],
+    /// With each flag, by its name.
+    pub(crate) ticks: BTreeMap<&'static str, u64>,
+    /// In which any sensor has a flag other than `VALID`, by its name.
+    pub(crate) sensors: BTreeMap<&'static str, u64>,
 }
 
 impl FlagCounts {
     /// Counts one output.
     pub(crate) fn add(&mut self, tick: &CorrectedTick) {
-        count_bits(&mut self.ticks, tick.flags.bits());
+        for (name, _) in tick.flags.iter_names() {
+            *self.ticks.entry(name).or_default() += 1;
+        }
         let sensors = tick.gyro_flags.iter().chain(&tick.accel_flags);
-        let bits = sensors.fold(0, |bits, flags| bits | (*flags - SensorFlags::VALID).bits());
-        count_bits(&mut self.sensors, bits.into());
+        let any = sensors.fold(SensorFlags::empty(), |any, flags| any | *flags);
+        for (name, _) in (any - SensorFlags::VALID).iter_names() {
+            *self.sensors.entry(name).or_default() += 1;
+        }
     }
-
-    /// By name, those that occurred: flags of outputs, and of sensors.
-    pub(crate) fn named(&self) -> [BTreeMap<&'static str, u64>; 2] {
-        let ticks = TickFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
-        let sensors =
-            SensorFlags::all().iter_names().map(|(name, flag)| (name, flag.bits().trailing_zeros()));
-        [occurred(ticks, &self.ticks), occurred(sensors, &self.sensors)]
-    }
-}
-
-/// Counts by the names of their bits, those that occurred.
-fn occurred(bits: impl Iterator<Item = (&'static str, u32)>, counts: &[u64]) -> BTreeMap<&'static str, u64> {
-    let counted = bits.filter_map(|(name, bit)| Some((name, *counts.get(bit as usize)?)));
-    counted.filter(|(_, count)| *count > 0).collect()
 }
 
 /// What the sums come to.
@@ -91,16 +81,6 @@ pub struct Summary {
     pub flags: BTreeMap<&'static str, u64>,
     /// Outputs in which any sensor has a flag other than `VALID`, for each that occurred.
     pub sensor_flags: BTreeMap<&'static str, u64>,
-}
-
-/// Counts each bit that is set; most ticks have none.
-fn count_bits(counts: &mut [u64], bits: u16) {
-    if bits == 0 {
-        return;
-    }
-    for (bit, count) in counts.iter_mut().enumerate() {
-        *count += u64::from(bits >> bit & 1);
-    }
 }
 
 impl Sums {
@@ -132,7 +112,6 @@ impl Sums {
     pub fn summary(&self) -> Summary {
         let duration_s = Span::from_ns(self.duration_ns).as_s();
         let mean = |sum: f64| if duration_s > 0.0 { sum / duration_s } else { 0.0 };
-        let [flags, sensor_flags] = self.flags.named();
         Summary {
             ticks: self.ticks,
             outputs: self.outputs,
@@ -144,8 +123,8 @@ impl Sums {
                 .map(|sum| AngularRate::from_rad_per_s(mean(sum)).as_deg_per_h()),
             mean_specific_force_m_per_s2: self.velocity_m_per_s.map(mean),
             mean_force_m_per_s2: mean(self.speed_m_per_s),
-            flags,
-            sensor_flags,
+            flags: self.flags.ticks.clone(),
+            sensor_flags: self.flags.sensors.clone(),
         }
     }
 }

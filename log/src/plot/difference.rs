@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 
 use isotherm_protocol::corrected::CorrectedTick;
 
+use super::DifferenceSummary;
+use super::nominal::ARCSEC;
 use super::track::Track;
 use super::unit::increments;
 
-/// Radians in seconds of arc.
-const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 /// Most ticks of one log that wait for the other's.
 const MAX_WAITING: usize = 1 << 16;
 
@@ -26,12 +26,7 @@ pub(super) struct Difference {
     waiting: [VecDeque<Waiting>; 2],
     /// Differences of rates (°/h), of specific forces (m/s²), and of the angles added up (″).
     pub(super) track: Track,
-    /// Ticks that both logs have.
-    pub(super) common: u64,
-    /// Ticks that only one of the logs has.
-    pub(super) single: [u64; 2],
-    /// Ticks that differ at all.
-    pub(super) differing: u64,
+    pub(super) summary: DifferenceSummary,
     angle_arcsec: [f64; 3],
 }
 
@@ -40,9 +35,7 @@ impl Difference {
         Self {
             waiting: [VecDeque::new(), VecDeque::new()],
             track: Track::new(9, detail),
-            common: 0,
-            single: [0, 0],
-            differing: 0,
+            summary: DifferenceSummary::default(),
             angle_arcsec: [0.0; 3],
         }
     }
@@ -53,45 +46,44 @@ impl Difference {
         let [first, second] = &mut self.waiting;
         (if log == 0 { first } else { second }).push_back(waiting);
         self.compare();
-        let [first, second] = &mut self.waiting;
-        for (queue, single) in [first, second].into_iter().zip(&mut self.single) {
-            if queue.len() > MAX_WAITING {
-                queue.pop_front();
-                *single += 1;
-            }
-        }
+        self.give_up(MAX_WAITING);
     }
 
     /// There are no further ticks.
     pub(super) fn end(&mut self) {
-        for (queue, single) in self.waiting.iter_mut().zip(&mut self.single) {
-            *single += queue.len() as u64;
-            queue.clear();
+        self.give_up(0);
+    }
+
+    /// Counts the first ticks of a log as its own alone, until so many wait.
+    fn give_up(&mut self, most: usize) {
+        let DifferenceSummary { only_first, only_second, .. } = &mut self.summary;
+        for (queue, single) in self.waiting.iter_mut().zip([only_first, only_second]) {
+            *single += queue.drain(..queue.len().saturating_sub(most)).count() as u64;
         }
     }
 
     fn compare(&mut self) {
         let [first, second] = &mut self.waiting;
         while let (Some(a), Some(b)) = (first.front().copied(), second.front().copied()) {
-            if a.at_ns < b.at_ns {
+            let order = a.at_ns.cmp(&b.at_ns);
+            if order.is_le() {
                 first.pop_front();
-                self.single[0] += 1;
-                continue;
             }
-            if b.at_ns < a.at_ns {
+            if order.is_ge() {
                 second.pop_front();
-                self.single[1] += 1;
+            }
+            self.summary.only_first += u64::from(order.is_lt());
+            self.summary.only_second += u64::from(order.is_gt());
+            self.summary.common_ticks += u64::from(order.is_eq());
+            if order.is_ne() {
                 continue;
             }
-            first.pop_front();
-            second.pop_front();
-            self.common += 1;
             let mut values = [0.0; 9];
             for ((value, a), b) in values.iter_mut().zip(a.increments).zip(b.increments) {
                 *value = b - a;
             }
             let differs = values.iter().any(|value| *value != 0.0);
-            self.differing += u64::from(differs);
+            self.summary.differing_ticks += u64::from(differs);
             let angles = a.angle_rad.iter().zip(b.angle_rad);
             for ((sum, value), (a, b)) in
                 self.angle_arcsec.iter_mut().zip(values.iter_mut().skip(6)).zip(angles)
@@ -119,10 +111,12 @@ mod tests {
         (0..10).for_each(|index| difference.take(0, index * 10, &tick(1e-6)));
         (5..12).for_each(|index| difference.take(1, index * 10, &tick(3e-6)));
         difference.end();
-        assert_eq!((difference.common, difference.single, difference.differing), (5, [5, 2], 5));
-        let rate = difference.track.overall(0, 1.0).unwrap();
+        let counts = DifferenceSummary { common_ticks: 5, differing_ticks: 5, only_first: 5, only_second: 2 };
+        assert_eq!(difference.summary, counts);
+        let finished = difference.track.finish(0);
+        let rate = finished.overall(0, 1.0).unwrap();
         assert!((rate.mean - 2e-6 * 100.0 * 206_264.806).abs() < 1e-3, "{rate:?}");
-        let angle = difference.track.overall(6, 1.0).unwrap();
+        let angle = finished.overall(6, 1.0).unwrap();
         assert!((angle.max - 1e-5 * ARCSEC).abs() < 1e-9, "{angle:?}");
     }
 
@@ -132,6 +126,6 @@ mod tests {
         (0..100_000).for_each(|index| difference.take(1, index, &tick(0.0)));
         assert!(difference.waiting[1].len() <= MAX_WAITING);
         difference.end();
-        assert_eq!((difference.common, difference.single), (0, [0, 100_000]));
+        assert_eq!((difference.summary.common_ticks, difference.summary.only_second), (0, 100_000));
     }
 }

@@ -30,7 +30,7 @@ pub(super) fn page(units: Vec<(UnitId, UnitLogs)>, summary: &PlotSummary) -> Opt
         drawn = true;
         let both = logs.iter().flatten().count() == 2;
         let mut drawing = Drawing { begin_ns, end_ns, both, rows: Vec::new() };
-        let difference = difference.filter(|difference| both && difference.common > 0);
+        let difference = difference.filter(|difference| both && difference.summary.common_ticks > 0);
         let chart = drawing.chart(&unit, logs, difference);
         page.heading(&format!("Unit {unit}"));
         page.paragraph(&format!(
@@ -78,25 +78,28 @@ impl Drawing {
             self.add(log, shown, &mut parts);
         }
         let [rates, forces, angles] = self.differences(difference);
-        let mut panels = Vec::new();
-        lanes(&mut panels, "state and calibration", parts.lanes);
-        let each =
-            |what: &str, way: &str, unit: &str, height, curves: [Vec<Series>; 3], panels: &mut Vec<Panel>| {
-                for (axis, curves) in AXES.iter().zip(curves) {
-                    series(panels, format!("{what} {way} {axis}"), unit, height, curves);
-                }
-            };
-        each("rate", "about", "°/h", 150, parts.rates, &mut panels);
-        series(&mut panels, "difference of rates".to_owned(), "°/h", 110, rates);
-        series(&mut panels, "accumulated difference of angles".to_owned(), "″", 110, angles);
-        each("specific force", "along", "m/s²", 110, parts.forces, &mut panels);
-        series(&mut panels, "difference of specific forces".to_owned(), "m/s²", 110, forces);
-        for (title, unit, curves) in parts.unplaced {
-            series(&mut panels, title, unit, 150, curves);
-        }
-        series(&mut panels, "temperatures applied".to_owned(), "°C", 110, parts.applied);
-        series(&mut panels, "temperature readings".to_owned(), "as sent", 110, parts.readings);
-        lanes(&mut panels, "modes and flags", parts.flags);
+        let one = |title: &str, unit, height, curves| vec![Panel::of(title, unit, height, curves)];
+        let each = |what: &str, unit: &str, height, curves: [Vec<Series>; 3]| -> Vec<Panel> {
+            let axes = AXES.iter().zip(curves);
+            axes.map(|(axis, curves)| Panel::of(format!("{what} {axis}"), unit, height, curves)).collect()
+        };
+        let unplaced = parts.unplaced.into_iter();
+        let panels = [
+            lanes("state and calibration", parts.lanes),
+            each("rate about", "°/h", 150, parts.rates),
+            one("difference of rates", "°/h", 110, rates),
+            one("accumulated difference of angles", "″", 110, angles),
+            each("specific force along", "m/s²", 110, parts.forces),
+            one("difference of specific forces", "m/s²", 110, forces),
+            unplaced.map(|(title, unit, curves)| Panel::of(title, unit, 150, curves)).collect(),
+            one("temperatures applied", "°C", 110, parts.applied),
+            one("temperature readings", "as sent", 110, parts.readings),
+            lanes("modes and flags", parts.flags),
+        ];
+        let has_content = |panel: &Panel| match &panel.content {
+            Content::Series(curves) => !curves.is_empty(),
+            Content::Lanes(lanes) => !lanes.is_empty(),
+        };
         let of = if self.both { "A and B" } else { "the log" };
         Chart {
             caption: format!(
@@ -104,7 +107,7 @@ impl Drawing {
                  the mean. Raw: readings with nominal scale factors, along the input axes."
             ),
             x: Axis::of("time", "s"),
-            panels,
+            panels: panels.into_iter().flatten().filter(has_content).collect(),
             marks,
         }
     }
@@ -160,13 +163,11 @@ impl Drawing {
                 (None, OutputKind::Mean) => Some(Scale::of_means(gyro.sensors, DEG_PER_H)),
                 (None, OutputKind::Counts) => None,
             };
-            let what = ("gyro", "rate about", "°/h");
-            self.raw(log, gyro, scale, what, &mut parts.rates, &mut parts.unplaced, &mut parts.flags);
+            self.raw(log, gyro, scale, true, parts);
         }
         if let Some(accel) = shown.accel {
             let scale = nominal.and_then(|nominal| nominal.accel.clone());
-            let what = ("accelerometer", "specific force along", "m/s²");
-            self.raw(log, accel, scale, what, &mut parts.forces, &mut parts.unplaced, &mut parts.flags);
+            self.raw(log, accel, scale, false, parts);
         }
         if let Some(track) = shown.corrected {
             self.corrected(log, track, modes_told, parts);
@@ -177,9 +178,9 @@ impl Drawing {
         ] {
             for (index, (channel, track)) in tracks.into_iter().enumerate() {
                 let ink = Ink::several().nth(index + 2 * log).unwrap_or(Ink::First);
-                self.row(format!("{prefix}{what} {channel} ({unit})"), track.overall(0, 1.0));
-                let finished = track.finish(self.begin_ns);
-                curves.extend(curve(&finished, 0, 1.0, format!("{prefix}{channel}"), ink));
+                let row = format!("{prefix}{what} {channel} ({unit})");
+                let name = format!("{prefix}{channel}");
+                curves.extend(self.curve(&track.finish(self.begin_ns), (0, 1.0), row, name, ink));
             }
         }
     }
@@ -187,15 +188,13 @@ impl Drawing {
     fn corrected(&mut self, log: usize, track: Track, modes_told: bool, parts: &mut Parts) {
         let prefix = self.prefix(log);
         let ink = if log == 0 { Ink::Corrected } else { Ink::Other };
-        for (index, axis) in AXES.iter().chain(&AXES).enumerate() {
+        let finished = track.finish(self.begin_ns);
+        let places = parts.rates.iter_mut().chain(&mut parts.forces).zip(AXES.iter().chain(&AXES));
+        for (index, (curves, axis)) in places.enumerate() {
             let what = if index < 3 { "rate about" } else { "specific force along" };
             let unit = if index < 3 { "°/h" } else { "m/s²" };
-            self.row(format!("{prefix}corrected {what} {axis} ({unit})"), track.overall(index, 1.0));
-        }
-        let occurred = track.occurred();
-        let finished = track.finish(self.begin_ns);
-        for (index, curves) in parts.rates.iter_mut().chain(&mut parts.forces).enumerate() {
-            curves.extend(curve(&finished, index, 1.0, format!("{prefix}corrected"), ink));
+            let row = format!("{prefix}corrected {what} {axis} ({unit})");
+            curves.extend(self.curve(&finished, (index, 1.0), row, format!("{prefix}corrected"), ink));
         }
         let named = |bit, name: String, ink| (bit, format!("{prefix}{name}"), ink);
         let mut bits = Vec::new();
@@ -217,50 +216,41 @@ impl Drawing {
                 ));
             }
         }
-        bit_lanes(&finished, occurred, bits, &mut parts.flags);
+        bit_lanes(&finished, bits, &mut parts.flags);
     }
 
     /// Adds raw readings: to the axes that they are along, or to a panel of their own.
-    #[expect(clippy::too_many_arguments, reason = "the places where they may go, each by its name")]
-    fn raw(
-        &mut self,
-        log: usize,
-        raw: RawTrack,
-        scale: Option<Scale>,
-        (sensor, along, unit): (&str, &str, &'static str),
-        axes: &mut [Vec<Series>; 3],
-        unplaced: &mut Vec<(String, &'static str, Vec<Series>)>,
-        flags: &mut Vec<Lane>,
-    ) {
+    fn raw(&mut self, log: usize, raw: RawTrack, scale: Option<Scale>, of_gyros: bool, parts: &mut Parts) {
         let prefix = self.prefix(log);
+        let (sensor, along, unit, placed) = if of_gyros {
+            ("gyro", "rate about", "°/h", &mut parts.rates)
+        } else {
+            ("accelerometer", "specific force along", "m/s²", &mut parts.forces)
+        };
         let RawTrack { kind, sensors, track, .. } = raw;
-        let occurred = track.occurred();
         let unit = if scale.is_some() { unit } else { unscaled(kind) };
         let scale = scale.unwrap_or(Scale { factors: vec![1.0; sensors], axes: Vec::new() });
-        let factor = |index: usize| scale.factors.get(index).copied().unwrap_or(f64::NAN);
-        for index in 0..sensors {
-            let what = match scale.axes.get(index).and_then(|axis| AXES.get(*axis)) {
-                Some(name) => format!("{along} {name}"),
-                None => format!("{sensor} {}", index + 1),
-            };
-            self.row(format!("{prefix}raw {what} ({unit})"), track.overall(index, factor(index)));
-        }
         let finished = track.finish(self.begin_ns);
         let mut own = Vec::new();
         for index in 0..sensors {
-            let ink = if log == 0 { Ink::Raw } else { Ink::Fourth };
-            if let Some(curves) = scale.axes.get(index).and_then(|axis| axes.get_mut(*axis)) {
-                curves.extend(curve(&finished, index, factor(index), format!("{prefix}raw"), ink));
+            let factor = scale.factors.get(index).copied().unwrap_or(f64::NAN);
+            let axis = scale.axes.get(index).copied();
+            let place = axis.and_then(|axis| AXES.get(axis).zip(placed.get_mut(axis)));
+            let (what, name, ink, curves) = if let Some((axis, curves)) = place {
+                let ink = if log == 0 { Ink::Raw } else { Ink::Fourth };
+                (format!("{along} {axis}"), format!("{prefix}raw"), ink, curves)
             } else {
                 let ink = Ink::several().nth(index + 3 * log).unwrap_or(Ink::First);
-                let name = format!("{prefix}{sensor} {}", index + 1);
-                own.extend(curve(&finished, index, factor(index), name, ink));
-            }
+                let what = format!("{sensor} {}", index + 1);
+                (what.clone(), format!("{prefix}{what}"), ink, &mut own)
+            };
+            let row = format!("{prefix}raw {what} ({unit})");
+            curves.extend(self.curve(&finished, (index, factor), row, name, ink));
         }
         let title = format!("raw {sensor}s");
-        match unplaced.iter_mut().find(|(known, other, _)| *known == title && *other == unit) {
+        match parts.unplaced.iter_mut().find(|(known, other, _)| *known == title && *other == unit) {
             Some((_, _, curves)) => curves.extend(own),
-            None => unplaced.push((title, unit, own)),
+            None => parts.unplaced.push((title, unit, own)),
         }
         let bits = [
             (MODE_PLUS, "mode +1", Ink::Second),
@@ -268,7 +258,7 @@ impl Drawing {
             (SWITCH, "switch commanded", Ink::Truth),
         ];
         let bits = bits.map(|(bit, name, ink)| (bit, format!("{prefix}{name}"), ink));
-        bit_lanes(&finished, occurred, bits.to_vec(), flags);
+        bit_lanes(&finished, bits.to_vec(), &mut parts.flags);
     }
 
     /// Curves of what the logs differ by: rates, specific forces, angles.
@@ -276,15 +266,12 @@ impl Drawing {
         let mut curves = [const { Vec::new() }; 3];
         let Some(Difference { track, .. }) = difference else { return curves };
         let kinds = [("rate about", "°/h"), ("specific force along", "m/s²"), ("angle about", "″")];
-        for (kind, (what, unit)) in kinds.iter().enumerate() {
-            for (axis, name) in AXES.iter().enumerate() {
-                self.row(format!("B − A {what} {name} ({unit})"), track.overall(3 * kind + axis, 1.0));
-            }
-        }
         let finished = track.finish(self.begin_ns);
-        for (kind, curves) in curves.iter_mut().enumerate() {
+        for (kind, ((what, unit), curves)) in kinds.iter().zip(&mut curves).enumerate() {
             for ((axis, name), ink) in AXES.iter().enumerate().zip(Ink::several()) {
-                curves.extend(curve(&finished, 3 * kind + axis, 1.0, format!("B − A {name}"), ink));
+                let row = format!("B − A {what} {name} ({unit})");
+                let which = (3 * kind + axis, 1.0);
+                curves.extend(self.curve(&finished, which, row, format!("B − A {name}"), ink));
             }
         }
         curves
@@ -301,47 +288,34 @@ impl Drawing {
         list.iter().zip(ends).map(stretch).collect()
     }
 
-    /// Adds a row to the table.
-    fn row(&mut self, name: String, overall: Option<Overall>) {
-        if let Some(Overall { min, max, mean }) = overall.filter(|overall| overall.mean.is_finite()) {
-            self.rows.push(vec![name, figure(min), figure(mean), figure(max)]);
-        }
+    /// A curve of the values of one quantity, scaled, and its row in the table.
+    fn curve(
+        &mut self,
+        finished: &Finished,
+        (index, scale): (usize, f64),
+        row: String,
+        name: String,
+        ink: Ink,
+    ) -> Option<Series> {
+        let overall = finished.overall(index, scale).filter(|overall| overall.mean.is_finite());
+        self.rows.extend(
+            overall.map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
+        );
+        Some(Series { name, ink, form: Form::Line, samples: finished.samples(index, scale)? })
     }
 }
 
-/// A curve of a track; `None` where it has no such value.
-fn curve(finished: &Finished, index: usize, scale: f64, name: String, ink: Ink) -> Option<Series> {
-    Some(Series { name, ink, form: Form::Line, samples: finished.samples(index, scale)? })
-}
-
 /// Lanes of the bits that occurred.
-fn bit_lanes(finished: &Finished, occurred: u32, bits: Vec<(u32, String, Ink)>, lanes: &mut Vec<Lane>) {
+fn bit_lanes(finished: &Finished, bits: Vec<(u32, String, Ink)>, lanes: &mut Vec<Lane>) {
     for (bit, name, ink) in bits {
-        if occurred >> bit & 1 == 1 {
+        if finished.occurred >> bit & 1 == 1 {
             let (bits, places) = (std::sync::Arc::clone(&finished.bits), finished.places.clone());
             lanes.push(Lane::Bit { name, ink, bit, bits, places });
         }
     }
 }
 
-/// Adds a panel with curves, where there are any.
-fn series(panels: &mut Vec<Panel>, title: String, unit: &str, height: u32, curves: Vec<Series>) {
-    if !curves.is_empty() {
-        let content = Content::Series(curves);
-        panels.push(Panel { title, unit: unit.to_owned(), height, logarithmic: false, content });
-    }
-}
-
-/// Adds a panel with lanes, where there are any.
-fn lanes(panels: &mut Vec<Panel>, title: &str, lanes: Vec<Lane>) {
-    if !lanes.is_empty() {
-        let content = Content::Lanes(lanes);
-        panels.push(Panel {
-            title: title.to_owned(),
-            unit: String::new(),
-            height: 0,
-            logarithmic: false,
-            content,
-        });
-    }
+/// A panel of lanes.
+fn lanes(title: &str, lanes: Vec<Lane>) -> Vec<Panel> {
+    vec![Panel { content: Content::Lanes(lanes), ..Panel::of(title, "", 0, Vec::new()) }]
 }

@@ -7,7 +7,9 @@ use isotherm_protocol::document::Document;
 use super::AXES;
 
 /// Radians per second in degrees per hour.
-pub(super) const DEG_PER_H: f64 = 180.0 / std::f64::consts::PI * 3600.0;
+pub(super) const DEG_PER_H: f64 = ARCSEC;
+/// Radians in seconds of arc.
+pub(super) const ARCSEC: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 /// A sensor whose input axis has this much of a case axis is said to be along it.
 const ALONG: f64 = 0.9;
 

@@ -1,7 +1,6 @@
 //! The logs, read once and in step, into what is shown of their units.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::sync::Arc;
 
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::document::{Document, Parsed};
@@ -11,9 +10,10 @@ use isotherm_protocol::stream::UnitStream;
 use super::difference::Difference;
 use super::nominal::Nominal;
 use super::unit::UnitPlot;
-use super::{DifferenceSummary, MAX_UNITS, PlotLog, PlotOptions, PlotSummary, UnitSummary, layout, track};
+use super::{MAX_UNITS, PlotLog, PlotOptions, PlotSummary, UnitSummary, layout, track};
 use crate::error::Error;
 use crate::message::{Message, Topic};
+use crate::offline::Loaded;
 use isotherm_pages::Page;
 
 /// Logs that begin further apart than this are laid side by side by their beginnings (ns).
@@ -29,31 +29,44 @@ struct Source {
     over: bool,
     /// Where on the axis it is (ns).
     now_ns: i64,
-    stream: Option<UnitStream>,
+    /// What its raw messages are corrected by, and of which unit they are.
+    corrects: Option<(UnitStream, UnitId)>,
 }
 
 impl Source {
-    /// Sees to it that a message waits, if there is one.
-    fn fill(&mut self) -> Result<(), Error> {
-        if self.ahead.is_empty() && !self.over {
-            match self.log.messages.next_message()? {
-                Some(message) => self.ahead.push_back(message),
-                None => self.over = true,
+    /// Reads on by one message, and makes what is to be corrected of it; whether there was one.
+    fn read(&mut self) -> Result<bool, Error> {
+        let message = self.log.messages.next_message()?;
+        self.over = message.is_none();
+        let received_ns = message.as_ref().map_or(0, |message| message.received_ns);
+        if let Some((stream, unit)) = &mut self.corrects {
+            match &message {
+                None => stream.flush(),
+                Some(Message { topic: Topic::Raw(of, kind), frame, .. }) => {
+                    unit.clone_from(of);
+                    // One that cannot be read is counted as such where it is shown.
+                    let _ = stream.receive(*kind, frame);
+                }
+                Some(_) => {}
             }
         }
-        Ok(())
+        self.ahead.extend(message);
+        if let Some((stream, unit)) = &mut self.corrects {
+            let mut frame = Vec::new();
+            while stream.next_frame(&mut frame).is_some() {
+                let topic = Topic::Corrected(unit.clone());
+                self.ahead.push_back(Message { topic, received_ns, frame: std::mem::take(&mut frame) });
+            }
+        }
+        Ok(!self.over)
     }
 
     /// The producer's time of the first message that has one (ns).
     fn first_ns(&mut self) -> Result<Option<i64>, Error> {
         while self.ahead.len() < LOOK_AHEAD && !self.over {
-            let Some(message) = self.log.messages.next_message()? else {
-                self.over = true;
-                break;
-            };
-            let time = message.time();
-            self.ahead.push_back(message);
-            if let Some(time) = time {
+            let read = self.ahead.len();
+            self.read()?;
+            if let Some(time) = self.ahead.iter().skip(read).find_map(Message::time) {
                 return Ok(Some(time.as_ns()));
             }
         }
@@ -84,17 +97,12 @@ impl Plot {
     pub(super) fn new(logs: Vec<PlotLog>, options: &PlotOptions) -> Result<Self, Error> {
         let mut sources = Vec::with_capacity(logs.len());
         for log in logs {
-            let stream = match &options.calibration {
-                Some(parsed) if log.correct => {
-                    let unit = crate::offline::unit_id(&parsed.document.unit)?;
-                    let mut stream = UnitStream::new(unit, UnitSettings::default());
-                    let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
-                    stream.install(Arc::new(parsed.calibration.clone()), digest);
-                    Some(stream)
-                }
-                _ => None,
-            };
-            sources.push(Source { log, ahead: VecDeque::new(), over: false, now_ns: i64::MIN, stream });
+            let calibration = options.calibration.as_ref().filter(|_| log.correct);
+            let corrects = calibration.cloned().map(Loaded::of).transpose()?.map(|loaded| {
+                let stream = UnitStream::new(loaded.unit.clone(), UnitSettings::default());
+                (loaded.installed(stream), loaded.unit)
+            });
+            sources.push(Source { log, ahead: VecDeque::new(), over: false, now_ns: i64::MIN, corrects });
         }
         let mut plot = Self {
             moved_ns: vec![0; sources.len()],
@@ -128,7 +136,7 @@ impl Plot {
     pub(super) fn step(&mut self) -> Result<bool, Error> {
         let Some(log) = self.next_log()? else { return Ok(false) };
         if let Some(message) = self.logs.get_mut(log).and_then(|source| source.ahead.pop_front()) {
-            self.take(log, &message);
+            self.show(log, &message);
         }
         Ok(true)
     }
@@ -136,54 +144,12 @@ impl Plot {
     /// The log that is behind on the axis; `None` when all are over.
     fn next_log(&mut self) -> Result<Option<usize>, Error> {
         for source in &mut self.logs {
-            source.fill()?;
+            if source.ahead.is_empty() && !source.over {
+                source.read()?;
+            }
         }
         let waiting = self.logs.iter().enumerate().filter(|(_, source)| !source.ahead.is_empty());
-        let next = waiting.min_by_key(|(_, source)| source.now_ns).map(|(log, _)| log);
-        if next.is_none() {
-            self.flush();
-        }
-        Ok(next)
-    }
-
-    /// What still waits in the streams comes out.
-    fn flush(&mut self) {
-        for log in 0..self.logs.len() {
-            let Some(mut stream) = self.logs.get_mut(log).and_then(|source| source.stream.take()) else {
-                continue;
-            };
-            stream.flush();
-            self.take_corrected(log, &mut stream, None, 0);
-        }
-    }
-
-    fn take(&mut self, log: usize, message: &Message) {
-        self.show(log, message);
-        let Some(mut stream) = self.logs.get_mut(log).and_then(|source| source.stream.take()) else { return };
-        if let Topic::Raw(unit, kind) = &message.topic {
-            // A frame that cannot be read was counted where it was shown.
-            let _ = stream.receive(*kind, &message.frame);
-            self.take_corrected(log, &mut stream, Some(unit), message.received_ns);
-        }
-        if let Some(source) = self.logs.get_mut(log) {
-            source.stream = Some(stream);
-        }
-    }
-
-    /// Shows what a stream has corrected.
-    fn take_corrected(
-        &mut self,
-        log: usize,
-        stream: &mut UnitStream,
-        unit: Option<&UnitId>,
-        received_ns: u64,
-    ) {
-        let unit = unit.or_else(|| self.units.keys().next()).cloned().unwrap_or_else(|| stream.id().clone());
-        let mut frame = Vec::new();
-        while stream.next_frame(&mut frame).is_some() {
-            let topic = Topic::Corrected(unit.clone());
-            self.show(log, &Message { topic, received_ns, frame: std::mem::take(&mut frame) });
-        }
+        Ok(waiting.min_by_key(|(_, source)| source.now_ns).map(|(log, _)| log))
     }
 
     /// Enters a message into what is shown of its unit.
@@ -274,14 +240,7 @@ impl Plot {
             let difference = shown.difference.as_ref().filter(|_| {
                 shown.logs.iter().flatten().filter(|shown| shown.corrected.is_some()).count() == 2
             })?;
-            let [only_first, only_second] = difference.single;
-            let summary = DifferenceSummary {
-                common_ticks: difference.common,
-                differing_ticks: difference.differing,
-                only_first,
-                only_second,
-            };
-            Some((unit.to_string(), summary))
+            Some((unit.to_string(), difference.summary))
         });
         PlotSummary {
             logs: self.logs.iter().map(|source| source.log.name.clone()).collect(),

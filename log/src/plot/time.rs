@@ -36,6 +36,12 @@ pub(super) struct Clock {
     now_ns: Option<i64>,
 }
 
+impl Default for Clock {
+    fn default() -> Self {
+        Self::moved(0)
+    }
+}
+
 impl Clock {
     /// A clock whose times are moved by so much (ns).
     pub(super) fn moved(shift_ns: i64) -> Self {

@@ -216,27 +216,15 @@ impl Track {
         self.ticks
     }
 
-    /// All bits that occurred.
-    pub(super) fn occurred(&self) -> u32 {
-        self.bits
-    }
-
     /// First and last time (ns); `None` while it is empty.
     pub(super) fn range(&self) -> Option<[i64; 2]> {
         self.range
     }
 
-    /// Figures of one of its values, `scale` times what was taken; `None` where there is no number.
-    pub(super) fn overall(&self, index: usize, scale: f64) -> Option<Overall> {
-        let cell = self.total.get(index).filter(|cell| cell.count > 0)?;
-        let (a, b) = (cell.min * scale, cell.max * scale);
-        Some(Overall { min: a.min(b), max: a.max(b), mean: cell.mean() * scale })
-    }
-
     /// What a page shows of it; times become seconds after `origin_ns`.
     pub(super) fn finish(self, origin_ns: i64) -> Finished {
-        let width = self.width;
-        match self.form {
+        let Self { width, form, total, bits: occurred, .. } = self;
+        let (values, bits, places) = match form {
             Form::Exact { times, values, bits } => {
                 let mut order: Vec<usize> = (0..times.len()).collect();
                 // Late ticks go to their place; those of equal time stay as they came.
@@ -244,35 +232,26 @@ impl Track {
                 let seconds = |&index: &usize| {
                     seconds_of(times.get(index).map_or(0, |time| time.saturating_sub(origin_ns)))
                 };
-                let x: Arc<[f64]> = order.iter().map(seconds).collect();
+                let of_tick = |&index: &usize| values.iter().skip(index * width).take(width).copied();
                 let flags = order.iter().filter_map(|&index| bits.get(index).copied()).collect();
-                let column = |number: usize| {
-                    let value = |&index: &usize| values.get(index * width + number).copied();
-                    Column::Points(order.iter().filter_map(value).collect())
-                };
-                Finished {
-                    columns: (0..width).map(column).collect(),
-                    bits: Arc::new(Bits(flags)),
-                    places: Places::Points(x),
-                }
+                let places = Places::Points(order.iter().map(seconds).collect());
+                (Values::Points(order.iter().flat_map(of_tick).collect()), flags, places)
             }
             Form::Bins { shift, first, cells, bits } => {
                 let begin = i128::from(first) << shift;
                 let after_ns = i64::try_from(begin - i128::from(origin_ns)).unwrap_or(i64::MAX);
                 let places =
                     Places::Bins { first: seconds_of(after_ns), width: seconds_of(1_i64 << shift.min(62)) };
-                let column = |number: usize| {
-                    Column::Bins(cells.iter().skip(number).step_by(width.max(1)).copied().collect())
-                };
-                Finished { columns: (0..width).map(column).collect(), bits: Arc::new(Bits(bits)), places }
+                (Values::Bins(cells), bits, places)
             }
-        }
+        };
+        Finished { width, values, bits: Arc::new(Bits(bits)), places, total, occurred }
     }
 }
 
-/// One value of all ticks.
+/// All values, tick by tick or bin by bin.
 #[derive(Debug, Clone)]
-enum Column {
+enum Values {
     Points(Vec<f64>),
     Bins(Vec<Cell>),
 }
@@ -280,24 +259,41 @@ enum Column {
 /// A track as a page shows it.
 #[derive(Debug, Clone)]
 pub(super) struct Finished {
-    columns: Vec<Column>,
+    /// Values of each tick.
+    width: usize,
+    values: Values,
     /// The bits of its ticks or bins.
     pub(super) bits: Arc<Bits>,
     /// Where they are.
     pub(super) places: Places,
+    /// Of all ticks.
+    total: Vec<Cell>,
+    /// All bits that occurred.
+    pub(super) occurred: u32,
 }
 
 impl Finished {
+    /// Figures of one of its values, `scale` times what was taken; `None` where there is no number.
+    pub(super) fn overall(&self, index: usize, scale: f64) -> Option<Overall> {
+        let cell = self.total.get(index).filter(|cell| cell.count > 0)?;
+        let (a, b) = (cell.min * scale, cell.max * scale);
+        Some(Overall { min: a.min(b), max: a.max(b), mean: cell.mean() * scale })
+    }
+
     /// One of its values, `scale` times what was taken; `None` where it has no such value.
     pub(super) fn samples(&self, index: usize, scale: f64) -> Option<Samples> {
-        match (self.columns.get(index)?, &self.places) {
-            (Column::Points(y), Places::Points(x)) => {
-                Some(Samples::Points { x: Arc::clone(x), y: y.iter().map(|y| y * scale).collect() })
+        if index >= self.width {
+            return None;
+        }
+        match (&self.values, &self.places) {
+            (Values::Points(all), Places::Points(x)) => {
+                let y = all.iter().skip(index).step_by(self.width).map(|y| y * scale).collect();
+                Some(Samples::Points { x: Arc::clone(x), y })
             }
-            (Column::Bins(cells), &Places::Bins { first, width }) => {
+            (Values::Bins(cells), &Places::Bins { first, width }) => {
                 let of = |value: fn(&Cell) -> f64| {
                     let scaled = |cell: &Cell| if cell.count == 0 { f64::NAN } else { value(cell) * scale };
-                    cells.iter().map(scaled).collect::<Vec<_>>()
+                    cells.iter().skip(index).step_by(self.width).map(scaled).collect::<Vec<_>>()
                 };
                 let (a, b) = (of(|cell| cell.min), of(|cell| cell.max));
                 let (min, max) = if scale < 0.0 { (b, a) } else { (a, b) };

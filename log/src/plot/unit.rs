@@ -6,6 +6,7 @@ use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
+use isotherm_protocol::digest::Digits;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::journal::{Joiner, JournalEvent, JournalPart};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
@@ -62,7 +63,7 @@ pub(super) struct RawTrack {
 }
 
 /// One unit.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct UnitPlot {
     detail: usize,
     pub(super) clock: Clock,
@@ -89,24 +90,7 @@ pub(super) struct UnitPlot {
 impl UnitPlot {
     /// Nothing seen; its time is moved by so much on the axis.
     pub(super) fn new(detail: usize, nominal: Option<Nominal>, moved_ns: i64) -> Self {
-        Self {
-            detail,
-            clock: Clock::moved(moved_ns),
-            corrected: None,
-            gyro: None,
-            accel: None,
-            readings: BTreeMap::new(),
-            applied: BTreeMap::new(),
-            states: Vec::new(),
-            revisions: Vec::new(),
-            happenings: Vec::new(),
-            unlisted: 0,
-            nominal,
-            missed: 0,
-            unreadable: 0,
-            revision: None,
-            joiner: Joiner::new(),
-        }
+        Self { detail, clock: Clock::moved(moved_ns), nominal, ..Self::default() }
     }
 
     /// Takes a message of the unit; corrected ticks are handed on with their time on the axis (ns).
@@ -363,6 +347,5 @@ fn flags(tick: &CorrectedTick) -> u32 {
 
 /// A revision's counter and the first digits of its digest.
 fn named(revision: Revision) -> String {
-    let digits: Vec<_> = revision.digest.iter().take(4).map(|byte| format!("{byte:02x}")).collect();
-    format!("{} ({})", revision.counter, digits.concat())
+    format!("{} ({})", revision.counter, Digits(revision.digest.split_at(4).0))
 }

@@ -35,12 +35,6 @@ pub struct Documents {
 }
 
 impl Documents {
-    /// No journal yet.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Takes one message of a journal; the documents in the entry that it completes.
     pub fn take(&mut self, frame: &[u8], received_ns: u64) -> Vec<Attachment> {
         let joined = codec::decode::<JournalPart>(frame).ok().map(|part| self.joiner.join(part));
@@ -110,7 +104,7 @@ mod tests {
 
     #[test]
     fn documents_are_found_and_lost_entries_counted() {
-        let mut documents = Documents::new();
+        let mut documents = Documents::default();
         assert!(take(&mut documents, 4, JournalEvent::Flushed).is_empty());
         assert!(!documents.knows("A-1"));
         let text = |text: &str| Some(text.to_owned());

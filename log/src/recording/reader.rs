@@ -1,20 +1,18 @@
 //! Reading a recording from front to back, in constant memory.
 
 use std::collections::{HashMap, VecDeque};
-use std::fs::File;
-use std::io::{self, Read, Seek};
+use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::McapError;
 use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::Serialize;
 
 use super::record::{LONGEST_RECORD, chunk_records, parse};
-use super::skip::{Front, pass_over};
-use super::{Attachment, CHANNELS, MESSAGE_ENCODING, Metadata, view};
+use super::walk::{HEAD, Head, RecordFile, head_of, number};
+use super::{Attachment, CHANNELS, MAGIC, MESSAGE_ENCODING, Metadata, view};
 use crate::error::Error;
 use crate::file::open_log;
 use crate::message::{Message, Topic};
@@ -40,10 +38,13 @@ impl RecordingReport {
 
 /// Bytes that are read at once.
 const BLOCK: usize = 1 << 16;
+/// A chunk's head up to the time of its last message.
+const CHUNK_TIMES: usize = 16;
 
 /// Reads the messages of one or several recordings, one after the other, as they were written.
 ///
 /// A file that ends in the middle, as after a kill, is read to its last whole chunk; the report says so.
+#[derive(Debug)]
 pub struct RecordingReader {
     /// Files still to be opened, the next one last.
     waiting: Vec<PathBuf>,
@@ -57,22 +58,20 @@ pub struct RecordingReader {
 }
 
 /// A file that is being read.
+#[derive(Debug)]
 struct Opened {
     path: PathBuf,
-    file: File,
-    reader: LinearReader,
-    /// From the part that was passed over, then from the last chunk.
+    records: RecordFile,
+    /// Where the next record begins (bytes).
+    at: u64,
+    /// Chunks whose messages were all received before this are passed over (ns); 0 behind the first other one.
+    before_ns: u64,
+    /// From the last record or chunk.
     found: VecDeque<Found>,
     /// What each channel carries.
     topics: HashMap<u16, Carries>,
-    /// The last whole file's end has been seen.
+    /// The end of the messages has been seen.
     ended: bool,
-}
-
-impl std::fmt::Debug for RecordingReader {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("RecordingReader").field("report", &self.report).finish_non_exhaustive()
-    }
 }
 
 impl RecordingReader {
@@ -129,7 +128,12 @@ impl RecordingReader {
     pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
         loop {
             let Some(opened) = &mut self.current else { return Ok(None) };
-            match opened.next(&self.read) {
+            let before = opened.at;
+            let next = opened.next();
+            if opened.at > before {
+                self.read.fetch_add(opened.at - before, Ordering::Relaxed);
+            }
+            match next {
                 Ok(Some(Found::Message(Some(message)))) => {
                     self.report.messages += 1;
                     return Ok(Some(message));
@@ -138,8 +142,16 @@ impl RecordingReader {
                 Ok(Some(Found::Attachment(attachment))) => self.attachments.push(attachment),
                 Ok(Some(Found::Metadata(metadata))) => self.metadata.push(metadata),
                 Ok(None) => self.advance()?,
-                Err(Stop::Io(source)) => return Err(Error::file(&opened.path, "read the recording", source)),
-                Err(Stop::Damaged(words)) => {
+                Err(McapError::Io(source)) => {
+                    return Err(Error::file(&opened.path, "read the recording", source));
+                }
+                Err(error) => {
+                    let words = match error {
+                        McapError::UnexpectedEof => "ends in the middle".to_owned(),
+                        other => format!(
+                            "is damaged from here on: {other}; `isotherm-replay recover` restores what is intact after it"
+                        ),
+                    };
                     let words = format!("{}: {words}", opened.path.display());
                     self.report.cut_short.get_or_insert(words);
                     self.advance()?;
@@ -157,7 +169,8 @@ impl RecordingReader {
 }
 
 /// What a channel carries.
-pub(super) enum Carries {
+#[derive(Debug)]
+enum Carries {
     /// Frames of a topic.
     Frames(Topic),
     /// What stands in frames too.
@@ -167,101 +180,102 @@ pub(super) enum Carries {
 }
 
 /// One record that is of use.
-pub(super) enum Found {
+#[derive(Debug)]
+enum Found {
     /// A message; `None` for one of something else.
     Message(Option<Message>),
     Attachment(Attachment),
     Metadata(Metadata),
 }
 
-/// Why a file is read no further.
-enum Stop {
-    Io(io::Error),
-    Damaged(String),
-}
-
 impl Opened {
     fn open(path: PathBuf, before_ns: u64, read: &AtomicU64) -> Result<Self, Error> {
         let failed = |source| Error::file(&path, "open the recording", source);
-        let mut file = open_log(&path, "open the recording")?;
-        let mut magic = [0; 8];
-        let length = read_up_to(&mut file, &mut magic).map_err(failed)?;
-        if magic.get(..length) != Some(super::MAGIC) {
+        let file = open_log(&path, "open the recording")?;
+        let mut records = RecordFile::new(file, BLOCK).map_err(failed)?;
+        if records.load(0, MAGIC.len()).map_err(failed)? != MAGIC {
             return Err(failed(io::Error::other("it does not begin as an MCAP file")));
         }
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_emit_chunks(true)
-            .with_record_length_limit(LONGEST_RECORD);
-        let reader = LinearReader::new_with_options(options);
-        let mut front = Front { at: length as u64, ..Front::default() };
-        if before_ns > 0 {
-            front = pass_over(&mut file, before_ns)
-                .map_err(|source| Error::file(&path, "read the recording", source))?;
-        }
-        let Front { found, topics, at } = front;
+        let at = MAGIC.len() as u64;
         read.fetch_add(at, Ordering::Relaxed);
-        Ok(Self { path, file, reader, found: found.into(), topics, ended: false })
+        let (found, topics) = (VecDeque::new(), HashMap::new());
+        Ok(Self { path, records, at, before_ns, found, topics, ended: false })
     }
 
     /// The next record that is of use; `None` at the end.
-    fn next(&mut self, read: &AtomicU64) -> Result<Option<Found>, Stop> {
-        if let Some(found) = self.found.pop_front() {
-            return Ok(Some(found));
-        }
+    fn next(&mut self) -> Result<Option<Found>, McapError> {
         loop {
-            let Some(event) = self.reader.next_event() else {
-                // The library is content where a file ends between two records.
-                return if self.ended {
-                    Ok(None)
-                } else {
-                    Err(Stop::Damaged("ends without its summary".to_owned()))
-                };
-            };
-            match event.map_err(stop)? {
-                LinearReadEvent::ReadRequest(need) => {
-                    let room = self.room_for(need).map_err(Stop::Io)?;
-                    let count = self.file.read(self.reader.insert(room)).map_err(Stop::Io)?;
-                    read.fetch_add(count as u64, Ordering::Relaxed);
-                    self.reader.notify_read(count);
+            if let Some(found) = self.found.pop_front() {
+                return Ok(Some(found));
+            }
+            let head = self.records.load(self.at, HEAD)?;
+            let (opcode, length) = head_of(&head).ok_or(McapError::UnexpectedEof)?;
+            let short = usize::try_from(length).ok().filter(|length| *length <= LONGEST_RECORD);
+            let short = short.ok_or(McapError::RecordTooLarge { opcode, len: length })?;
+            let head = Head { opcode, begin: self.at + HEAD as u64, length };
+            if opcode == op::CHUNK && self.before_ns > 0 && self.passes_over(&head)? {
+                continue;
+            }
+            let data = self.records.load(head.begin, short)?;
+            if data.len() < short {
+                return Err(McapError::UnexpectedEof);
+            }
+            if opcode == op::CHUNK {
+                // All of its records or none.
+                for record in chunk_records(&data)? {
+                    self.found.extend(take(record, &mut self.topics, &mut self.ended));
                 }
-                // All of its records or none: the library's own walk through a chunk goes on behind its end.
-                LinearReadEvent::Record { opcode: op::CHUNK, data } => {
-                    for record in chunk_records(data).map_err(stop)? {
-                        self.found.extend(take(record, &mut self.topics, &mut self.ended));
-                    }
-                    if let Some(found) = self.found.pop_front() {
-                        return Ok(Some(found));
-                    }
-                }
-                LinearReadEvent::Record { opcode, data } => {
-                    let record = parse(opcode, data).map_err(stop)?;
-                    if let Some(found) = take(record, &mut self.topics, &mut self.ended) {
-                        return Ok(Some(found));
-                    }
-                }
+            } else {
+                let record = parse(opcode, &data)?;
+                self.found.extend(take(record, &mut self.topics, &mut self.ended));
+            }
+            self.at = head.end();
+            match opcode {
+                op::FOOTER => return self.end(),
+                op::CHUNK | op::MESSAGE | op::DATA_END => self.before_ns = 0,
+                _ => {}
             }
         }
     }
-}
 
-impl Opened {
-    /// Room for what the library wants to read next, no more than the file has: a length in it may be damaged.
-    fn room_for(&mut self, need: usize) -> io::Result<usize> {
-        if need <= BLOCK {
-            return Ok(BLOCK);
+    /// The end of the file, behind its footer.
+    fn end(&mut self) -> Result<Option<Found>, McapError> {
+        let magic = self.records.load(self.at, MAGIC.len())?;
+        self.at += magic.len() as u64;
+        match magic == MAGIC {
+            true if self.ended => Ok(None),
+            false if magic.len() == MAGIC.len() => Err(McapError::BadMagic),
+            _ => Err(McapError::UnexpectedEof),
         }
-        let left = self.file.metadata()?.len().saturating_sub(self.file.stream_position()?);
-        Ok(need.min(usize::try_from(left).unwrap_or(usize::MAX)).max(BLOCK))
+    }
+
+    /// Passes over a chunk of which every message was received before the time from which on they are wanted.
+    ///
+    /// Its head says when its last message was received, and the indexes behind it of which channels it has messages. So it
+    /// takes a few reads, and no summary: a recording that was cut short is passed over as well.
+    fn passes_over(&mut self, chunk: &Head) -> io::Result<bool> {
+        let times = self.records.load(chunk.begin, CHUNK_TIMES)?;
+        let is_before = number(&times, 8).is_some_and(|last_ns| last_ns < self.before_ns);
+        if chunk.length < CHUNK_TIMES as u64 || !is_before || chunk.end() > self.records.length() {
+            return Ok(false);
+        }
+        let (indexed, behind) = self.records.indexed(chunk)?;
+        let known = !indexed.is_empty() && indexed.iter().all(|id| self.topics.contains_key(id));
+        if !known {
+            // It is read for its channels alone; what is damaged, for whatever there is.
+            let Some(bytes) = self.records.body(chunk)? else { return Ok(false) };
+            let Ok(records) = chunk_records(&bytes) else { return Ok(false) };
+            for record in records.into_iter().filter(|record| matches!(record, Record::Channel(_))) {
+                let _ = take(record, &mut self.topics, &mut self.ended);
+            }
+        }
+        self.at = behind;
+        Ok(true)
     }
 }
 
 /// Takes what is of use in a record.
-pub(super) fn take(
-    record: Record<'_>,
-    topics: &mut HashMap<u16, Carries>,
-    ended: &mut bool,
-) -> Option<Found> {
+fn take(record: Record<'_>, topics: &mut HashMap<u16, Carries>, ended: &mut bool) -> Option<Found> {
     match record {
         Record::Channel(channel) => {
             let carries = match channel.message_encoding.as_str() {
@@ -293,26 +307,4 @@ pub(super) fn take(
         }
         _ => None,
     }
-}
-
-fn stop(error: McapError) -> Stop {
-    match error {
-        McapError::Io(source) => Stop::Io(source),
-        McapError::UnexpectedEof => Stop::Damaged("ends in the middle".to_owned()),
-        other => Stop::Damaged(format!(
-            "is damaged from here on: {other}; `isotherm-replay recover` restores what is intact after it"
-        )),
-    }
-}
-
-/// Reads until the buffer is full or the file is over.
-fn read_up_to(file: &mut File, buffer: &mut [u8]) -> io::Result<usize> {
-    let mut length = 0;
-    while length < buffer.len() {
-        match file.read(&mut buffer[length..])? {
-            0 => break,
-            count => length += count,
-        }
-    }
-    Ok(length)
 }

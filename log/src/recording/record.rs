@@ -6,6 +6,8 @@ use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 
+use super::walk::number;
+
 /// Longest record (bytes): chunks beyond this are not of a recorder.
 pub(super) const LONGEST_RECORD: usize = 1 << 28;
 /// Bytes of a chunk that are handed over at once.
@@ -54,34 +56,28 @@ pub(crate) fn chunk_records(data: &[u8]) -> Result<Vec<Record<'static>>, McapErr
 
 /// How long a chunk says that it is: behind its end the library would go on.
 fn chunk_length(data: &[u8]) -> Option<usize> {
-    let compression = u32::from_le_bytes(*data.get(28..)?.first_chunk()?);
-    let records = usize::try_from(compression).ok()?.checked_add(32)?;
-    let length = u64::from_le_bytes(*data.get(records..)?.first_chunk()?);
-    records.checked_add(8)?.checked_add(usize::try_from(length).ok()?)
+    behind_long(data, behind_short(data, 28)?)
 }
 
-/// How long an attachment says that it is.
+/// How long an attachment says that it is: name and media type, what it holds, the CRC.
 fn attachment_length(data: &[u8]) -> Option<usize> {
-    let mut at = 16_usize;
-    // Name and media type behind their lengths.
-    for _ in 0..2 {
-        let length = u32::from_le_bytes(*data.get(at..)?.first_chunk()?);
-        at = at.checked_add(4)?.checked_add(usize::try_from(length).ok()?)?;
-    }
-    let length = u64::from_le_bytes(*data.get(at..)?.first_chunk()?);
-    // The length itself, and the CRC.
-    at.checked_add(8 + 4)?.checked_add(usize::try_from(length).ok()?)
+    behind_long(data, behind_short(data, behind_short(data, 16)?)?)?.checked_add(4)
 }
 
 /// How long a record of names and values says that it is.
 pub(super) fn metadata_length(data: &[u8]) -> Option<usize> {
-    let text = |at: usize| {
-        let length = u32::from_le_bytes(*data.get(at..)?.first_chunk()?);
-        at.checked_add(4)?.checked_add(usize::try_from(length).ok()?)
-    };
-    let values = text(0)?;
-    let length = u32::from_le_bytes(*data.get(values..)?.first_chunk()?);
-    values.checked_add(4)?.checked_add(usize::try_from(length).ok()?)
+    behind_short(data, behind_short(data, 0)?)
+}
+
+/// Where that ends whose length (u32) stands at a place.
+fn behind_short(data: &[u8], at: usize) -> Option<usize> {
+    let length = u32::from_le_bytes(*data.get(at..)?.first_chunk()?);
+    at.checked_add(4)?.checked_add(usize::try_from(length).ok()?)
+}
+
+/// Where that ends whose length (u64) stands at a place.
+fn behind_long(data: &[u8], at: usize) -> Option<usize> {
+    at.checked_add(8)?.checked_add(usize::try_from(number(data, at)?).ok()?)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use mcap::records::Record;
 use serde::Serialize;
 
-use super::RecordingOptions;
+use super::{RecordingOptions, writer};
 use crate::error::Error;
 use crate::file::{Partial, partial_of, refuse_overwriting, refuse_replacing};
 use crate::progress::Progress;
@@ -153,6 +153,7 @@ impl Recovery {
     ) -> Result<RecoveryReport, Error> {
         let mut scanner = Scanner::open(&self.input)?;
         let failed = |source| Error::file(&self.input, "read the recording", source);
+        let not_written = |source| writer::failed(output, source);
         let mut piece = scanner.next_piece().map_err(failed)?;
         let profile = scan::profile(piece.as_ref()).unwrap_or("isotherm").to_owned();
         let mut rescue = Rescue::create(output, options, &profile, definitions)?;
@@ -165,16 +166,16 @@ impl Recovery {
                 Piece::Record(Record::DataEnd(_)) => report.ended = true,
                 Piece::Chunk(records) => {
                     report.chunks += 1;
-                    records.into_iter().try_for_each(|record| rescue.take(record, &mut report))?;
-                    rescue.end_chunk()?;
+                    let taken = records.into_iter().try_for_each(|record| rescue.take(record, &mut report));
+                    taken.and_then(|()| rescue.end_chunk()).map_err(not_written)?;
                 }
-                Piece::Record(record) => rescue.take(record, &mut report)?,
+                Piece::Record(record) => rescue.take(record, &mut report).map_err(not_written)?,
             }
             self.read.store(scanner.offset(), Ordering::Relaxed);
             watch(&report);
             piece = scanner.next_piece().map_err(failed)?;
         }
-        rescue.finish(&mut report)?;
+        rescue.finish(&mut report).map_err(not_written)?;
         Ok(report)
     }
 }

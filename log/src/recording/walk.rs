@@ -1,6 +1,9 @@
 //! Going from record to record without reading what they hold.
 
+use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
+
+use mcap::records::op;
 
 use super::record::LONGEST_RECORD;
 
@@ -9,8 +12,10 @@ pub(crate) const HEAD: usize = 9;
 
 /// A file of records.
 #[derive(Debug)]
-pub(crate) struct RecordFile<F> {
-    file: BufReader<F>,
+pub(crate) struct RecordFile {
+    file: BufReader<File>,
+    /// Where the file is read on (bytes from its beginning).
+    here: u64,
     length: u64,
 }
 
@@ -30,16 +35,14 @@ impl Head {
     }
 }
 
-impl<F: Read + Seek> RecordFile<F> {
+impl RecordFile {
     /// A file, of which so many bytes are read at once.
     ///
     /// # Errors
     /// Those of the file.
-    pub(crate) fn new(mut file: F, block: usize) -> io::Result<Self> {
-        let here = file.stream_position()?;
-        let length = file.seek(SeekFrom::End(0))?;
-        file.seek(SeekFrom::Start(here))?;
-        Ok(Self { file: BufReader::with_capacity(block, file), length })
+    pub(crate) fn new(file: File, block: usize) -> io::Result<Self> {
+        let length = file.metadata()?.len();
+        Ok(Self { file: BufReader::with_capacity(block, file), here: 0, length })
     }
 
     /// Of the whole file (bytes).
@@ -52,14 +55,16 @@ impl<F: Read + Seek> RecordFile<F> {
     /// # Errors
     /// Those of reading it.
     pub(crate) fn load(&mut self, at: u64, length: usize) -> io::Result<Vec<u8>> {
-        let here = self.file.stream_position()?;
-        match i64::try_from(i128::from(at) - i128::from(here)) {
+        match i64::try_from(i128::from(at) - i128::from(self.here)) {
             // Keeps what is buffered.
             Ok(distance) => self.file.seek_relative(distance)?,
             Err(_) => self.file.seek(SeekFrom::Start(at)).map(drop)?,
         }
-        let mut bytes = Vec::new();
+        // No more than the file has: a length in it may be damaged.
+        let room = usize::try_from(self.length.saturating_sub(at)).unwrap_or(usize::MAX);
+        let mut bytes = Vec::with_capacity(length.min(room));
         (&mut self.file).take(length as u64).read_to_end(&mut bytes)?;
+        self.here = at + bytes.len() as u64;
         Ok(bytes)
     }
 
@@ -81,6 +86,19 @@ impl<F: Read + Seek> RecordFile<F> {
     pub(crate) fn body(&mut self, head: &Head) -> io::Result<Option<Vec<u8>>> {
         let length = usize::try_from(head.length).ok().filter(|length| *length <= LONGEST_RECORD);
         length.map(|length| self.load(head.begin, length)).transpose()
+    }
+
+    /// Channels of the indexes behind a chunk, and where what follows these begins.
+    ///
+    /// # Errors
+    /// Those of reading the file.
+    pub(crate) fn indexed(&mut self, chunk: &Head) -> io::Result<(Vec<u16>, u64)> {
+        let (mut channels, mut at) = (Vec::new(), chunk.end());
+        while let Some(index) = self.head(at)?.filter(|head| head.opcode == op::MESSAGE_INDEX) {
+            channels.extend(self.load(index.begin, 2)?.first_chunk().copied().map(u16::from_le_bytes));
+            at = index.end();
+        }
+        Ok((channels, at))
     }
 }
 

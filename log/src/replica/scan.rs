@@ -106,58 +106,27 @@ pub(crate) fn join(joiner: &mut Joiner, frame: &[u8]) -> Result<Option<JournalEn
 
 /// A recording, gone through record by record.
 struct Recording {
-    records: RecordFile<File>,
+    records: RecordFile,
     /// Where the next record begins.
     at: u64,
     /// Topic of each channel so far; `None` for channels of something else.
     topics: HashMap<u16, Option<Topic>>,
     /// Whether journals are read.
     journals: bool,
-    /// The last chunk, unread until it is known to hold a journal.
-    chunk: Option<Chunk>,
-}
-
-/// A chunk whose indexes are being gone through.
-struct Chunk {
-    head: Head,
-    /// Whether it must be read: it has a journal, or a channel that is not known yet.
-    wanted: bool,
-    /// Whether anything was said of what it holds.
-    indexed: bool,
 }
 
 impl Recording {
     fn open(path: &Path, journals: bool) -> io::Result<Self> {
         let records = RecordFile::new(File::open(path)?, BLOCK)?;
-        let at = MAGIC.len() as u64;
-        Ok(Self { records, at, topics: HashMap::new(), journals, chunk: None })
+        Ok(Self { records, at: MAGIC.len() as u64, topics: HashMap::new(), journals })
     }
 
     /// Goes on by one record; `false` at the end of what can be read.
     fn record(&mut self, found: &mut Found) -> io::Result<bool> {
-        let Some(head) = self.records.head(self.at)? else {
-            // Some of its indexes may be cut off.
-            self.chunk.iter_mut().for_each(|chunk| chunk.wanted = true);
-            self.leave_chunk(found)?;
-            return Ok(false);
-        };
+        let Some(head) = self.records.head(self.at)? else { return Ok(false) };
         self.at = head.end();
-        if head.opcode != op::MESSAGE_INDEX {
-            self.leave_chunk(found)?;
-        }
         match head.opcode {
-            op::CHUNK => self.chunk = Some(Chunk { head, wanted: false, indexed: false }),
-            op::MESSAGE_INDEX => {
-                if let Some(chunk) = &mut self.chunk
-                    && let Some(id) = self.records.load(head.begin, 2)?.first_chunk()
-                {
-                    chunk.indexed = true;
-                    chunk.wanted |= match self.topics.get(&u16::from_le_bytes(*id)) {
-                        Some(topic) => self.journals && matches!(topic, Some(Topic::Journal(_))),
-                        None => true,
-                    };
-                }
-            }
+            op::CHUNK => self.chunk(&head, found)?,
             op::CHANNEL | op::MESSAGE => {
                 let Some(bytes) = self.records.body(&head)? else { return Ok(false) };
                 let Ok(record) = mcap::parse_record(head.opcode, &bytes) else { return Ok(false) };
@@ -169,15 +138,21 @@ impl Recording {
         Ok(true)
     }
 
-    /// Reads the chunk whose indexes are over, where it is wanted.
-    fn leave_chunk(&mut self, found: &mut Found) -> io::Result<()> {
-        let Some(chunk) = self.chunk.take().filter(|chunk| chunk.wanted || !chunk.indexed) else {
-            return Ok(());
-        };
-        let bytes = self.records.body(&chunk.head)?;
-        // What is damaged will be told by who reads it for its messages.
-        let records = bytes.and_then(|bytes| chunk_records(&bytes).ok());
-        records.iter().flatten().for_each(|record| self.take(record, found));
+    /// Reads a chunk where it must be: it has a journal or a channel that is not known yet, or nothing says what it has.
+    fn chunk(&mut self, chunk: &Head, found: &mut Found) -> io::Result<()> {
+        let (channels, behind) = self.records.indexed(chunk)?;
+        self.at = behind;
+        let wanted = channels.iter().any(|id| match self.topics.get(id) {
+            Some(topic) => self.journals && matches!(topic, Some(Topic::Journal(_))),
+            None => true,
+        });
+        // At the file's end some of its indexes may be cut off.
+        if wanted || channels.is_empty() || self.records.head(behind)?.is_none() {
+            let bytes = self.records.body(chunk)?;
+            // What is damaged will be told by who reads it for its messages.
+            let records = bytes.and_then(|bytes| chunk_records(&bytes).ok());
+            records.iter().flatten().for_each(|record| self.take(record, found));
+        }
         Ok(())
     }
 

@@ -73,14 +73,6 @@ pub trait RosMessage: Serialize + Sized {
     const TYPE: &'static str;
     /// Its definition, followed by those of the types in it.
     const DEFINITION: &'static str;
-
-    /// The message as bytes.
-    ///
-    /// # Errors
-    /// Where a text of it has more than 2³² bytes.
-    fn to_cdr(&self) -> Result<Vec<u8>, cdr_encoding::Error> {
-        to_cdr(self)
-    }
 }
 
 /// `builtin_interfaces/msg/Time`.

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::streams::raw_text::free_name;
+
 /// Part of a topic's name for a serial or a channel, as ROS allows it: letters, digits and single underscores, the
 /// first a letter.
 ///
@@ -38,12 +40,7 @@ impl Names {
         let mut taken = BTreeSet::new();
         let mut tokens = BTreeMap::new();
         for name in sorted {
-            let base = token(name, prefix);
-            let numbered = (2..).map(|number| format!("{base}_{number}"));
-            let free = std::iter::once(base.clone()).chain(numbered).find(|token| !taken.contains(token));
-            let free = free.unwrap_or(base);
-            taken.insert(free.clone());
-            tokens.insert(name.to_owned(), free);
+            tokens.insert(name.to_owned(), free_name(token(name, prefix), &mut taken));
         }
         Self { tokens }
     }

@@ -3,7 +3,7 @@
 use isotherm_correction::sample::{CorrectedTick, TickFlags};
 use isotherm_correction::units::Span;
 
-use super::message::{Header, Imu, RosMessage, Temperature, Time, time};
+use super::message::{Header, Imu, Temperature, Time, time, to_cdr};
 
 fn header() -> Header {
     Header { stamp: Time { sec: 5, nanosec: 7 }, frame_id: "A_1".to_owned() }
@@ -17,7 +17,7 @@ fn doubles(bytes: &[u8], count: usize) -> Vec<f64> {
 
 #[test]
 fn a_temperature_has_these_bytes() {
-    let bytes = Temperature { header: header(), temperature: 1.5, variance: 0.0 }.to_cdr().unwrap();
+    let bytes = to_cdr(&Temperature { header: header(), temperature: 1.5, variance: 0.0 }).unwrap();
     let expected: &[u8] = &[
         0, 1, 0, 0, // plain CDR, little-endian
         5, 0, 0, 0, 7, 0, 0, 0, // stamp
@@ -26,7 +26,7 @@ fn a_temperature_has_these_bytes() {
     ];
     assert_eq!(bytes, expected);
     let longer = Header { frame_id: "A_12".to_owned(), ..header() };
-    let bytes = Temperature { header: longer, temperature: 1.5, variance: 0.0 }.to_cdr().unwrap();
+    let bytes = to_cdr(&Temperature { header: longer, temperature: 1.5, variance: 0.0 }).unwrap();
     // Seventeen bytes behind the encapsulation, then seven up to the next multiple of eight.
     assert_eq!(bytes[20..28], [0, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(bytes.len(), 4 + 17 + 7 + 16);
@@ -40,7 +40,7 @@ fn an_imu_message_states_means_and_says_what_it_does_not_know() {
         delta_velocity: [0.1, 0.2, 0.3],
         ..CorrectedTick::default()
     };
-    let numbers = |tick: &CorrectedTick| doubles(&Imu::of_tick(header(), tick).to_cdr().unwrap(), 37);
+    let numbers = |tick: &CorrectedTick| doubles(&to_cdr(&Imu::of_tick(header(), tick)).unwrap(), 37);
     let seconds = Span::from_ms(10).as_s();
     let known = numbers(&tick);
     assert_eq!(known[..4], [0.0, 0.0, 0.0, 1.0]);

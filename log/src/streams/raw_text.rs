@@ -177,9 +177,14 @@ impl RawColumns {
     /// # Errors
     /// Those of the writer.
     pub fn write_row(&self, row: &Row, writer: &mut dyn Write) -> io::Result<(NotHeld, bool)> {
-        let gyro = row.gyro.as_ref().filter(|(output, tick)| self.holds_gyro(*output, tick));
-        let accel = row.accel.as_ref().filter(|(output, tick)| self.holds_accel(*output, tick));
-        let held = row.temperatures.iter().filter(|reading| self.has_channel(&reading.channel)).count();
+        let gyro = row.gyro.as_ref().filter(|(output, tick)| {
+            Shape::of(*output, &tick.readings, !tick.half_periods.is_empty()) == self.gyro
+        });
+        let accel = row.accel.as_ref();
+        let accel =
+            accel.filter(|(output, tick)| self.accel == Some(Shape::of(*output, &tick.readings, false)));
+        let has_column = |channel| self.channels.iter().any(|(known, _)| *known == channel);
+        let held = row.temperatures.iter().filter(|reading| has_column(reading.channel)).count();
         let not_held = NotHeld {
             other_shape: u64::from(row.gyro.is_some() && gyro.is_none())
                 + u64::from(row.accel.is_some() && accel.is_none()),
@@ -199,21 +204,6 @@ impl RawColumns {
         self.write_gyro(gyro.map(|(_, tick)| tick), writer)?;
         writeln!(writer)?;
         Ok((not_held, true))
-    }
-
-    fn has_channel(&self, channel: &ChannelName) -> bool {
-        self.channels.iter().any(|(known, _)| known == channel)
-    }
-
-    fn holds_gyro(&self, output: OutputKind, tick: &GyroTick) -> bool {
-        output == self.gyro.output()
-            && tick.readings.len() == self.gyro.sensors
-            && tick.half_periods.is_empty() != self.gyro.half_periods
-    }
-
-    fn holds_accel(&self, output: OutputKind, tick: &AccelTick) -> bool {
-        let fits = |shape: Shape| output == shape.output() && tick.readings.len() == shape.sensors;
-        self.accel.is_some_and(fits)
     }
 
     fn write_accel(&self, tick: Option<&AccelTick>, writer: &mut dyn Write) -> io::Result<()> {
@@ -262,12 +252,16 @@ fn section(kind: &str, unit: &str, shape: Shape) -> String {
 /// Name of a channel's column: its letters and digits, and a number where that is taken.
 fn column_name(channel: &str, taken: &mut BTreeSet<String>) -> String {
     let plain: String = channel.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    let base = format!("temperature_{plain}");
-    let numbered = (2..).map(|number| format!("{base}_{number}"));
-    let name = std::iter::once(base.clone()).chain(numbered).find(|name| !taken.contains(name));
-    let name = name.unwrap_or(base);
-    taken.insert(name.clone());
-    name
+    free_name(format!("temperature_{plain}"), taken)
+}
+
+/// A name, with a number from 2 where it is taken already; it is taken from then on.
+pub(crate) fn free_name(name: String, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name));
+    let free = free.unwrap_or(name);
+    taken.insert(free.clone());
+    free
 }
 
 /// Writes readings: counts as whole numbers, means in the shortest way that reads back to the bit.

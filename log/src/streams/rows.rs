@@ -7,6 +7,7 @@ use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, 
 
 use super::contents::UnitContents;
 use super::decoded::Decoded;
+use crate::text::LogEvent;
 
 /// How long a row waits for what comes late, by the time of later ticks of every stream (ns).
 const WAIT_NS: i64 = 5_000_000_000;
@@ -58,29 +59,11 @@ enum Source {
     Channel(ChannelName),
 }
 
-/// One tick or reading.
-#[derive(Debug, Clone, PartialEq)]
-enum Item {
-    Temperature(TemperatureReading),
-    Accel(OutputKind, AccelTick),
-    Gyro(OutputKind, GyroTick),
-}
-
-impl Item {
-    fn source(&self) -> Source {
-        match self {
-            Self::Temperature(reading) => Source::Channel(reading.channel),
-            Self::Accel(..) => Source::Accel,
-            Self::Gyro(..) => Source::Gyro,
-        }
-    }
-
-    fn time_ns(&self) -> i64 {
-        match self {
-            Self::Temperature(reading) => reading.time.as_ns(),
-            Self::Accel(_, tick) => tick.end_time.as_ns(),
-            Self::Gyro(_, tick) => tick.end_time.as_ns(),
-        }
+fn source(event: &LogEvent) -> Source {
+    match event {
+        LogEvent::Temperature(reading) => Source::Channel(reading.channel),
+        LogEvent::Accel { .. } => Source::Accel,
+        LogEvent::Gyro { .. } => Source::Gyro,
     }
 }
 
@@ -99,7 +82,7 @@ pub struct Rows {
     series: Option<u64>,
     known_series: BTreeSet<u64>,
     /// Items without a series that are before everything given: late, or of a run whose first gyro tick is still to come.
-    early: Vec<Item>,
+    early: Vec<LogEvent>,
     ready: VecDeque<Step>,
     tally: Tally,
 }
@@ -156,17 +139,17 @@ impl Rows {
         }
         self.series = Some(tick.series);
         self.known_series.insert(tick.series);
-        self.insert(Item::Gyro(output, tick));
+        self.insert(LogEvent::Gyro { output, tick });
     }
 
     /// Takes an accelerometer tick.
     pub fn accel(&mut self, output: OutputKind, tick: AccelTick) {
-        self.other(Item::Accel(output, tick));
+        self.other(LogEvent::Accel { output, tick });
     }
 
     /// Takes a temperature reading.
     pub fn temperature(&mut self, reading: TemperatureReading) {
-        self.other(Item::Temperature(reading));
+        self.other(LogEvent::Temperature(reading));
     }
 
     /// The next step that is ready.
@@ -176,7 +159,8 @@ impl Rows {
 
     /// Makes everything ready: nothing comes any more.
     pub fn finish(&mut self) {
-        self.give_up_early();
+        // No new run began: what waited for one is late.
+        self.tally.late += mem::take(&mut self.early).len() as u64;
         self.release(|_| true);
     }
 
@@ -191,8 +175,8 @@ impl Rows {
     }
 
     /// Takes what has no series.
-    fn other(&mut self, item: Item) {
-        if !self.is_passed(item.time_ns()) {
+    fn other(&mut self, item: LogEvent) {
+        if !self.is_passed(item.time().as_ns()) {
             self.insert(item);
         } else if self.early.len() < MOST_EARLY {
             self.early.push(item);
@@ -220,14 +204,14 @@ impl Rows {
         self.waiting.retain(|time_ns, row| {
             let moves = row.gyro.is_none() && belongs(*time_ns);
             if moves {
-                kept.extend(row.temperatures.drain(..).map(Item::Temperature));
-                kept.extend(row.accel.take().map(|(output, tick)| Item::Accel(output, tick)));
+                kept.extend(row.temperatures.drain(..).map(LogEvent::Temperature));
+                kept.extend(row.accel.take().map(|(output, tick)| LogEvent::Accel { output, tick }));
             }
             !moves
         });
         self.release(|_| true);
         let (early, late): (Vec<_>, Vec<_>) =
-            mem::take(&mut self.early).into_iter().partition(|item| item.time_ns() >= from);
+            mem::take(&mut self.early).into_iter().partition(|item| item.time().as_ns() >= from);
         self.tally.late += late.len() as u64;
         if self.given_ns.is_some() {
             self.ready.push_back(Step::NewRun);
@@ -238,20 +222,20 @@ impl Rows {
     }
 
     /// Puts an item into its row, and gives what has waited long enough.
-    fn insert(&mut self, item: Item) {
-        let (source, time_ns) = (item.source(), item.time_ns());
+    fn insert(&mut self, item: LogEvent) {
+        let (source, time_ns) = (source(&item), item.time().as_ns());
         let row = self.waiting.entry(time_ns).or_insert_with(|| Row { time_ns, ..Row::default() });
         let tally = &mut self.tally;
         match item {
-            Item::Temperature(reading) => {
+            LogEvent::Temperature(reading) => {
                 let known = row.temperatures.iter().find(|known| known.channel == reading.channel);
                 match known {
                     Some(known) => tally.again(known.raw.to_bits() == reading.raw.to_bits()),
                     None => row.temperatures.push(reading),
                 }
             }
-            Item::Accel(output, tick) => place(&mut row.accel, (output, tick), tally),
-            Item::Gyro(output, tick) => place(&mut row.gyro, (output, tick), tally),
+            LogEvent::Accel { output, tick } => place(&mut row.accel, (output, tick), tally),
+            LogEvent::Gyro { output, tick } => place(&mut row.gyro, (output, tick), tally),
         }
         let newest = self.newest_ns.entry(source).or_default();
         *newest = (*newest).max(Some(time_ns));
@@ -277,11 +261,6 @@ impl Rows {
             self.given_ns = Some(time_ns);
             self.ready.push_back(Step::Row(Box::new(row)));
         }
-    }
-
-    /// No new run began: what waited for one is late.
-    fn give_up_early(&mut self) {
-        self.tally.late += mem::take(&mut self.early).len() as u64;
     }
 }
 

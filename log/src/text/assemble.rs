@@ -148,16 +148,10 @@ impl Assembler {
     /// Closes the open tick of a kind, whose successor begins at `next`.
     fn close(&mut self, kind: usize, next: Option<i64>, columns: &Columns) {
         let Some((start, mut event)) = self.open.get_mut(kind).and_then(Option::take) else { return };
-        match &mut event {
-            LogEvent::Gyro { tick, .. } => {
-                tick.duration = self.gyro.until(start, next);
-                tick.end_time = Timestamp::from_ns(start) + tick.duration;
-            }
-            LogEvent::Accel { tick, .. } => {
-                tick.duration = self.accel.until(start, next);
-                tick.end_time = Timestamp::from_ns(start) + tick.duration;
-            }
-            LogEvent::Temperature(_) => {}
+        let timeline = if kind == GYRO { &self.gyro } else { &self.accel };
+        if let Some(tick) = Tick::of(&mut event) {
+            *tick.duration = timeline.until(start, next);
+            *tick.end_time = Timestamp::from_ns(start) + *tick.duration;
         }
         to_means(&mut event, columns);
         self.enqueue_parts(event);
@@ -170,20 +164,13 @@ impl Assembler {
         }
         for number in 0..self.parts {
             let mut part = event.clone();
-            let of = Part { number, parts: self.parts };
-            match &mut part {
-                LogEvent::Gyro { output, tick } => {
-                    of.cut((&mut tick.sequence, &mut tick.end_time, &mut tick.duration));
-                    of.share(*output, &mut tick.readings);
-                    tick.switch_command &= number == 0;
-                    // Counts of half a period cannot be parted.
-                    tick.half_periods.clear();
-                }
-                LogEvent::Accel { output, tick } => {
-                    of.cut((&mut tick.sequence, &mut tick.end_time, &mut tick.duration));
-                    of.share(*output, &mut tick.readings);
-                }
-                LogEvent::Temperature(_) => {}
+            if let Some(tick) = Tick::of(&mut part) {
+                tick.cut(number, self.parts);
+            }
+            if let LogEvent::Gyro { tick, .. } = &mut part {
+                tick.switch_command &= number == 0;
+                // Counts of half a period cannot be parted.
+                tick.half_periods.clear();
             }
             self.enqueue(part);
         }
@@ -203,29 +190,43 @@ fn parts_of(tick: Span) -> u32 {
     u32::try_from(parts).unwrap_or(u32::MAX)
 }
 
-/// One of the equal parts of a tick.
-#[derive(Clone, Copy)]
-struct Part {
-    /// Which, from 0.
-    number: u32,
-    /// How many there are.
-    parts: u32,
+/// What ticks of both kinds have.
+struct Tick<'e> {
+    kind: usize,
+    output: OutputKind,
+    sequence: &'e mut u64,
+    end_time: &'e mut Timestamp,
+    duration: &'e mut Span,
+    readings: &'e mut [f64],
 }
 
-impl Part {
-    fn cut(self, (sequence, end, duration): (&mut u64, &mut Timestamp, &mut Span)) {
-        *sequence = sequence.saturating_mul(self.parts.into()).saturating_add(self.number.into());
-        let begin = *end - *duration;
-        let until =
-            |parts: u32| Span::from_ns(duration.as_ns().saturating_mul(parts.into()) / i64::from(self.parts));
-        *end = begin + until(self.number + 1);
-        *duration = Span::from_ns(until(self.number + 1).as_ns() - until(self.number).as_ns());
+impl<'e> Tick<'e> {
+    /// Of an event; `None` for a temperature.
+    fn of(event: &'e mut LogEvent) -> Option<Self> {
+        let (kind, output, sequence, end_time, duration, readings) = match event {
+            LogEvent::Gyro { output, tick: GyroTick { sequence, end_time, duration, readings, .. } } => {
+                (GYRO, *output, sequence, end_time, duration, readings)
+            }
+            LogEvent::Accel { output, tick: AccelTick { sequence, end_time, duration, readings } } => {
+                (ACCEL, *output, sequence, end_time, duration, readings)
+            }
+            LogEvent::Temperature(_) => return None,
+        };
+        Some(Self { kind, output, sequence, end_time, duration, readings })
     }
 
-    fn share(self, output: OutputKind, readings: &mut [f64]) {
+    /// Cuts one of so many equal parts out of it, counted from 0.
+    fn cut(self, number: u32, parts: u32) {
+        let Self { output, sequence, end_time, duration, readings, .. } = self;
+        *sequence = sequence.saturating_mul(parts.into()).saturating_add(number.into());
+        let begin = *end_time - *duration;
+        let until =
+            |part: u32| Span::from_ns(duration.as_ns().saturating_mul(part.into()) / i64::from(parts));
+        *end_time = begin + until(number + 1);
+        *duration = Span::from_ns(until(number + 1).as_ns() - until(number).as_ns());
         if output == OutputKind::Counts {
             for reading in readings {
-                *reading /= f64::from(self.parts);
+                *reading /= f64::from(parts);
             }
         }
     }
@@ -233,13 +234,8 @@ impl Part {
 
 /// Divides increments by the duration of their tick.
 fn to_means(event: &mut LogEvent, columns: &Columns) {
-    let (cells, readings, duration) = match event {
-        LogEvent::Gyro { tick, .. } => {
-            (columns.gyro.as_ref().map(|gyro| &gyro.ticks), &mut tick.readings, tick.duration)
-        }
-        LogEvent::Accel { tick, .. } => (columns.accel.as_ref(), &mut tick.readings, tick.duration),
-        LogEvent::Temperature(_) => return,
-    };
+    let Some(Tick { kind, duration, readings, .. }) = Tick::of(event) else { return };
+    let cells = columns.ticks().get(kind).copied().flatten();
     let Some(TickCells { output: OutputKind::Mean, sensors, .. }) = cells else { return };
     for (reading, (_, conversion)) in readings.iter_mut().zip(sensors) {
         if conversion.per_tick {

@@ -68,14 +68,7 @@ impl FileReader {
             header: Vec::new(),
             layout: mapping.layout.clone(),
             time: mapping.time.clone(),
-            columns: Columns {
-                stamps: None,
-                gyro: None,
-                accel: None,
-                temperatures: Vec::new(),
-                status: None,
-                select: None,
-            },
+            columns: Columns::default(),
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
             days_ns: 0,
@@ -87,9 +80,8 @@ impl FileReader {
             ended: false,
             report: ReadReport::default(),
         };
-        let resolved = reader
-            .skip_and_name()
-            .and_then(|()| resolve(mapping, &reader.header).map_err(|reason| Fault { cell: None, reason }));
+        let resolved =
+            reader.skip_and_name().and_then(|()| resolve(mapping, &reader.header).map_err(Fault::from));
         reader.columns = resolved.map_err(|fault| reader.error(fault))?;
         Ok(reader)
     }
@@ -101,7 +93,7 @@ impl FileReader {
         }
         if self.layout.header {
             if !self.line()? {
-                return Err(Fault { cell: None, reason: Reason::NoHeader });
+                return Err(Reason::NoHeader.into());
             }
             self.split()?;
             let line = self.lines.line();
@@ -114,18 +106,17 @@ impl FileReader {
 
     /// Goes to the next line that is neither blank nor a comment; false at the end.
     fn line(&mut self) -> Result<bool, Fault> {
-        let whole = |reason| Fault { cell: None, reason };
         loop {
             let line = self.lines.advance().map_err(|error| match error.kind() {
-                std::io::ErrorKind::UnexpectedEof => whole(Reason::CutShort),
-                _ => whole(Reason::Io(error)),
+                std::io::ErrorKind::UnexpectedEof => Reason::CutShort,
+                _ => Reason::Io(error),
             })?;
             if self.lines.is_utf16() {
-                return Err(whole(Reason::Utf16));
+                return Err(Reason::Utf16.into());
             }
             match line {
                 Line::End => return Ok(false),
-                Line::TooLong => return Err(whole(Reason::LineTooLong { limit: LONGEST_LINE })),
+                Line::TooLong => return Err(Reason::LineTooLong { limit: LONGEST_LINE }.into()),
                 Line::Read => {}
             }
             let text = self.lines.line().trim_ascii_start();
@@ -142,7 +133,7 @@ impl FileReader {
         split(self.lines.line_mut(), self.layout.delimiter, &mut self.cells).map_err(|OpenQuote(at)| {
             let column = u32::try_from(at + 1).unwrap_or(u32::MAX);
             self.cells.push(Cell { start: at, end: self.lines.line().len(), column });
-            Fault { cell: Some(self.cells.len() - 1), reason: Reason::OpenQuote }
+            Reason::OpenQuote.at(self.cells.len() - 1)
         })
     }
 
@@ -239,9 +230,8 @@ impl FileReader {
         let row = Row::new(self.lines.line(), &self.cells, &self.layout);
         // Of a row without a cell nobody knows.
         let has = |cells: &TickCells| !cells.may_be_empty || row.has_readings(cells).unwrap_or(false);
-        let gyro = self.columns.gyro.as_ref().is_some_and(|gyro| has(&gyro.ticks));
-        let accel = self.columns.accel.as_ref().is_some_and(has);
-        self.assembler.skip(stamp, [gyro, accel], &self.columns);
+        let had = self.columns.ticks().map(|ticks| ticks.is_some_and(has));
+        self.assembler.skip(stamp, had, &self.columns);
     }
 
     /// There are no further rows: everything can be given.
@@ -257,16 +247,13 @@ impl FileReader {
         let filled = |cell: &Cell| line.get(cell.start..cell.end).is_some_and(|text| !text.is_empty());
         let Some(surplus) = self.cells.iter().skip(columns).position(filled) else { return Ok(()) };
         let commas = self.layout.delimiter == Delimiter::Character(b',');
-        let reason = Reason::TooManyCells { columns, named: self.layout.header, commas };
-        Err(Fault { cell: Some(columns + surplus), reason })
+        Err(Reason::TooManyCells { columns, named: self.layout.header, commas }.at(columns + surplus))
     }
 
     /// The step of time to a row, where it is longer than any tick can be and the mapping knows of no gaps.
     fn gap(&self, now: i64) -> Option<Reason> {
         let tick = self.time.tick?.as_ns();
-        let counted = |ticks: &TickCells| ticks.sequence.is_none();
-        let gyro = self.columns.gyro.as_ref().map(|gyro| &gyro.ticks);
-        let numbered_by_rows = gyro.or(self.columns.accel.as_ref()).is_some_and(counted);
+        let numbered_by_rows = self.columns.leading().is_some_and(|ticks| ticks.sequence.is_none());
         let step = Span::from_ns(now.saturating_sub(self.last_stamp?));
         let most = i64::try_from(LONGEST_STEP + self.bad_since).unwrap_or(i64::MAX);
         let gap = self.time.gap_after_ticks.is_none()
@@ -310,8 +297,9 @@ impl FileReader {
                 }
                 let before =
                     String::from_utf8_lossy(text.get(stamp.clone()).unwrap_or_default()).into_owned();
-                let reason = Reason::TimeNotIncreasing { before, line: *line, again: now == last };
-                return Err(Fault { cell: Some(cell.cell), reason });
+                return Err(
+                    Reason::TimeNotIncreasing { before, line: *line, again: now == last }.at(cell.cell)
+                );
             }
             now
         } else {
@@ -321,7 +309,7 @@ impl FileReader {
         };
         *stamp = Some(now);
         if let (Some(cell), Some(reason)) = (self.columns.stamps, self.gap(now)) {
-            return Err(Fault { cell: Some(cell.cell), reason });
+            return Err(reason.at(cell.cell));
         }
         if let Some((cell, status)) = &self.columns.status {
             row.check_status(*cell, status)?;

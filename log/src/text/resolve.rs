@@ -114,7 +114,7 @@ pub(super) struct TemperatureCell {
 }
 
 /// All columns of a file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Columns {
     /// Stamps.
     pub(super) stamps: Option<TimeCell>,
@@ -131,18 +131,27 @@ pub(super) struct Columns {
 }
 
 impl Columns {
+    /// The ticks of each kind: gyros, accelerometers.
+    pub(super) fn ticks(&self) -> [Option<&TickCells>; 2] {
+        [self.gyro.as_ref().map(|gyro| &gyro.ticks), self.accel.as_ref()]
+    }
+
+    /// Those that number the rows: the gyros, else the accelerometers.
+    pub(super) fn leading(&self) -> Option<&TickCells> {
+        let [gyro, accel] = self.ticks();
+        gyro.or(accel)
+    }
+
     /// Cell of the number that every row has: that of its gyros, in a file without gyros of its accelerometers.
     pub(super) fn row_number(&self) -> Option<usize> {
-        let gyro = self.gyro.as_ref().map(|gyro| &gyro.ticks);
-        gyro.or(self.accel.as_ref()).filter(|ticks| !ticks.may_be_empty)?.sequence
+        self.leading().filter(|ticks| !ticks.may_be_empty)?.sequence
     }
 
     /// Refuses a sensor's column that is something else, too. Two temperature channels may share a thermometer.
     fn apart(&self) -> Result<(), Reason> {
         let mut sensors: Vec<(usize, String)> = Vec::new();
         let mut others: Vec<(usize, String)> = Vec::new();
-        let gyro = self.gyro.as_ref().map(|gyro| &gyro.ticks);
-        for (kind, ticks) in [("gyro", gyro), ("accelerometer", self.accel.as_ref())] {
+        for (kind, ticks) in ["gyro", "accelerometer"].into_iter().zip(self.ticks()) {
             let Some(ticks) = ticks else { continue };
             let numbered = ticks.sensors.iter().zip(1..);
             sensors.extend(

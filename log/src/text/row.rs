@@ -19,6 +19,20 @@ pub(super) struct Fault {
     pub(super) reason: Reason,
 }
 
+impl From<Reason> for Fault {
+    /// Of a whole line, or of no line at all.
+    fn from(reason: Reason) -> Self {
+        Self { cell: None, reason }
+    }
+}
+
+impl Reason {
+    /// What is wrong with a cell.
+    pub(super) fn at(self, cell: usize) -> Fault {
+        Fault { cell: Some(cell), reason: self }
+    }
+}
+
 /// A row of cells.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<'a> {
@@ -69,13 +83,13 @@ impl<'a> Row<'a> {
     /// What a cell holds, which must be something.
     fn filled(&self, cell: usize) -> Result<&'a [u8], Fault> {
         let text = self.text(cell)?;
-        if text.is_empty() { Err(Fault { cell: Some(cell), reason: Reason::Empty }) } else { Ok(text) }
+        if text.is_empty() { Err(Reason::Empty.at(cell)) } else { Ok(text) }
     }
 
     /// The row is too short for a cell.
     #[cold]
     fn missing(&self, cell: usize) -> Fault {
-        Fault { cell: Some(cell), reason: Reason::MissingCell { cells: self.cells.len() } }
+        Reason::MissingCell { cells: self.cells.len() }.at(cell)
     }
 
     /// A number.
@@ -83,14 +97,14 @@ impl<'a> Row<'a> {
         let text = self.filled(cell)?;
         number::float(text, self.decimal_mark).ok_or_else(|| {
             let comma = self.decimal_mark == b'.' && text.contains(&b',');
-            Fault { cell: Some(cell), reason: Reason::NotANumber { comma } }
+            Reason::NotANumber { comma }.at(cell)
         })
     }
 
     /// A count.
     fn count(&self, cell: usize) -> Result<i32, Fault> {
         let count = number::count(self.filled(cell)?, self.decimal_mark);
-        count.ok_or(Fault { cell: Some(cell), reason: Reason::NotACount })
+        count.ok_or(Reason::NotACount.at(cell))
     }
 
     /// A time (ns).
@@ -104,13 +118,13 @@ impl<'a> Row<'a> {
                 (stamp_ns(&whole, time.unit), Reason::NotADateTime { unit: time.unit })
             }
         };
-        ns.ok_or(Fault { cell: Some(time.cell), reason })
+        ns.ok_or(reason.at(time.cell))
     }
 
     /// A duration.
     fn span(&self, time: TimeCell) -> Result<Span, Fault> {
         match self.time_ns(time)? {
-            ns if ns < 0 => Err(Fault { cell: Some(time.cell), reason: Reason::NegativeDuration }),
+            ns if ns < 0 => Err(Reason::NegativeDuration.at(time.cell)),
             ns => Ok(Span::from_ns(ns)),
         }
     }
@@ -121,8 +135,8 @@ impl<'a> Row<'a> {
             text if text == state.plus.as_bytes() => Ok(true),
             text if text == state.minus.as_bytes() => Ok(false),
             _ => {
-                let reason = Reason::UnknownState { plus: state.plus.clone(), minus: state.minus.clone() };
-                Err(Fault { cell: Some(state.cell), reason })
+                let (plus, minus) = (state.plus.clone(), state.minus.clone());
+                Err(Reason::UnknownState { plus, minus }.at(state.cell))
             }
         }
     }
@@ -165,18 +179,15 @@ impl<'a> Row<'a> {
         let text = self.filled(cell)?;
         let holds = match status.bad_bits {
             None => status.good.iter().any(|good| good.trim().as_bytes() == text),
-            Some(bits) => {
-                let word = number::word(text).ok_or(Fault { cell: Some(cell), reason: Reason::NotAWord })?;
-                word & bits == 0
-            }
+            Some(bits) => number::word(text).ok_or(Reason::NotAWord.at(cell))? & bits == 0,
         };
-        if holds { Ok(()) } else { Err(Fault { cell: Some(cell), reason: Reason::BadStatus }) }
+        if holds { Ok(()) } else { Err(Reason::BadStatus.at(cell)) }
     }
 
     /// A sequence number.
     pub(super) fn sequence(&self, cell: usize) -> Result<u64, Fault> {
         let sequence = number::natural(self.filled(cell)?);
-        sequence.ok_or(Fault { cell: Some(cell), reason: Reason::NotASequence })
+        sequence.ok_or(Reason::NotASequence.at(cell))
     }
 
     /// Whether any sensor's cell holds something.

@@ -102,7 +102,7 @@ impl FileWriter {
             current,
             topics: Vec::new(),
             pending: Vec::new(),
-            journal: Documents::new(),
+            journal: Documents::default(),
             open: BTreeMap::new(),
             attachments: 0,
             before_bytes: 0,

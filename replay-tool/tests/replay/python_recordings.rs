@@ -3,12 +3,12 @@
 use std::process::Command;
 
 use isotherm_correction::unit::UnitSettings;
-use isotherm_correction::units::{Angle, Span};
+use isotherm_correction::units::Angle;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::load_calibration;
+use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
-use isotherm_log::source::{Log, TextOptions};
 use isotherm_protocol::document::{AccelOutput, Document};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
@@ -88,9 +88,9 @@ fn record(folder: &std::path::Path, unit: &str, writer: &mut RecordingWriter) {
     let loaded = load_calibration(document(unit).as_ref()).unwrap();
     let unit = UnitId::new(unit).unwrap();
     let mapping = Mapping::load(&folder.join("log.mapping.toml")).unwrap();
-    let options =
-        TextOptions { mapping: &mapping, unit: &unit, batch_ticks: 16, start: Span::ZERO, duration: None };
-    let mut log = Log::text(&[folder.join("log.csv")], options).unwrap();
+    let (paths, mapping) = (vec![folder.join("log.csv")], Box::new(mapping));
+    let files = LogFiles::Text { paths, mapping, unit: unit.clone(), batch_ticks: 16 };
+    let mut log = files.open(&Part::default()).unwrap();
     let mut stream = UnitStream::new(unit.clone(), UnitSettings::default());
     stream.install(loaded.calibration, loaded.digest);
     let mut frame = Vec::new();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::names::{Kind, meaning};
 use super::super::words::parts;
-use super::super::{Hints, Proposal, Question, refuse};
+use super::super::{Asked, Proposal, refuse};
 use super::File;
 use crate::error::Error;
 
@@ -15,16 +15,7 @@ const SERIALS: [&str; 9] = ["serial", "serialno", "sn", "id", "uid", "device", "
 const STATES: [&str; 11] =
     ["status", "state", "valid", "validity", "ok", "flag", "flags", "quality", "health", "error", "fail"];
 
-/// A column of serials: which, its file and name, and its cells.
-#[derive(Clone)]
-pub(super) struct Serials {
-    index: usize,
-    file: String,
-    name: String,
-    cells: Vec<String>,
-}
-
-impl File<'_> {
+impl<'a> File<'a> {
     /// Columns whose name has one of these words and means no quantity, with their cells, where these are few.
     fn few(self, words: &'static [&str]) -> impl Iterator<Item = (usize, Vec<(String, u64)>)> {
         let named = self.names().iter().enumerate().filter(move |(_, name)| {
@@ -49,44 +40,42 @@ impl File<'_> {
         }
     }
 
-    /// The column of serials, where rows are of several units.
-    pub(super) fn serials(self) -> Option<Serials> {
-        let (index, values) = self.few(&SERIALS).find(|(_, values)| values.len() > 1)?;
-        let cells = values.into_iter().map(|(value, _)| value).collect();
-        Some(Serials { index, file: self.name.to_owned(), name: self.listed(&[index]), cells })
-    }
-}
-
-/// The rows that are taken, where they are of several units; asks for the serial where none of them is given.
-pub(super) fn select<'h>(
-    path: &Path,
-    serials: Option<&Serials>,
-    hints: &'h Hints,
-    proposal: &mut Proposal,
-) -> Result<Option<(usize, &'h str)>, Error> {
-    // A sensor's name of one letter may be a unit's as well.
-    let of_kind = |cell: &String| Some(meaning(&format!("{cell} x"), None).filter(|_| cell.len() > 1)?.kind);
-    let has = |column: &Serials, kind| column.cells.iter().any(|cell| of_kind(cell) == Some(kind));
-    if let Some(column) = serials.filter(|column| has(column, Kind::Gyro) && has(column, Kind::Accel)) {
-        let Serials { name, cells, .. } = column;
-        let cells = cells.join(", ");
-        return Err(refuse(
-            path,
-            format!(
-                "has a row for each sensor ({cells} in column {name}): make one row per tick of it, with a column for each sensor's axis"
-            ),
-        ));
-    }
-    match (serials, hints.serial.as_deref()) {
-        (Some(column), Some(serial)) if column.cells.iter().any(|have| have == serial) => {
-            Ok(Some((column.index, serial)))
+    /// The column of serials and the one whose rows are taken, where rows are of several units; asks for it where none of
+    /// them is given.
+    pub(super) fn select(
+        self,
+        path: &Path,
+        proposal: &mut Proposal,
+    ) -> Result<Option<(usize, &'a str)>, Error> {
+        let given = self.hints.serial.as_deref();
+        let Some((index, values)) = self.few(&SERIALS).find(|(_, values)| values.len() > 1) else {
+            return match given {
+                Some(_) => Err(refuse(path, "has no column with several serials: leave --serial out")),
+                None => Ok(None),
+            };
+        };
+        let (name, column) = (self.name, self.listed(&[index]));
+        let serials: Vec<_> = values.into_iter().map(|(value, _)| value).collect();
+        let listed = serials.join(", ");
+        // A sensor's name of one letter may be a unit's as well.
+        let of_kind =
+            |cell: &String| Some(meaning(&format!("{cell} x"), None).filter(|_| cell.len() > 1)?.kind);
+        if [Kind::Gyro, Kind::Accel]
+            .iter()
+            .all(|kind| serials.iter().any(|cell| of_kind(cell) == Some(*kind)))
+        {
+            return Err(refuse(
+                path,
+                format!(
+                    "has a row for each sensor ({listed} in column {column}): make one row per tick of it, with a column for each sensor's axis"
+                ),
+            ));
         }
-        (Some(column), _) => {
-            let Serials { file, name, cells, .. } = column.clone();
-            proposal.open.push(Question::Serial { file, column: name, serials: cells });
-            Ok(None)
+        if let Some(serial) = given.filter(|given| serials.iter().any(|have| have == given)) {
+            return Ok(Some((index, serial)));
         }
-        (None, Some(_)) => Err(refuse(path, "has no column with several serials: leave --serial out")),
-        (None, None) => Ok(None),
+        let words = format!("{name} has rows of several units, {listed} in column {column}: of which unit?");
+        proposal.ask(Asked::Serial(serials), words);
+        Ok(None)
     }
 }

@@ -4,10 +4,20 @@ use super::super::clock::{UNITS_NS, rate_in, unit_of};
 use super::super::figures::GAP;
 use super::super::layout;
 use super::super::names::Kind;
-use super::super::written::Time;
-use super::super::{Proposal, Question, STAMP_UNITS};
+use super::super::{Asked, Proposal, STAMP_UNITS, states};
 use super::{File, Meanings};
 use crate::mapping::TimeUnit;
+
+/// Where the time of a row comes from.
+#[derive(Default)]
+pub(super) struct Time {
+    pub(super) column: Option<usize>,
+    /// Column of the date, where the other has the time of day alone.
+    pub(super) date: Option<usize>,
+    pub(super) unit: String,
+    pub(super) tick_ns: f64,
+    pub(super) gap_after_ticks: Option<f64>,
+}
 
 impl File<'_> {
     pub(super) fn time(self, meanings: &Meanings, counted: bool, proposal: &mut Proposal) -> Time {
@@ -39,7 +49,9 @@ impl File<'_> {
         let stated = self.hints.rate_hz.or_else(|| rate_in(&self.found.preamble));
         let Some((index, named_unit, unknown, column)) = found else {
             let Some(rate) = stated else {
-                proposal.open.push(Question::Rate { file: self.name.to_owned(), why });
+                let why = why.map_or_else(String::new, |why| format!(" ({why})"));
+                let words = format!("{} has no usable time{why}: how many rows per second?", self.name);
+                proposal.ask(Asked::Rate, words);
                 return Time { tick_ns: 1e7, ..Time::default() };
             };
             let by = if self.hints.rate_hz.is_some() { "given" } else { "the log's first lines say" };
@@ -53,17 +65,18 @@ impl File<'_> {
                 && column.order.is_none()
                 && self.hints.time_unit.is_none()
             {
-                proposal
-                    .open
-                    .push(Question::DateOrder { column: self.listed(&[index]), first: self.stamp(index) });
+                let (column, first) = (self.listed(&[index]), self.stamp(index));
+                let words = "begin with the day (dmy) or with the month (mdy)?";
+                proposal.ask(Asked::DateOrder, format!("does {first:?} in {column} {words}"));
             }
             Some(*word)
         });
         let unit = self.hints.time_unit.as_deref().or(dated).or(named_unit).map(ToOwned::to_owned);
         let told = unit.or_else(|| unit_of(step, column.maximum, stated).filter(|_| unknown.is_none()));
         let unit = told.unwrap_or_else(|| {
-            let (column, unknown) = (self.listed(&[index]), unknown.cloned());
-            proposal.open.push(Question::TimeUnit { column, unknown, step: step.to_string() });
+            let (column, stated) = (self.listed(&[index]), states(unknown, ""));
+            let words = format!("what is the unit of the time {column}?{stated} It usually grows by {step}");
+            proposal.ask(Asked::TimeUnit, words);
             "s".to_owned()
         });
         let ns = UNITS_NS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, ns)| *ns);

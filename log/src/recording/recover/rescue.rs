@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::{Channel, MessageHeader, Record};
@@ -56,7 +56,6 @@ struct Target {
 pub(super) struct Rescue<'a> {
     writer: Writer<BufWriter<Arc<File>>>,
     file: Arc<File>,
-    path: PathBuf,
     definitions: &'a mut Definitions,
     /// By number in the old file; `None` where nothing names it.
     targets: HashMap<u16, Option<Target>>,
@@ -87,10 +86,9 @@ impl<'a> Rescue<'a> {
         Ok(Self {
             writer,
             file,
-            path: path.to_owned(),
             definitions,
             targets: HashMap::new(),
-            journal: Documents::new(),
+            journal: Documents::default(),
             documents: BTreeMap::new(),
             attached: BTreeSet::new(),
             stated: None,
@@ -100,8 +98,8 @@ impl<'a> Rescue<'a> {
     /// Takes one record.
     ///
     /// # Errors
-    /// [`Error::File`] where it cannot be written.
-    pub(super) fn take(&mut self, record: Record<'_>, report: &mut RecoveryReport) -> Result<(), Error> {
+    /// Where it cannot be written.
+    pub(super) fn take(&mut self, record: Record<'_>, report: &mut RecoveryReport) -> Result<(), McapError> {
         match record {
             Record::Schema { header, data } => {
                 let schema = (header.name, header.encoding, data.into_owned());
@@ -122,7 +120,7 @@ impl<'a> Rescue<'a> {
                     self.definitions.keys.extend(keys);
                 }
                 report.metadata += 1;
-                self.writer.write_metadata(&metadata).map_err(|source| self.failed(source))?;
+                self.writer.write_metadata(&metadata)?;
             }
             Record::Statistics(statistics) => self.stated = Some(statistics.message_count),
             _ => {}
@@ -134,15 +132,15 @@ impl<'a> Rescue<'a> {
     ///
     /// # Errors
     /// As [`Rescue::take`].
-    pub(super) fn end_chunk(&mut self) -> Result<(), Error> {
-        self.writer.flush().map_err(|source| self.failed(source))
+    pub(super) fn end_chunk(&mut self) -> Result<(), McapError> {
+        self.writer.flush()
     }
 
     /// Ends the file with a summary, and with a record of what was lost.
     ///
     /// # Errors
     /// As [`Rescue::take`].
-    pub(super) fn finish(mut self, report: &mut RecoveryReport) -> Result<(), Error> {
+    pub(super) fn finish(mut self, report: &mut RecoveryReport) -> Result<(), McapError> {
         for document in std::mem::take(&mut self.documents).into_values() {
             report.documents_rebuilt += 1;
             self.attach(&document)?;
@@ -152,11 +150,11 @@ impl<'a> Rescue<'a> {
             Some(stated) => stated.saturating_sub(written),
             None => report.topics.values().map(|topic| topic.missing).sum(),
         };
-        self.writer.write_metadata(&account(report)).map_err(|source| self.failed(source))?;
-        self.writer.finish().map_err(|source| self.failed(source))?;
-        let Self { writer, file, path, .. } = self;
-        let synced = writer.into_inner().flush().and_then(|()| file.sync_all());
-        synced.map_err(|source| Error::file(&path, "write the recording", source))
+        self.writer.write_metadata(&account(report))?;
+        self.writer.finish()?;
+        let Self { writer, file, .. } = self;
+        writer.into_inner().flush()?;
+        Ok(file.sync_all()?)
     }
 
     fn message(
@@ -164,11 +162,11 @@ impl<'a> Rescue<'a> {
         header: MessageHeader,
         data: &[u8],
         report: &mut RecoveryReport,
-    ) -> Result<(), Error> {
+    ) -> Result<(), McapError> {
         let number = header.channel_id;
         // Looked up each time where it is not known: its record may come later.
         if self.targets.get(&number).is_none_or(Option::is_none) {
-            let target = self.declare(number).map_err(|source| self.failed(source))?;
+            let target = self.declare(number)?;
             self.targets.insert(number, target);
         }
         let Some(Some(target)) = self.targets.get_mut(&number) else {
@@ -192,7 +190,7 @@ impl<'a> Rescue<'a> {
             }
         }
         let header = MessageHeader { channel_id: target.id, ..header };
-        self.writer.write_to_known_channel(&header, data).map_err(|source| failed(&self.path, source))
+        self.writer.write_to_known_channel(&header, data)
     }
 
     /// Enters a channel of the old file into the new one; `None` where nothing names it.
@@ -217,14 +215,10 @@ impl<'a> Rescue<'a> {
         Ok(Some(Target { id, key, next: ours.then_some(0), is_journal }))
     }
 
-    fn attach(&mut self, attachment: &Attachment) -> Result<(), Error> {
+    fn attach(&mut self, attachment: &Attachment) -> Result<(), McapError> {
         self.documents.remove(&attachment.name);
         self.attached.insert(attachment.name.clone());
-        self.writer.attach(&attachment.as_written()).map_err(|source| self.failed(source))
-    }
-
-    fn failed(&self, source: McapError) -> Error {
-        failed(&self.path, source)
+        self.writer.attach(&attachment.as_written())
     }
 }
 

@@ -1,6 +1,5 @@
 //! Whole records of a file, found again behind what is damaged.
 
-use std::fs::File;
 use std::io;
 use std::path::Path;
 
@@ -52,7 +51,7 @@ pub(super) fn profile(piece: Option<&Piece>) -> Option<&str> {
 /// Goes through a file.
 #[derive(Debug)]
 pub(super) struct Scanner {
-    records: RecordFile<File>,
+    records: RecordFile,
     /// Where the next piece begins.
     offset: u64,
     /// Behind the footer only the magic follows.
