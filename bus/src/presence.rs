@@ -126,7 +126,10 @@ impl Alive {
 }
 
 /// Waits until somebody subscribes to what the publisher publishes.
-pub(crate) async fn wait_for_subscriber(publisher: &Publisher<'_>, limit: Duration) -> Result<(), BusError> {
+///
+/// # Errors
+/// [`BusError::NoSubscriber`] after `limit`, [`BusError::Declare`].
+pub async fn wait_for_subscriber(publisher: &Publisher<'_>, limit: Duration) -> Result<(), BusError> {
     let key = || publisher.key_expr().to_string();
     let declare = |source| BusError::Declare { key: key(), source };
     let deadline = Instant::now() + limit;

@@ -46,7 +46,7 @@ impl Stream {
             frames.extend(codec::encode(&accels).map(|frame| (RawStream::Accel, frame)));
             frames.extend(codec::encode(&gyros).map(|frame| (RawStream::Gyro, frame)));
         }
-        let id = UnitId::new("ZLG-0001").map_err(|error| Error::Count(error.to_string()))?;
+        let id = UnitId::new("ZLG-0001").map_err(Error::of("kernel"))?;
         Ok(Self {
             name: format!("raw frames in, corrected frames out, batches of {size}"),
             calibration: Arc::clone(unit.calibration()),

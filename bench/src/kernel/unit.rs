@@ -171,7 +171,7 @@ impl UnitCase {
     ) -> Result<Self, Error> {
         let path = path(document);
         let text = std::fs::read_to_string(&path).map_err(|source| Error::file(&path, source))?;
-        let invalid = |what: String| Error::Invalid { path: path.clone(), what };
+        let invalid = |what: String| Error::invalid(&path, what);
         let mut document =
             Document::parse(&text, None).map_err(|found| invalid(format!("{found:?}")))?.document;
         change(&mut document);
