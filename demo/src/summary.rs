@@ -82,7 +82,7 @@ impl UnitSummary {
         let [end_to_end_p50_us, end_to_end_p99_us] = scored.end_to_end_ns.map(microseconds);
         Self {
             unit: member.id.to_string(),
-            kind: member.kind.name(),
+            kind: member.kind.name,
             ticks_in: scored.sent,
             ticks_out: continuity.ticks,
             gaps: continuity.announced_missing,
@@ -94,7 +94,7 @@ impl UnitSummary {
             duplicated: continuity.duplicated,
             event_s: member.scenario.duration_s,
             compression: pace.compression,
-            averaging_s: member.kind.averaging_s(),
+            averaging_s: member.kind.averaging_s,
             raw_rms_deg_per_h: raw.rms_deg_per_h,
             corrected_rms_deg_per_h: corrected.rms_deg_per_h,
             raw_peak_to_peak_deg_per_h: raw.peak_to_peak_deg_per_h,

@@ -72,8 +72,8 @@ impl<'a> Tally<'a> {
         let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─");
         let tally = |member: &'a Member| {
             let bar = bars.add(ProgressBar::new(member.ticks).with_style(style.clone()));
-            bar.set_prefix(format!("{} {}", member.id, member.kind.name()));
-            Tally { member, score: Score::new(member.kind.averaging_s()), bar }
+            bar.set_prefix(format!("{} {}", member.id, member.kind.name));
+            Tally { member, score: Score::new(member.kind.averaging_s), bar }
         };
         fleet.iter().map(tally).collect()
     }
