@@ -8,7 +8,7 @@ use super::score::{Temperatures, minus};
 use super::summary::{AXES, Summary, UnitSummary, arrow};
 use super::switch::{Switch, Tick};
 use super::watch::Watched;
-use super::windows::{Mean, Spread, Stage, deg_per_h};
+use super::windows::{CORRECTED, Mean, RAW, Spread, Stage, deg_per_h};
 
 /// How much larger the raw error must be for the corrected one to get a diagram of its own.
 const ENLARGE_FROM: f64 = 4.0;
@@ -47,17 +47,17 @@ fn headline(unit: &UnitSummary) -> String {
 fn rate_errors(unit: &UnitSummary, member: &Member, watched: &Watched) -> Chart {
     let means: &[Mean] = &watched.scored.means;
     let size = |stage, axis| Spread::about(means, stage, axis).peak_to_peak_deg_per_h;
-    let axis = (0..3).max_by(|&a, &b| size(Stage::Raw, a).total_cmp(&size(Stage::Raw, b))).unwrap_or(0);
+    let axis = (0..3).max_by(|&a, &b| size(RAW, a).total_cmp(&size(RAW, b))).unwrap_or(0);
 
-    let error = |stage, name, ink| {
-        Series::line(name, ink, means.iter().map(|mean| (mean.time_s, deg_per_h(mean.error(stage)[axis]))))
+    let error = |stage: Stage, name, ink| {
+        Series::line(name, ink, means.iter().map(|mean| (mean.time_s, deg_per_h(stage(mean)[axis]))))
     };
-    let raw = || error(Stage::Raw, "raw", Ink::Raw);
-    let corrected = || error(Stage::Corrected, "corrected", Ink::Corrected);
+    let raw = || error(RAW, "raw", Ink::Raw);
+    let corrected = || error(CORRECTED, "corrected", Ink::Corrected);
     let truth = || Series::line("truth", Ink::Truth, [(0.0, 0.0), (member.scenario.duration_s, 0.0)]);
 
     let mut panels = vec![Panel::of("rate error", "°/h", 210, vec![raw(), corrected(), truth()])];
-    if size(Stage::Raw, axis) > ENLARGE_FROM * size(Stage::Corrected, axis) {
+    if size(RAW, axis) > ENLARGE_FROM * size(CORRECTED, axis) {
         panels.push(Panel::of("rate error, corrected alone", "°/h", 140, vec![corrected(), truth()]));
     }
     panels.push(temperatures(member, watched));

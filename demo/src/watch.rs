@@ -8,7 +8,7 @@ use tokio::sync::mpsc::UnboundedReceiver;
 
 use super::fleet::Member;
 use super::score::{Score, Scored, SentBatch};
-use super::windows::{Stage, deg_per_h};
+use super::windows::{deg_per_h, over_axes};
 
 /// How long nothing may arrive after the last producer has ended before the rest counts as lost.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -84,8 +84,7 @@ impl<'a> Tally<'a> {
         }
         let out = consumer.continuity(&self.member.id).ticks;
         let error = self.score.latest().map_or_else(String::new, |mean| {
-            let [raw, corrected] =
-                [Stage::Raw, Stage::Corrected].map(|stage| deg_per_h(mean.over_axes(stage)));
+            let [raw, corrected] = [mean.raw, mean.corrected].map(|error| deg_per_h(over_axes(error)));
             format!("  raw {raw:.2} → {corrected:.2} °/h")
         });
         self.bar.set_position(out);
