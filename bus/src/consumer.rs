@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
-use tokio::sync::mpsc::{UnboundedReceiver, error::TryRecvError, unbounded_channel};
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use zenoh::Session;
 use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
@@ -96,13 +96,9 @@ impl Consumer {
     /// The next batch that has arrived already, or `None`.
     pub fn try_next(&mut self) -> Option<CorrectedBatch> {
         loop {
-            match self.frames.try_recv() {
-                Ok((key, frame)) => {
-                    if let Some(batch) = self.take(&key, &frame) {
-                        return Some(batch);
-                    }
-                }
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return None,
+            let (key, frame) = self.frames.try_recv().ok()?;
+            if let Some(batch) = self.take(&key, &frame) {
+                return Some(batch);
             }
         }
     }
