@@ -147,19 +147,18 @@ pub async fn ask(
 /// The frames of each memory among the answers of journals, whole and in the order of their parts, with the key that they came on.
 #[must_use]
 pub fn memories(samples: &[Sample]) -> Vec<(String, Vec<Vec<u8>>)> {
-    let mut parts: BTreeMap<(String, String, u64), BTreeMap<u32, Vec<u8>>> = BTreeMap::new();
-    let mut whole = BTreeMap::new();
+    // Of each memory how many parts it has, and those that came.
+    let mut memories: BTreeMap<(String, String, u64), (u32, BTreeMap<u32, Vec<u8>>)> = BTreeMap::new();
     for sample in samples {
         let frame = sample.payload().to_bytes().into_owned();
         let Ok(part) = codec::decode::<JournalPart>(&frame) else { continue };
         let place = (sample.key_expr().to_string(), part.instance, part.number);
-        whole.insert(place.clone(), part.parts);
-        parts.entry(place).or_default().insert(part.part, frame);
+        let (parts, frames) = memories.entry(place).or_default();
+        *parts = part.parts;
+        frames.insert(part.part, frame);
     }
     // Half an answer is of no use.
-    let is_whole = |place: &(String, String, u64), frames: &BTreeMap<u32, Vec<u8>>| {
-        whole.get(place).is_some_and(|parts| usize::try_from(*parts) == Ok(frames.len()))
-    };
-    let memories = parts.into_iter().filter(|(place, frames)| is_whole(place, frames));
-    memories.map(|((key, ..), frames)| (key, frames.into_values().collect())).collect()
+    let is_whole = |parts: u32, frames: &BTreeMap<_, _>| usize::try_from(parts) == Ok(frames.len());
+    let whole = memories.into_iter().filter(|(_, (parts, frames))| is_whole(*parts, frames));
+    whole.map(|((key, ..), (_, frames))| (key, frames.into_values().collect())).collect()
 }
