@@ -9,9 +9,10 @@ use super::subject::Subject;
 use crate::part::Plan;
 
 /// When the source publishes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Pace {
     /// All units at the same moment, one after the other.
+    #[default]
     Burst,
     /// As fast as it can be done, for so long at most (ms).
     Saturated {
@@ -32,7 +33,7 @@ pub(crate) enum Beside {
 }
 
 /// A load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
     /// Units.
     pub(crate) units: usize,
@@ -65,17 +66,7 @@ const KEPT: usize = 200_000;
 impl Case {
     /// Units at a rate, for so many seconds.
     pub(crate) fn paced(units: usize, rate_hz: u32, batch: usize, seconds: f64) -> Self {
-        Self {
-            units,
-            rate_hz,
-            batch,
-            pace: Pace::Burst,
-            seconds,
-            ticks: 0,
-            beside: None,
-            state: true,
-            timed_swaps: 0,
-        }
+        Self { units, rate_hz, batch, seconds, state: true, ..Self::default() }
     }
 
     /// As much as will go through, at most so many ticks of all units in so many seconds.
