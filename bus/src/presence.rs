@@ -14,7 +14,7 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::sample::{Sample, SampleKind};
 
 use crate::BusError;
-use crate::inquiry::querier_matched;
+use crate::inquiry::{is_matched, querier_matched};
 
 /// Waits until a service answers on the status topic of all units.
 ///
@@ -118,18 +118,11 @@ pub async fn wait_for_subscriber(publisher: &Publisher<'_>, limit: Duration) -> 
     let key = || publisher.key_expr().to_string();
     let declare = |source| BusError::Declare { key: key(), source };
     let deadline = Instant::now() + limit;
-    // The listener first: a subscriber that comes between the two calls is seen by one of them.
     let listener = publisher.matching_listener().await.map_err(declare)?;
-    if publisher.matching_status().await.map_err(declare)?.matching() {
-        return Ok(());
-    }
-    loop {
-        match timeout_at(deadline, listener.recv_async()).await {
-            Ok(Ok(status)) if status.matching() => return Ok(()),
-            Ok(Ok(_)) => {}
-            Ok(Err(_)) | Err(_) => {
-                return Err(BusError::NoSubscriber { key: key(), waited: limit });
-            }
-        }
+    let status = publisher.matching_status().await.map_err(declare)?;
+    if is_matched(&listener, status.matching(), deadline).await {
+        Ok(())
+    } else {
+        Err(BusError::NoSubscriber { key: key(), waited: limit })
     }
 }
