@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
-use comfy_table::presets::NOTHING;
-use comfy_table::{CellAlignment, Table};
-use isotherm_cli::{Exit, failed_lines, parse, print, say, to_stdout};
+use isotherm_cli::{Exit, failed_lines, json as as_json, parse, print, say, table, to_stdout};
 
 use crate::chain::{self, ChainArgs};
 use crate::error::Error;
@@ -82,28 +80,22 @@ fn run(command: Command) -> Result<String, Error> {
             if json {
                 return Ok(as_json(&rows));
             }
-            let mut table = plain(&["kernel", "ns per tick", "quartiles", "of autopilot"]);
-            for row in rows {
+            let head = ["kernel", "ns per tick", "quartiles", "of autopilot"];
+            let rows = rows.into_iter().map(|row| {
                 let [low, high] = row.quartiles_ns;
-                table.add_row([
-                    row.name,
-                    format!("{:.1}", row.ns_per_tick),
-                    format!("{low:.1}…{high:.1}"),
-                    format!("{:.2}×", row.ratio_to_peer),
-                ]);
-            }
-            Ok(format!("{table}\n"))
+                let [ns, ratio] = [format!("{:.1}", row.ns_per_tick), format!("{:.2}×", row.ratio_to_peer)];
+                [row.name, ns, format!("{low:.1}…{high:.1}"), ratio]
+            });
+            Ok(format!("{}\n", table(head, rows, 1..)))
         }
         Command::Instructions { figures: path, bless, json } => {
             let counted = instructions::count()?;
             let printed = if json {
                 as_json(&counted)
             } else {
-                let mut table = plain(&["kernel", "instructions per tick"]);
-                for (name, figure) in &counted.per_tick {
-                    table.add_row([name.clone(), format!("{figure:.1}")]);
-                }
-                format!("{table}\n")
+                let rows =
+                    counted.per_tick.iter().map(|(name, figure)| [name.clone(), format!("{figure:.1}")]);
+                format!("{}\n", table(["kernel", "instructions per tick"], rows, 1..))
             };
             if bless {
                 counted.write(&path)?;
@@ -140,25 +132,14 @@ fn run(command: Command) -> Result<String, Error> {
             if json {
                 return Ok(as_json(&offline));
             }
-            let mut table = plain(&["correct, one core", "ticks/s"]);
-            table.add_row(["from a recording".to_owned(), format!("{:.0}", offline.correct_per_s)]);
-            table.add_row(["not compressed".to_owned(), format!("{:.0}", offline.uncompressed_per_s)]);
-            Ok(format!("{table}\n"))
+            let rows =
+                [("from a recording", offline.correct_per_s), ("not compressed", offline.uncompressed_per_s)];
+            let rows = rows.map(|(name, per_s)| [name.to_owned(), format!("{per_s:.0}")]);
+            Ok(format!("{}\n", table(["correct, one core", "ticks/s"], rows, 1..)))
         }
         Command::Part { role, plan } => part::run(role, &plan).map(|()| String::new()),
         Command::Pass { index } => instructions::pass(index).map(|()| String::new()),
     }
-}
-
-fn as_json(value: &impl serde::Serialize) -> String {
-    serde_json::to_string_pretty(value).map_or_else(|error| error.to_string(), |text| text + "\n")
-}
-
-pub(crate) fn plain(head: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_preset(NOTHING).set_header(head);
-    table.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
-    table
 }
 
 /// Runs the program.

@@ -1,5 +1,6 @@
 //! What can end a bench.
 
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -39,9 +40,6 @@ pub enum Error {
         /// Why.
         source: io::Error,
     },
-    /// Instructions cannot be counted.
-    #[error("cannot count instructions: {0}")]
-    Count(String),
     /// A process of a chain has failed.
     #[error("{part}: {what}")]
     Part {
@@ -57,19 +55,16 @@ pub enum Error {
     #[error("{subject}: {what}: what it gives is wrong, so its speed is not told")]
     Output {
         /// What was measured.
-        subject: String,
+        subject: &'static str,
         /// What is wrong with it.
         what: String,
     },
-    /// Cases of which no figure was told.
-    #[error("{}", .0.join("\n"))]
-    Failed(Vec<String>),
     /// A session.
     #[error(transparent)]
     Bus(#[from] isotherm_bus::BusError),
-    /// Something takes more than it took.
+    /// Cases of which no figure was told, or that take more than they took.
     #[error("{}", .0.join("\n"))]
-    Slower(Vec<String>),
+    Failed(Vec<String>),
 }
 
 impl Error {
@@ -77,7 +72,16 @@ impl Error {
         Self::File { path: path.to_owned(), source }
     }
 
-    pub(crate) fn zenoh(part: &'static str, error: &zenoh::Error) -> Self {
-        Self::Part { part, what: isotherm_bus::words(error) }
+    pub(crate) fn invalid(path: &Path, what: impl Display) -> Self {
+        Self::Invalid { path: path.to_owned(), what: what.to_string() }
+    }
+
+    /// For `map_err`: what has become of a part.
+    pub(crate) fn of<E: Display>(part: &'static str) -> impl Fn(E) -> Self {
+        move |what| Self::Part { part, what: what.to_string() }
+    }
+
+    pub(crate) fn zenoh(part: &'static str) -> impl Fn(zenoh::Error) -> Self {
+        move |error| Self::Part { part, what: isotherm_bus::words(&error) }
     }
 }

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::kernel::KERNELS;
+use crate::process::this;
 
 /// More than so much above the committed figure is a fault.
 const LARGEST_RISE: f64 = 0.05;
@@ -44,30 +45,34 @@ pub(crate) fn count() -> Result<Figures, Error> {
 /// The compiler at hand: what has just built this program, where nobody has changed it since.
 fn compiler() -> Result<String, Error> {
     let output = Command::new("rustc").arg("--version").output();
-    let output = output.map_err(|error| Error::Count(format!("rustc --version: {error}")))?;
+    let output = output.map_err(|error| counting(format!("rustc --version: {error}")))?;
     Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// Instructions cannot be counted.
+fn counting(what: String) -> Error {
+    Error::of("cannot count instructions")(what)
 }
 
 /// Counts one kernel in a process of its own.
 fn count_one(index: usize) -> Result<u64, Error> {
-    let program = std::env::current_exe().map_err(|error| Error::Count(error.to_string()))?;
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg("--toggle-collect=*isotherm_bench::kernel*::pass*")
-        .arg(program)
+        .arg(this()?)
         .args(["pass", &index.to_string()])
         .output()
         .map_err(|error| {
-            Error::Count(format!("valgrind: {error}; install Debian's package valgrind or the like"))
+            counting(format!("valgrind: {error}; install Debian's package valgrind or the like"))
         })?;
     let words = String::from_utf8_lossy(&output.stderr);
     if !output.status.success() {
-        return Err(Error::Count(format!("valgrind ended with {}:\n{words}", output.status)));
+        return Err(counting(format!("valgrind ended with {}:\n{words}", output.status)));
     }
     let collected = words.lines().find_map(|line| line.split_once("Collected : "));
     collected
         .and_then(|(_, number)| number.trim().parse().ok())
-        .ok_or_else(|| Error::Count(format!("no count in what valgrind says:\n{words}")))
+        .ok_or_else(|| counting(format!("no count in what valgrind says:\n{words}")))
 }
 
 /// Runs one kernel once: what the counted process does.
@@ -82,15 +87,12 @@ impl Figures {
     /// Reads committed figures.
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::file(path, source))?;
-        serde_json::from_str(&text)
-            .map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })
+        serde_json::from_str(&text).map_err(|error| Error::invalid(path, error))
     }
 
     /// Writes figures to be committed.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
-        let text = serde_json::to_string_pretty(self)
-            .map_err(|error| Error::Invalid { path: path.to_owned(), what: error.to_string() })?;
-        std::fs::write(path, text + "\n").map_err(|source| Error::file(path, source))
+        std::fs::write(path, isotherm_cli::json(self)).map_err(|source| Error::file(path, source))
     }
 
     /// Whether figures of the other kind can be compared with these: one compiler, one architecture.
@@ -116,6 +118,6 @@ impl Figures {
                 ));
             }
         }
-        if slower.is_empty() { Ok(()) } else { Err(Error::Slower(slower)) }
+        if slower.is_empty() { Ok(()) } else { Err(Error::Failed(slower)) }
     }
 }

@@ -8,7 +8,7 @@ mod unit;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::rounds::interleaved;
+use crate::rounds::{interleaved, quantile};
 
 /// Something that works through a number of ticks, again and again.
 pub trait Kernel {
@@ -75,20 +75,16 @@ pub(crate) fn measure(rounds: usize) -> Result<Vec<Row>, Error> {
         std::hint::black_box(kernel.pass());
     });
     #[expect(clippy::cast_precision_loss, reason = "some ten thousand ticks")]
-    let per_tick = |kernel: &dyn Kernel, seconds: f64| seconds * 1e9 / kernel.ticks() as f64;
-    let mut rows = Vec::new();
-    let mut peer = f64::NAN;
-    for (kernel, times) in kernels.iter().zip(&times) {
-        let ns_per_tick = per_tick(kernel.as_ref(), times.median_s());
-        if rows.is_empty() {
-            peer = ns_per_tick;
-        }
-        rows.push(Row {
-            name: kernel.name().to_owned(),
-            ns_per_tick,
-            quartiles_ns: [0.25, 0.75].map(|share| per_tick(kernel.as_ref(), times.quantile_s(share))),
-            ratio_to_peer: ns_per_tick / peer,
-        });
-    }
-    Ok(rows)
+    let per_tick_ns = kernels.iter().zip(&times).map(|(kernel, times)| {
+        [0.25, 0.5, 0.75].map(|share| quantile(times, share) * 1e9 / kernel.ticks() as f64)
+    });
+    let per_tick_ns: Vec<_> = per_tick_ns.collect();
+    let peer = per_tick_ns.first().map_or(f64::NAN, |[_, median, _]| *median);
+    let row = |(kernel, [low, ns_per_tick, high]): (Box<dyn Kernel>, [f64; 3])| Row {
+        name: kernel.name().to_owned(),
+        ns_per_tick,
+        quartiles_ns: [low, high],
+        ratio_to_peer: ns_per_tick / peer,
+    };
+    Ok(kernels.into_iter().zip(per_tick_ns).map(row).collect())
 }

@@ -5,10 +5,10 @@
 //! | `kernel` | the state machine per tick, beside what an autopilot does per sample |
 //! | `instructions` | the same counted in instructions, for a machine that is never quiet |
 //! | `chain` | source, service or relay, and sink over TCP loopback: latency, throughput, loss |
-//! | `scale` | growth with the number of units; offline correction beside numpy |
+//! | `offline` | a recording corrected on one core |
 //! | `part` | the processes of a chain |
 //! | `rounds` | interleaved rounds and their medians |
-//! | `clock`, `machine`, `process`, `progress` | what the benches stand on |
+//! | `clock`, `machine`, `process` | what the benches stand on |
 //!
 //! What a bench refuses to do: report the speed of a wrong result. Each case is checked before it is timed.
 

@@ -53,8 +53,8 @@ fn recordings(folder: &Path, duration_s: u32) -> Result<([PathBuf; 2], u64), Err
     let mut simulate = Command::new(beside("isotherm-replay")?);
     simulate.args(["simulate", "--preset", "mems-chamber", "--seed", "1", "--json", "--duration"]);
     let said = run(simulate.arg(duration_s.to_string()).arg("--out").arg(&text))?;
-    let said: serde_json::Value = serde_json::from_str(&said)
-        .map_err(|error| Error::Part { part: "simulate", what: format!("{said:?}: {error}") })?;
+    let said: serde_json::Value =
+        serde_json::from_str(&said).map_err(|error| Error::of("simulate")(format!("{said:?}: {error}")))?;
     let recordings = ["zstd", "none"].map(|compression| folder.join(format!("{compression}.mcap")));
     for (out, compression) in recordings.iter().zip(["zstd", "none"]) {
         let mut convert = Command::new(beside("isotherm-replay")?);
@@ -67,8 +67,7 @@ fn recordings(folder: &Path, duration_s: u32) -> Result<([PathBuf; 2], u64), Err
 /// Corrects a recording on one thread; the processor time of that (s).
 fn correct(recording: &Path) -> Result<f64, Error> {
     let document = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../config/calibration/{UNIT}.toml"));
-    let account =
-        || children_s().ok_or_else(|| Error::Part { part: "account", what: "/proc has none".to_owned() });
+    let account = || children_s().ok_or_else(|| Error::of("account")("/proc has none"));
     let before = account()?;
     let mut correct = Command::new(beside("isotherm-replay")?);
     run(correct.arg("correct").arg(recording).args(["--threads", "1", "--calibration"]).arg(document))?;
@@ -81,7 +80,7 @@ fn run(command: &mut Command) -> Result<String, Error> {
     let output = command.stdin(Stdio::null()).output().map_err(|source| Error::file(&program, source))?;
     if !output.status.success() {
         let words = String::from_utf8_lossy(&output.stderr).into_owned();
-        return Err(Error::Invalid { path: program, what: format!("{}: {words}", output.status) });
+        return Err(Error::invalid(&program, format_args!("{}: {words}", output.status)));
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }

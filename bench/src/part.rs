@@ -12,7 +12,8 @@ mod source;
 
 use std::fs;
 use std::io::{self, BufRead, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::time::Duration;
 
 use isotherm_bus::{DeclaredKeys, SessionOptions};
 use isotherm_protocol::key::UnitId;
@@ -20,8 +21,8 @@ use serde::Serialize;
 use tokio::runtime::Runtime;
 use zenoh::{Session, Wait};
 
-pub(crate) use plan::{Format, Pace, Plan, unit_name};
-pub(crate) use sink::{Kept, Received, read_kept};
+pub(crate) use plan::{Plan, unit_name};
+pub(crate) use sink::{Kept, Received};
 pub(crate) use source::Sent;
 
 use crate::error::Error;
@@ -47,14 +48,13 @@ pub(crate) struct Ready {
     pub(crate) metrics: Option<String>,
 }
 
-/// How long a part waits for the others (s).
-const LONGEST_WAIT_S: u64 = 60;
+/// How long a part waits for the others.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
 /// Plays a part to its end.
 pub(crate) fn run(role: Role, plan: &Path) -> Result<(), Error> {
     let text = fs::read_to_string(plan).map_err(|source| Error::file(plan, source))?;
-    let plan: Plan = serde_json::from_str(&text)
-        .map_err(|error| Error::Invalid { path: plan.to_owned(), what: error.to_string() })?;
+    let plan: Plan = serde_json::from_str(&text).map_err(|error| Error::invalid(plan, error))?;
     match role {
         Role::Source => source::run(&plan),
         Role::Relay => relay::run(&plan),
@@ -75,16 +75,13 @@ fn declare_keys<K: IntoIterator<Item = String>>(
     plan: &Plan,
     of: impl Fn(&UnitId) -> K,
 ) -> Result<DeclaredKeys, Error> {
-    let units = (0..plan.units).map(unit_name).collect::<Result<Vec<_>, _>>()?;
-    let keys = DeclaredKeys::declare(session, units.iter().flat_map(of));
-    keys.map_err(|error| Error::zenoh("keys", &error))
+    let units = (0..plan.case.units).map(unit_name).collect::<Result<Vec<_>, _>>()?;
+    DeclaredKeys::declare(session, units.iter().flat_map(of)).map_err(Error::zenoh("keys"))
 }
 
 /// Waits until the one in the middle answers: then it knows every subscription made before.
 fn wait_for_middle(session: &Session) -> Result<(), Error> {
-    let limit = std::time::Duration::from_secs(LONGEST_WAIT_S);
-    runtime()?.block_on(isotherm_bus::presence::wait_for_service(session, limit))?;
-    Ok(())
+    Ok(runtime()?.block_on(isotherm_bus::presence::wait_for_service(session, LONGEST_WAIT))?)
 }
 
 /// For what is asked over the bus.
@@ -95,11 +92,9 @@ pub(crate) fn runtime() -> Result<Runtime, Error> {
 
 /// Says something to the one who started this process.
 fn say(message: &impl Serialize) -> Result<(), Error> {
-    let line = serde_json::to_string(message)
-        .map_err(|error| Error::Part { part: "stdout", what: error.to_string() })?;
+    let line = serde_json::to_string(message).map_err(Error::of("stdout"))?;
     let mut out = io::stdout().lock();
-    let said = writeln!(out, "{line}").and_then(|()| out.flush());
-    said.map_err(|error| Error::Part { part: "stdout", what: error.to_string() })
+    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(Error::of("stdout"))
 }
 
 /// Waits for a line; `None` where none will come.
@@ -109,22 +104,4 @@ fn hear() -> Option<String> {
         Ok(0) | Err(_) => None,
         Ok(_) => Some(line.trim().to_owned()),
     }
-}
-
-/// Writes numbers as they lie in memory elsewhere: 8 bytes each, little-endian.
-fn write_numbers(path: &Path, numbers: &[u64]) -> Result<(), Error> {
-    let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
-    fs::write(path, bytes).map_err(|source| Error::file(path, source))
-}
-
-/// Reads numbers back.
-pub(crate) fn read_numbers(path: &Path) -> Result<Vec<u64>, Error> {
-    let bytes = fs::read(path).map_err(|source| Error::file(path, source))?;
-    let (numbers, _) = bytes.as_chunks::<8>();
-    Ok(numbers.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
-}
-
-/// Where a part leaves its numbers.
-pub(crate) fn path(plan: &Plan, name: &str) -> PathBuf {
-    plan.folder.join(name)
 }

@@ -71,7 +71,7 @@ impl Process {
         let log = fs::read_to_string(&self.log).unwrap_or_default();
         let last: Vec<&str> = log.lines().rev().take(12).collect();
         let last: Vec<&str> = last.into_iter().rev().collect();
-        Error::Part { part: self.name, what: format!("{what}\n{}", last.join("\n")) }
+        Error::of(self.name)(format!("{what}\n{}", last.join("\n")))
     }
 }
 

@@ -2,34 +2,20 @@
 
 use std::time::Instant;
 
-/// What one case took, by round.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Times {
-    /// Seconds of each round, sorted.
-    sorted_s: Vec<f64>,
+/// A quantile (0…1) of sorted figures.
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a place among some hundred rounds"
+)]
+pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1) as f64;
+    sorted.get((share * last).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-impl Times {
-    /// Median (s).
-    pub(crate) fn median_s(&self) -> f64 {
-        self.quantile_s(0.5)
-    }
-
-    /// A quantile (s), 0…1.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a place among some hundred rounds"
-    )]
-    pub(crate) fn quantile_s(&self, share: f64) -> f64 {
-        let last = self.sorted_s.len().saturating_sub(1) as f64;
-        self.sorted_s.get((share * last).round() as usize).copied().unwrap_or(f64::NAN)
-    }
-}
-
-/// Runs every case once in each of so many rounds, after one that is not counted.
-pub(crate) fn interleaved<T>(cases: &mut [T], rounds: usize, mut run: impl FnMut(&mut T)) -> Vec<Times> {
+/// Runs every case once in each of so many rounds, after one that is not counted; the seconds of each, sorted.
+pub(crate) fn interleaved<T>(cases: &mut [T], rounds: usize, mut run: impl FnMut(&mut T)) -> Vec<Vec<f64>> {
     let mut times: Vec<Vec<f64>> = cases.iter().map(|_| Vec::with_capacity(rounds)).collect();
     for round in 0..=rounds {
         for (case, times) in cases.iter_mut().zip(&mut times) {
@@ -40,11 +26,10 @@ pub(crate) fn interleaved<T>(cases: &mut [T], rounds: usize, mut run: impl FnMut
             }
         }
     }
-    let sorted = |mut times: Vec<f64>| {
+    for times in &mut times {
         times.sort_by(f64::total_cmp);
-        Times { sorted_s: times }
-    };
-    times.into_iter().map(sorted).collect()
+    }
+    times
 }
 
 /// Median of some figures; what is no number is left out, and no figures have none.

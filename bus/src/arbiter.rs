@@ -46,12 +46,6 @@ pub struct FirstWins {
 }
 
 impl FirstWins {
-    /// One that has seen nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Whether a tick is to be used.
     pub fn wins(&mut self, tick: &CorrectedTick) -> bool {
         let CorrectedTick { series, sequence, end_time, ticks, .. } = *tick;
@@ -97,15 +91,15 @@ mod tests {
 
     #[test]
     fn the_cases_of_all_clients_hold() {
-        let (mut name, mut arbiter, mut account) = ("", None, Continuity::new());
+        let (mut name, mut arbiter, mut account) = ("", None, Continuity::default());
         let (mut verdicts, mut cases) = (String::new(), 0);
         for line in CASES.lines().filter(|line| !line.starts_with('#') && !line.is_empty()) {
             let words: Vec<&str> = line.split_whitespace().collect();
             match words.as_slice() {
                 ["=", case, which] => {
                     name = case;
-                    arbiter = (*which == "first-wins").then(FirstWins::new);
-                    (account, verdicts) = (Continuity::new(), String::new());
+                    arbiter = (*which == "first-wins").then(FirstWins::default);
+                    (account, verdicts) = (Continuity::default(), String::new());
                 }
                 [">", expected, figures @ ..] => {
                     let Continuity { ticks, announced_missing, lost, duplicated, restarts, .. } = account;

@@ -71,13 +71,9 @@ pub struct Way {
     any_of: Vec<String>,
 }
 
-/// What the options, the variable and the user's file say together.
-#[derive(Debug)]
-struct Stated {
-    options: SessionOptions,
-    /// Who says where the service is, if it is neither the command line nor the default.
-    said_by: Option<String>,
-}
+/// What the options, the variable and the user's file say together, and who says where the service is, if it is neither the command line
+/// nor the default.
+type Stated = (SessionOptions, Option<String>);
 
 /// What the file of a user may say.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
@@ -110,11 +106,11 @@ impl ClientOptions {
     /// # Errors
     /// [`BusError::Endpoint`], [`BusError::UserFile`], [`BusError::Configuration`] and [`BusError::Option`].
     pub fn way(&self, role: Role) -> Result<Way, BusError> {
-        let mut stated = self.stated()?;
-        if !says_where(&stated.options) {
-            stated.options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
+        let (mut options, said_by) = self.stated()?;
+        if !says_where(&options) {
+            options.connect = vec![DEFAULT_ENDPOINT.to_owned()];
         }
-        stated.way(role)
+        Way::by((options, said_by), role)
     }
 
     /// The way for who needs no service: where nothing says where to connect, it is a peer on its own.
@@ -122,7 +118,7 @@ impl ClientOptions {
     /// # Errors
     /// As [`Self::way`].
     pub fn way_if_stated(&self, role: Role) -> Result<Way, BusError> {
-        self.stated()?.way(role)
+        Way::by(self.stated()?, role)
     }
 
     fn stated(&self) -> Result<Stated, BusError> {
@@ -167,7 +163,7 @@ impl ClientOptions {
         }
         match (of_file.to_config(), file) {
             (Err(error), Some(file)) => Err(BusError::UserFile(vec![format!("{}: {error}", file.display())])),
-            _ => Ok(Stated { options, said_by }),
+            _ => Ok((options, said_by)),
         }
     }
 }
@@ -177,9 +173,8 @@ fn says_where(options: &SessionOptions) -> bool {
     options.config.is_some() || !options.connect.is_empty() || !options.listen.is_empty()
 }
 
-impl Stated {
-    fn way(self, role: Role) -> Result<Way, BusError> {
-        let Self { options, said_by } = self;
+impl Way {
+    fn by((options, said_by): Stated, role: Role) -> Result<Self, BusError> {
         let mut config = options.to_config()?;
         if role == Role::Listener
             && options.config.is_none()
@@ -199,22 +194,9 @@ impl Stated {
             }
         }
         let name = common_name(&config);
-        Ok(Way { config, said_by, name, any_of })
+        Ok(Self { config, said_by, name, any_of })
     }
-}
 
-/// Makes a client of a peer.
-fn as_client(config: &mut Config) -> Result<(), BusError> {
-    set(config, "mode", "client")?;
-    set(config, "listen/endpoints", Vec::<String>::new())
-}
-
-/// Has what does not answer reported at once, not after many trials.
-fn once(config: &mut Config) -> Result<(), BusError> {
-    set(config, "connect/timeout_ms", 0)
-}
-
-impl Way {
     /// The way to one endpoint, as a client, with all else that a session's options say.
     ///
     /// # Errors
@@ -312,13 +294,20 @@ impl Way {
                 Ok(Err(join)) => join.into(),
                 Err(_) => not_connected(limit),
             };
-            let (config, said_by) = (self.config.clone(), self.said_by.clone());
-            let known =
-                tokio::task::spawn_blocking(move || obstacle::after(&config, limit, said_by.as_deref()))
-                    .await;
-            Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
+            Err(obstacle::found(source, self.config.clone(), limit, self.said_by.clone()).await)
         })
     }
+}
+
+/// Makes a client of a peer.
+fn as_client(config: &mut Config) -> Result<(), BusError> {
+    set(config, "mode", "client")?;
+    set(config, "listen/endpoints", Vec::<String>::new())
+}
+
+/// Has what does not answer reported at once, not after many trials.
+fn once(config: &mut Config) -> Result<(), BusError> {
+    set(config, "connect/timeout_ms", 0)
 }
 
 /// Nothing has answered.
@@ -364,7 +353,7 @@ mod tests {
     use super::*;
 
     fn connect(options: &ClientOptions, variable: Option<&str>, file: Option<&Path>) -> Vec<String> {
-        options.resolved(variable, file).unwrap().options.connect
+        options.resolved(variable, file).unwrap().0.connect
     }
 
     #[test]
@@ -381,14 +370,14 @@ mod tests {
         let tried = |way: Result<Way, BusError>| way.unwrap().tried();
         assert_eq!(tried(given.way(Role::Peer)), "tcp/a:1");
         assert_eq!(tried(given.way_if_stated(Role::Listener)), "tcp/a:1");
-        let way = |variable, file| tried(nothing.resolved(variable, file).unwrap().way(Role::Peer));
+        let way = |variable, file| tried(Way::by(nothing.resolved(variable, file).unwrap(), Role::Peer));
         assert_eq!(way(Some("b:2,d:4"), Some(&*file)), "tcp/b:2, tcp/d:4 (from ISOTHERM_CONNECT)");
         assert_eq!(way(None, Some(&*file)), format!("tcp/c:3 (from {})", file.display()));
         let listens = ClientOptions { listen: vec!["tcp/a:1".to_owned()], ..nothing.clone() };
         assert_eq!(connect(&listens, Some("b:2"), Some(&file)), Vec::<String>::new());
         // The site does not depend on who says where the service is.
-        let resolved = given.resolved(None, Some(&file)).unwrap();
-        assert_eq!(resolved.options.namespace.as_deref(), Some("site/c"));
+        let (options, _) = given.resolved(None, Some(&file)).unwrap();
+        assert_eq!(options.namespace.as_deref(), Some("site/c"));
     }
 
     #[test]

@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::CorrectedBatch;
 use isotherm_protocol::key::{self, UnitId};
-use tokio::sync::mpsc::{UnboundedReceiver, error::TryRecvError, unbounded_channel};
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use zenoh::Session;
 use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
 
 use crate::receipt::Receipt;
-use crate::{BusError, Continuity, DeclaredKeys, FirstWins};
+use crate::{BusError, Continuity, DeclaredKeys};
 
 /// Receives the corrected batches of one unit or of all, and keeps the account of each unit.
 ///
@@ -21,8 +21,6 @@ use crate::{BusError, Continuity, DeclaredKeys, FirstWins};
 pub struct Consumer {
     frames: UnboundedReceiver<(String, ZBytes)>,
     accounts: BTreeMap<UnitId, Continuity>,
-    /// By unit, where of several services the first is to win.
-    arbiters: Option<BTreeMap<UnitId, FirstWins>>,
     rejected: u64,
     session: Session,
     // One for each unit heard of.
@@ -58,26 +56,12 @@ impl Consumer {
         Ok(Self {
             frames,
             accounts: BTreeMap::new(),
-            arbiters: None,
             rejected: 0,
             session: session.clone(),
             keys: DeclaredKeys::default(),
             _receipt: receipt,
             _subscriber: subscriber,
         })
-    }
-
-    /// Has each tick used once, of the service that sends it first, where several correct a unit: ticks that were used are taken out
-    /// of their batch, and neither counted nor given out again.
-    #[must_use]
-    pub fn first_wins(self) -> Self {
-        Self { arbiters: Some(BTreeMap::new()), ..self }
-    }
-
-    /// Outputs that were left out because another service's came first; 0 without [`Consumer::first_wins`].
-    #[must_use]
-    pub fn dropped(&self) -> u64 {
-        self.arbiters.iter().flat_map(BTreeMap::values).map(FirstWins::dropped).sum()
     }
 
     /// The next batch; `None` once the session is closed and everything received before has been taken.
@@ -96,13 +80,9 @@ impl Consumer {
     /// The next batch that has arrived already, or `None`.
     pub fn try_next(&mut self) -> Option<CorrectedBatch> {
         loop {
-            match self.frames.try_recv() {
-                Ok((key, frame)) => {
-                    if let Some(batch) = self.take(&key, &frame) {
-                        return Some(batch);
-                    }
-                }
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return None,
+            let (key, frame) = self.frames.try_recv().ok()?;
+            if let Some(batch) = self.take(&key, &frame) {
+                return Some(batch);
             }
         }
     }
@@ -112,14 +92,7 @@ impl Consumer {
         let unit = key::parse_corrected(key).and_then(|serial| UnitId::new(serial).ok());
         let batch = codec::decode::<CorrectedBatch>(&frame.to_bytes()).ok();
         match (unit, batch) {
-            (Some(unit), Some(mut batch)) if batch.unit == unit.as_str() => {
-                if let Some(arbiters) = &mut self.arbiters {
-                    let arbiter = arbiters.entry(unit.clone()).or_default();
-                    batch.ticks.retain(|tick| arbiter.wins(tick));
-                    if batch.ticks.is_empty() {
-                        return None;
-                    }
-                }
+            (Some(unit), Some(batch)) if batch.unit == unit.as_str() => {
                 if !self.accounts.contains_key(&unit) {
                     // Slower without, and nothing else.
                     let _ = self.keys.add(&self.session, key.to_owned());

@@ -27,12 +27,6 @@ pub struct Continuity {
 }
 
 impl Continuity {
-    /// An account of nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Enters one tick.
     pub fn feed(&mut self, tick: &CorrectedTick) {
         let CorrectedTick { series, sequence, missed, flags, .. } = *tick;

@@ -10,6 +10,8 @@ use isotherm_protocol::pair::PairReport;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use tokio::time::{Instant, timeout, timeout_at};
 use zenoh::Session;
+use zenoh::handlers::FifoChannelHandler;
+use zenoh::matching::{MatchingListener, MatchingStatus};
 use zenoh::query::{ConsolidationMode, Querier, QueryTarget, Reply};
 use zenoh::sample::Sample;
 
@@ -87,13 +89,21 @@ pub(crate) async fn querier_matched(
         .await
         .map_err(declare)?;
     let listener = querier.matching_listener().await.map_err(declare)?;
-    let mut matching = querier.matching_status().await.map_err(declare)?.matching();
+    let status = querier.matching_status().await.map_err(declare)?;
+    Ok(is_matched(&listener, status.matching(), deadline).await.then_some(querier))
+}
+
+/// Whether somebody is there, or comes before the deadline; the listener is older than the status, so that one of them sees it.
+pub(crate) async fn is_matched(
+    listener: &MatchingListener<FifoChannelHandler<MatchingStatus>>,
+    mut matching: bool,
+    deadline: Instant,
+) -> bool {
     while !matching {
-        let Ok(Ok(status)) = timeout_at(deadline, listener.recv_async()).await else { return Ok(None) };
+        let Ok(Ok(status)) = timeout_at(deadline, listener.recv_async()).await else { return false };
         matching = status.matching();
     }
-    drop(listener);
-    Ok(Some(querier))
+    true
 }
 
 /// Why a question has no answer.
@@ -144,22 +154,23 @@ pub async fn ask(
     }
 }
 
+/// How many parts a memory has, and those that came.
+type Parts = (u32, BTreeMap<u32, Vec<u8>>);
+
 /// The frames of each memory among the answers of journals, whole and in the order of their parts, with the key that they came on.
 #[must_use]
 pub fn memories(samples: &[Sample]) -> Vec<(String, Vec<Vec<u8>>)> {
-    let mut parts: BTreeMap<(String, String, u64), BTreeMap<u32, Vec<u8>>> = BTreeMap::new();
-    let mut whole = BTreeMap::new();
+    let mut memories: BTreeMap<(String, String, u64), Parts> = BTreeMap::new();
     for sample in samples {
         let frame = sample.payload().to_bytes().into_owned();
         let Ok(part) = codec::decode::<JournalPart>(&frame) else { continue };
         let place = (sample.key_expr().to_string(), part.instance, part.number);
-        whole.insert(place.clone(), part.parts);
-        parts.entry(place).or_default().insert(part.part, frame);
+        let (parts, frames) = memories.entry(place).or_default();
+        *parts = part.parts;
+        frames.insert(part.part, frame);
     }
     // Half an answer is of no use.
-    let is_whole = |place: &(String, String, u64), frames: &BTreeMap<u32, Vec<u8>>| {
-        whole.get(place).is_some_and(|parts| usize::try_from(*parts) == Ok(frames.len()))
-    };
-    let memories = parts.into_iter().filter(|(place, frames)| is_whole(place, frames));
-    memories.map(|((key, ..), frames)| (key, frames.into_values().collect())).collect()
+    let is_whole = |parts: u32, frames: &BTreeMap<_, _>| usize::try_from(parts) == Ok(frames.len());
+    let whole = memories.into_iter().filter(|(_, (parts, frames))| is_whole(*parts, frames));
+    whole.map(|((key, ..), (_, frames))| (key, frames.into_values().collect())).collect()
 }

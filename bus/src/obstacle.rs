@@ -47,8 +47,19 @@ fn listen(endpoint: &str) -> Result<(), BusError> {
     Err(BusError::Listen { endpoint: address(endpoint).to_owned(), reason })
 }
 
+/// What has kept a session from opening: what is found, else what Zenoh says.
+pub(crate) async fn found(
+    source: zenoh::Error,
+    config: Config,
+    limit: Duration,
+    said_by: Option<String>,
+) -> BusError {
+    let known = tokio::task::spawn_blocking(move || after(&config, limit, said_by.as_deref())).await;
+    known.ok().flatten().unwrap_or(BusError::Open(source))
+}
+
 /// What has kept a session from connecting within `limit`, to endpoints that `said_by` has named.
-pub(crate) fn after(config: &Config, limit: Duration, said_by: Option<&str>) -> Option<BusError> {
+fn after(config: &Config, limit: Duration, said_by: Option<&str>) -> Option<BusError> {
     let endpoints = endpoints(config, "connect/endpoints");
     let (mut reasons, mut steps) = (Vec::new(), Vec::new());
     for endpoint in endpoints {

@@ -1,10 +1,9 @@
 //! Publishing one unit's frames as they are, without outrunning what comes back.
 
-mod in_flight;
 mod intervals;
 mod tally;
+mod under_way;
 
-use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -16,9 +15,9 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 
 use crate::{BusError, presence};
-use in_flight::InFlight;
 
 pub use tally::Sent;
+pub use under_way::UnderWay;
 
 /// How the frames of a unit are published.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,40 +82,7 @@ pub struct Outlet {
     unit: UnitId,
     options: OutletOptions,
     publishers: [Option<Publisher<'static>>; 5],
-    in_flight: Option<(Arc<InFlight>, Subscriber<()>)>,
-}
-
-/// A look at what is under way, from beside the one who sends; cheap to clone.
-#[derive(Clone)]
-pub struct UnderWay {
-    unit: UnitId,
-    in_flight: Arc<InFlight>,
-}
-
-impl fmt::Debug for UnderWay {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("UnderWay").field("unit", &self.unit).finish_non_exhaustive()
-    }
-}
-
-impl UnderWay {
-    /// The unit.
-    #[must_use]
-    pub fn unit(&self) -> &UnitId {
-        &self.unit
-    }
-
-    /// Gyro ticks under way.
-    #[must_use]
-    pub fn ticks(&self) -> u64 {
-        self.in_flight.ticks()
-    }
-
-    /// Batches that came back so far: where it stands still, nothing comes.
-    #[must_use]
-    pub fn batches(&self) -> u64 {
-        self.in_flight.batches()
-    }
+    under_way: Option<(Arc<UnderWay>, Subscriber<()>)>,
 }
 
 impl Outlet {
@@ -125,12 +91,12 @@ impl Outlet {
     /// # Errors
     /// [`BusError::Declare`].
     pub async fn declare(session: &Session, unit: &UnitId, options: OutletOptions) -> Result<Self, BusError> {
-        let in_flight = match options.max_in_flight {
-            Some(_) => Some(InFlight::declare(session, unit).await?),
+        let under_way = match options.max_in_flight {
+            Some(_) => Some(UnderWay::declare(session, unit).await?),
             None => None,
         };
         let publishers = [const { None }; 5];
-        Ok(Self { session: session.clone(), unit: unit.clone(), options, publishers, in_flight })
+        Ok(Self { session: session.clone(), unit: unit.clone(), options, publishers, under_way })
     }
 
     /// The unit.
@@ -198,8 +164,8 @@ impl Outlet {
             let limit = limit.max(least_in_flight(ticks.count));
             self.wait_below(limit.saturating_add(1).saturating_sub(ticks.count)).await?;
         }
-        let sent = match &self.in_flight {
-            Some((in_flight, _)) => in_flight.sent(ticks),
+        let sent = match &self.under_way {
+            Some((under_way, _)) => under_way.tally().sent(ticks),
             None => Sent { new: ticks.count, again: 0 },
         };
         self.publish(input, frame).await?;
@@ -227,31 +193,27 @@ impl Outlet {
     /// Gyro ticks sent and not come back; 0 without `max_in_flight`.
     #[must_use]
     pub fn in_flight(&self) -> u64 {
-        self.in_flight.as_ref().map_or(0, |(in_flight, _)| in_flight.ticks())
+        self.under_way.as_ref().map_or(0, |(under_way, _)| under_way.ticks())
     }
 
-    /// A look at it from elsewhere; `None` without `max_in_flight`.
+    /// What is under way, to be looked at from elsewhere; `None` without `max_in_flight`.
     #[must_use]
-    pub fn under_way(&self) -> Option<UnderWay> {
-        let (in_flight, _) = self.in_flight.as_ref()?;
-        Some(UnderWay { unit: self.unit.clone(), in_flight: Arc::clone(in_flight) })
+    pub fn under_way(&self) -> Option<Arc<UnderWay>> {
+        self.under_way.as_ref().map(|(under_way, _)| Arc::clone(under_way))
     }
 
     /// What became of the ticks; `None` without `max_in_flight`.
     #[must_use]
     pub fn account(&self) -> Option<Account> {
-        self.in_flight.as_ref().map(|(in_flight, _)| in_flight.account())
+        self.under_way.as_ref().map(|(under_way, _)| under_way.tally().account())
     }
 
     async fn wait_below(&self, limit: u64) -> Result<(), BusError> {
-        let Some((in_flight, _)) = &self.in_flight else { return Ok(()) };
-        in_flight.wait_below(limit, self.options.acknowledge_timeout).await.map_err(|in_flight| {
-            BusError::NoAcknowledgement {
-                unit: self.unit.clone(),
-                key: key::corrected(&self.unit),
-                waited: self.options.acknowledge_timeout,
-                in_flight,
-            }
+        let Some((under_way, _)) = &self.under_way else { return Ok(()) };
+        let waited = self.options.acknowledge_timeout;
+        under_way.wait_below(limit, waited).await.map_err(|in_flight| {
+            let (unit, key) = (self.unit.clone(), key::corrected(&self.unit));
+            BusError::NoAcknowledgement { unit, key, waited, in_flight }
         })
     }
 }

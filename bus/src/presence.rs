@@ -14,7 +14,7 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::sample::{Sample, SampleKind};
 
 use crate::BusError;
-use crate::inquiry::querier_matched;
+use crate::inquiry::{is_matched, querier_matched};
 
 /// Waits until a service answers on the status topic of all units.
 ///
@@ -74,17 +74,10 @@ pub async fn status(session: &Session, unit: &UnitId, limit: Duration) -> Option
 /// Watches by their tokens which service instances are there.
 #[derive(Debug)]
 pub struct ServiceWatch {
-    alive: Arc<Alive>,
+    /// Told when the last one has gone.
+    gone: Arc<Notify>,
     // Dropping it ends the watch.
     _subscriber: Subscriber<()>,
-}
-
-/// Instances that are there.
-#[derive(Debug, Default)]
-struct Alive {
-    instances: Mutex<BTreeSet<String>>,
-    /// Told when the last one has gone.
-    gone: Notify,
 }
 
 impl ServiceWatch {
@@ -93,55 +86,43 @@ impl ServiceWatch {
     /// # Errors
     /// [`BusError::Declare`].
     pub async fn declare(session: &Session) -> Result<Self, BusError> {
-        let alive = Arc::new(Alive::default());
-        let told = Arc::clone(&alive);
+        let gone = Arc::new(Notify::new());
+        let (told, there) = (Arc::clone(&gone), Mutex::new(BTreeSet::new()));
+        let tell = move |sample: Sample| {
+            let Some(instance) = key::parse_service_alive(sample.key_expr().as_str()) else { return };
+            let mut there = there.lock().unwrap_or_else(PoisonError::into_inner);
+            if sample.kind() == SampleKind::Put {
+                there.insert(instance.to_owned());
+            } else if there.remove(instance) && there.is_empty() {
+                told.notify_one();
+            }
+        };
         let key = key::ALL_SERVICES_ALIVE;
-        let liveliness = session.liveliness();
-        let subscriber = liveliness.declare_subscriber(key).history(true).callback(move |sample| {
-            told.tell(&sample);
-        });
-        let subscriber =
-            subscriber.await.map_err(|source| BusError::Declare { key: key.to_owned(), source })?;
-        Ok(Self { alive, _subscriber: subscriber })
+        let subscriber = session.liveliness().declare_subscriber(key).history(true).callback(tell).await;
+        let subscriber = subscriber.map_err(|source| BusError::Declare { key: key.to_owned(), source })?;
+        Ok(Self { gone, _subscriber: subscriber })
     }
 
     /// Ends when an instance was there and none is any more: it has ended, or the connection to it.
     pub async fn gone(&self) {
         // A permit is kept where the last one goes before anybody waits.
-        self.alive.gone.notified().await;
-    }
-}
-
-impl Alive {
-    fn tell(&self, sample: &Sample) {
-        let key = sample.key_expr().as_str();
-        let Some(instance) = key::parse_service_alive(key) else { return };
-        let mut instances = self.instances.lock().unwrap_or_else(PoisonError::into_inner);
-        if sample.kind() == SampleKind::Put {
-            instances.insert(instance.to_owned());
-        } else if instances.remove(instance) && instances.is_empty() {
-            self.gone.notify_one();
-        }
+        self.gone.notified().await;
     }
 }
 
 /// Waits until somebody subscribes to what the publisher publishes.
-pub(crate) async fn wait_for_subscriber(publisher: &Publisher<'_>, limit: Duration) -> Result<(), BusError> {
+///
+/// # Errors
+/// [`BusError::NoSubscriber`] after `limit`, [`BusError::Declare`].
+pub async fn wait_for_subscriber(publisher: &Publisher<'_>, limit: Duration) -> Result<(), BusError> {
     let key = || publisher.key_expr().to_string();
     let declare = |source| BusError::Declare { key: key(), source };
     let deadline = Instant::now() + limit;
-    // The listener first: a subscriber that comes between the two calls is seen by one of them.
     let listener = publisher.matching_listener().await.map_err(declare)?;
-    if publisher.matching_status().await.map_err(declare)?.matching() {
-        return Ok(());
-    }
-    loop {
-        match timeout_at(deadline, listener.recv_async()).await {
-            Ok(Ok(status)) if status.matching() => return Ok(()),
-            Ok(Ok(_)) => {}
-            Ok(Err(_)) | Err(_) => {
-                return Err(BusError::NoSubscriber { key: key(), waited: limit });
-            }
-        }
+    let status = publisher.matching_status().await.map_err(declare)?;
+    if is_matched(&listener, status.matching(), deadline).await {
+        Ok(())
+    } else {
+        Err(BusError::NoSubscriber { key: key(), waited: limit })
     }
 }

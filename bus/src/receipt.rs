@@ -8,9 +8,11 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use isotherm_protocol::key;
+use zenoh::handlers::DefaultHandler;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget, Queryable};
 use zenoh::sample::Locality;
+use zenoh::session::SessionGetBuilder;
 use zenoh::{Session, Wait};
 
 use crate::BusError;
@@ -51,18 +53,27 @@ pub async fn all_taken(session: &Session, limit: Duration) -> Result<(), BusErro
 
 /// Asks for the receipts and waits for the end of the query.
 fn ask(session: &Session, limit: Duration) -> Result<(), BusError> {
-    let replies = session
-        .get(key::ALL_RECEIPTS)
-        .target(QueryTarget::All)
-        .consolidation(ConsolidationMode::None)
-        .allowed_destination(Locality::Remote)
+    let replies = question(session, key::ALL_RECEIPTS, limit)
         .congestion_control(CongestionControl::Block)
-        .priority(Priority::RealTime)
-        .timeout(limit)
         .wait()
         .map_err(|source| BusError::Declare { key: key::ALL_RECEIPTS.to_owned(), source })?;
     // It ends once everybody has let it go, or is not there any more. Zenoh itself replies for those who have not in time.
     if replies.into_iter().any(|reply| reply.result().is_err()) { Err(not_taken(limit)) } else { Ok(()) }
+}
+
+/// A question that travels behind what was published, to all who give receipts on a key.
+fn question<'a>(
+    session: &'a Session,
+    key: &'a str,
+    limit: Duration,
+) -> SessionGetBuilder<'a, 'a, DefaultHandler> {
+    session
+        .get(key)
+        .target(QueryTarget::All)
+        .consolidation(ConsolidationMode::None)
+        .allowed_destination(Locality::Remote)
+        .priority(Priority::RealTime)
+        .timeout(limit)
 }
 
 /// A session that gives receipts and is behind.
@@ -88,14 +99,8 @@ pub async fn behind(session: &Session, limit: Duration) -> Vec<Behind> {
             continue;
         }
         // Dropped where its queue is full: then it is behind, and nobody waits for it.
-        let question = session
-            .get(key::receipt(&name))
-            .target(QueryTarget::All)
-            .consolidation(ConsolidationMode::None)
-            .allowed_destination(Locality::Remote)
-            .congestion_control(CongestionControl::Drop)
-            .priority(Priority::RealTime)
-            .timeout(limit);
+        let key = key::receipt(&name);
+        let question = question(session, &key, limit).congestion_control(CongestionControl::Drop);
         // Where the session is closed nobody is asked.
         if let Ok(replies) = question.await {
             asked.insert(name, (link.dst().to_string(), replies));

@@ -243,11 +243,7 @@ pub fn open_config(config: Config) -> BoxFuture<'static, Result<Session, BusErro
         let started = Instant::now();
         match zenoh::open(config.clone()).await {
             Ok(session) => Ok(session),
-            Err(source) => {
-                let waited = started.elapsed();
-                let known = tokio::task::spawn_blocking(move || obstacle::after(&config, waited, None)).await;
-                Err(known.ok().flatten().unwrap_or(BusError::Open(source)))
-            }
+            Err(source) => Err(obstacle::found(source, config, started.elapsed(), None).await),
         }
     })
 }

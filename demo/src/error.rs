@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use isotherm_bus::BusError;
 use isotherm_protocol::document::Problem;
+use isotherm_protocol::key::UnitId;
 use isotherm_simulator::ScenarioErrors;
 use thiserror::Error;
 
@@ -32,13 +33,8 @@ pub enum DemoError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// The status of a unit did not come.
-    #[error("no status of unit {unit} was received: {reason}")]
-    Status {
-        /// Serial of the unit.
-        unit: String,
-        /// Why.
-        reason: String,
-    },
+    #[error("no status of unit {0} was received: the service does not answer")]
+    Status(UnitId),
     /// The service did not stop in its time.
     #[error("the service did not stop cleanly: see its log")]
     Stop,

@@ -1,6 +1,8 @@
 //! The three units of the demo.
 
-use isotherm_correction::calibration::CalibrationParts;
+use std::sync::Arc;
+
+use isotherm_correction::calibration::{Calibration, CalibrationParts};
 use isotherm_correction::orientation::{Inverse, Orientation, SensorMask};
 use isotherm_correction::sample::{OutputKind, Sensors};
 use isotherm_protocol::document::Document;
@@ -16,69 +18,51 @@ use super::DemoError;
 /// more would.
 const CHAMBER_TICK_NS: i64 = 50_000_000;
 
-/// A calibration document that the program carries, so that the demo runs from any folder.
+/// What a unit is, and what is done to it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shipped {
+pub(crate) struct Kind {
+    /// As it stands in the table and in the JSON.
+    pub(crate) name: &'static str,
+    /// Over what the rate errors are averaged (s of event time): long enough that quantisation and white noise do not hide what
+    /// temperature and mode do, short against both.
+    pub(crate) averaging_s: f64,
+    /// What its gyros' temperature is called.
+    pub(crate) gyros: &'static str,
+    /// Its calibration document, which the program carries, so that the demo runs from any folder.
     pub(crate) file: &'static str,
     pub(crate) text: &'static str,
+    scenario: fn(u64) -> Scenario,
 }
 
-const ZEEMAN: Shipped =
-    Shipped { file: "ZLG-0001.toml", text: include_str!("../../config/calibration/ZLG-0001.toml") };
-const FIBRE_OPTIC: Shipped =
-    Shipped { file: "FOG-0001.toml", text: include_str!("../../config/calibration/FOG-0001.toml") };
-const MEMS: Shipped =
-    Shipped { file: "MEMS-0001.toml", text: include_str!("../../config/calibration/MEMS-0001.toml") };
-
-/// What a unit is, and what is done to it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    ZeemanLaser,
-    FibreOptic,
-    Mems,
-}
-
-impl Kind {
-    pub(crate) const ALL: [Self; 3] = [Self::ZeemanLaser, Self::FibreOptic, Self::Mems];
-
-    /// As it stands in the table and in the JSON.
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::ZeemanLaser => "Zeeman laser",
-            Self::FibreOptic => "fibre-optic",
-            Self::Mems => "MEMS",
-        }
-    }
-
-    /// Over what the rate errors are averaged (s of event time): long enough that quantisation and white noise do
-    /// not hide what temperature and mode do, short against both.
-    pub(crate) const fn averaging_s(self) -> f64 {
-        match self {
-            Self::ZeemanLaser => 1.0,
-            Self::FibreOptic => 100.0,
-            Self::Mems => 60.0,
-        }
-    }
-
-    pub(crate) const fn document(self) -> Shipped {
-        match self {
-            Self::ZeemanLaser => ZEEMAN,
-            Self::FibreOptic => FIBRE_OPTIC,
-            Self::Mems => MEMS,
-        }
-    }
-
-    fn scenario(self, seed: u64) -> Scenario {
-        match self {
-            Self::ZeemanLaser => zeeman_sine(seed),
-            Self::FibreOptic => Scenario {
-                tick_ns: CHAMBER_TICK_NS,
-                ..fibre_optic_chamber(seed.wrapping_add(1), judging_profile())
-            },
-            Self::Mems => Scenario { tick_ns: CHAMBER_TICK_NS, ..mems_chamber(seed.wrapping_add(2)) },
-        }
-    }
-}
+const KINDS: [Kind; 3] = [
+    Kind {
+        name: "Zeeman laser",
+        averaging_s: 1.0,
+        gyros: "gyros",
+        file: "ZLG-0001.toml",
+        text: include_str!("../../config/calibration/ZLG-0001.toml"),
+        scenario: zeeman_sine,
+    },
+    Kind {
+        name: "fibre-optic",
+        averaging_s: 100.0,
+        gyros: "gyro coils, outermost layer",
+        file: "FOG-0001.toml",
+        text: include_str!("../../config/calibration/FOG-0001.toml"),
+        scenario: |seed| Scenario {
+            tick_ns: CHAMBER_TICK_NS,
+            ..fibre_optic_chamber(seed.wrapping_add(1), judging_profile())
+        },
+    },
+    Kind {
+        name: "MEMS",
+        averaging_s: 60.0,
+        gyros: "gyros",
+        file: "MEMS-0001.toml",
+        text: include_str!("../../config/calibration/MEMS-0001.toml"),
+        scenario: |seed| Scenario { tick_ns: CHAMBER_TICK_NS, ..mems_chamber(seed.wrapping_add(2)) },
+    },
+];
 
 /// One unit of the demo.
 #[derive(Debug, Clone)]
@@ -89,6 +73,8 @@ pub(crate) struct Member {
     /// Raw gyro ticks of the whole scenario.
     pub(crate) ticks: u64,
     pub(crate) nominal: Nominal,
+    pub(crate) calibration: Arc<Calibration>,
+    pub(crate) digest: [u8; 8],
 }
 
 impl Member {
@@ -116,16 +102,17 @@ impl Member {
 /// None, unless a shipped document or a scenario is broken, which a test excludes.
 pub(crate) fn fleet(seed: u64) -> Result<Vec<Member>, DemoError> {
     let member = |kind: Kind| {
-        let Shipped { file, text } = kind.document();
+        let Kind { file, text, .. } = kind;
         let parsed = Document::parse(text, Some(file)).map_err(DemoError::Document)?;
         let unusable = || DemoError::Unusable { file };
         let id = UnitId::new(&parsed.document.unit).map_err(|_| unusable())?;
         let nominal = Nominal::new(&parsed.document.to_parts()).ok_or_else(unusable)?;
-        let scenario = Scenario { unit: id.to_string(), ..kind.scenario(seed) };
+        let scenario = Scenario { unit: id.to_string(), ..(kind.scenario)(seed) };
         let ticks = Simulation::new(&scenario)?.remaining();
-        Ok(Member { id, kind, scenario, ticks, nominal })
+        let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
+        Ok(Member { id, kind, scenario, ticks, nominal, calibration: Arc::new(parsed.calibration), digest })
     };
-    Kind::ALL.into_iter().map(member).collect()
+    KINDS.into_iter().map(member).collect()
 }
 
 /// What one would have of the gyros without this project: nominal scale and input axes, nothing else.
@@ -173,11 +160,10 @@ mod tests {
     #[test]
     fn every_unit_has_a_document_that_fits_its_scenario() {
         for member in fleet(1).unwrap() {
-            let parsed = Document::parse(member.kind.document().text, None).unwrap();
             assert_eq!(member.scenario.check(), Vec::new(), "{}", member.id);
-            assert_eq!(parsed.calibration.gyro_count(), member.scenario.instrument.gyros.count());
-            assert_eq!(parsed.calibration.gyro_output(), member.scenario.instrument.gyros.output_kind());
-            assert_eq!(member.kind.document().file, format!("{}.toml", member.id));
+            assert_eq!(member.calibration.gyro_count(), member.scenario.instrument.gyros.count());
+            assert_eq!(member.calibration.gyro_output(), member.scenario.instrument.gyros.output_kind());
+            assert_eq!(member.kind.file, format!("{}.toml", member.id));
         }
     }
 }

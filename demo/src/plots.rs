@@ -1,14 +1,14 @@
 //! The demo's report.
 
 use isotherm_correction::units::Angle;
-use isotherm_pages::{Axis, Chart, Content, Form, Ink, Lane, Page, Panel, Samples, Series, Stretch, Table};
+use isotherm_pages::{Axis, Chart, Content, Ink, Lane, Page, Panel, Series, Stretch, Table};
 
-use super::fleet::{Kind, Member};
+use super::fleet::Member;
 use super::score::{Temperatures, minus};
 use super::summary::{AXES, Summary, UnitSummary, arrow};
 use super::switch::{Switch, Tick};
 use super::watch::Watched;
-use super::windows::{Mean, Spread, Stage, deg_per_h};
+use super::windows::{CORRECTED, Mean, RAW, Spread, Stage, deg_per_h};
 
 /// How much larger the raw error must be for the corrected one to get a diagram of its own.
 const ENLARGE_FROM: f64 = 4.0;
@@ -28,7 +28,7 @@ pub(crate) fn page(summary: &Summary, fleet: &[Member], watched: &[Watched]) -> 
     let (head, rows) = summary.rows();
     page.table(&Table { head, rows });
     for ((unit, member), watched) in summary.units.iter().zip(fleet).zip(watched) {
-        page.heading(&format!("{} unit {}", capitalised(member.kind.name()), member.id));
+        page.heading(&format!("{} unit {}", capitalised(member.kind.name), member.id));
         page.paragraph(&member.story());
         page.chart(&rate_errors(unit, member, watched));
         if let Some(switch) = &watched.scored.switch {
@@ -47,120 +47,104 @@ fn headline(unit: &UnitSummary) -> String {
 fn rate_errors(unit: &UnitSummary, member: &Member, watched: &Watched) -> Chart {
     let means: &[Mean] = &watched.scored.means;
     let size = |stage, axis| Spread::about(means, stage, axis).peak_to_peak_deg_per_h;
-    let axis = (0..3).max_by(|&a, &b| size(Stage::Raw, a).total_cmp(&size(Stage::Raw, b))).unwrap_or(0);
+    let axis = (0..3).max_by(|&a, &b| size(RAW, a).total_cmp(&size(RAW, b))).unwrap_or(0);
 
-    let error = |stage, name, ink| {
-        curve(name, ink, means.iter().map(|mean| (mean.time_s, deg_per_h(mean.error(stage)[axis]))))
+    let error = |stage: Stage, name, ink| {
+        Series::line(name, ink, means.iter().map(|mean| (mean.time_s, deg_per_h(stage(mean)[axis]))))
     };
-    let raw = || error(Stage::Raw, "raw", Ink::Raw);
-    let corrected = || error(Stage::Corrected, "corrected", Ink::Corrected);
-    let truth = || curve("truth", Ink::Truth, [(0.0, 0.0), (member.scenario.duration_s, 0.0)]);
+    let raw = || error(RAW, "raw", Ink::Raw);
+    let corrected = || error(CORRECTED, "corrected", Ink::Corrected);
+    let truth = || Series::line("truth", Ink::Truth, [(0.0, 0.0), (member.scenario.duration_s, 0.0)]);
 
-    let mut panels = vec![panel("rate error", "°/h", 210, vec![raw(), corrected(), truth()])];
-    if size(Stage::Raw, axis) > ENLARGE_FROM * size(Stage::Corrected, axis) {
-        panels.push(panel("rate error, corrected alone", "°/h", 140, vec![corrected(), truth()]));
+    let mut panels = vec![Panel::of("rate error", "°/h", 210, vec![raw(), corrected(), truth()])];
+    if size(RAW, axis) > ENLARGE_FROM * size(CORRECTED, axis) {
+        panels.push(Panel::of("rate error, corrected alone", "°/h", 140, vec![corrected(), truth()]));
     }
     panels.push(temperatures(member, watched));
-    Chart {
-        caption: format!(
+    Chart::of(
+        format!(
             "Rate error of {} about the {} axis, the worst of the three: means over {} s of event time. \
              Below: temperature.",
             member.id, AXES[axis], unit.averaging_s
         ),
-        x: Axis::of("event time", "s"),
+        Axis::of("event time", "s"),
         panels,
-        marks: Vec::new(),
-    }
+    )
 }
 
 fn temperatures(member: &Member, watched: &Watched) -> Panel {
-    let gyros = if member.kind == Kind::FibreOptic { "gyro coils, outermost layer" } else { "gyros" };
     let readings = &watched.scored.temperatures;
     let of = |name, ink, value: fn(&Temperatures) -> f64| {
-        curve(name, ink, readings.iter().map(|reading| (reading.time_s, value(reading))))
+        Series::line(name, ink, readings.iter().map(|reading| (reading.time_s, value(reading))))
     };
     let curves = vec![
         of("chamber", Ink::Second, |reading| reading.chamber),
-        of(gyros, Ink::First, |reading| reading.gyros),
+        of(member.kind.gyros, Ink::First, |reading| reading.gyros),
         of("board", Ink::Third, |reading| reading.board),
     ];
-    panel("temperature", "°C", 120, curves)
+    Panel::of("temperature", "°C", 120, curves)
 }
 
 /// Increments around one mode switch, and the angle error that they add up to.
 fn mode_switch(switch: &Switch) -> Chart {
     // The axis about which the lost counts do most harm.
     let harm = |axis: usize| {
-        switch.ticks.iter().map(|tick| (tick.raw[axis] - tick.truth[axis]).abs()).fold(0.0, f64::max)
+        let off = |tick: &Tick| (tick.sent.raw[axis] - tick.sent.truth[axis]).abs();
+        switch.ticks.iter().map(off).fold(0.0, f64::max)
     };
     let axis = (0..3).max_by(|&a, &b| harm(a).total_cmp(&harm(b))).unwrap_or(0);
     let time_ms = |end_s: f64| (end_s - switch.command_s) * 1e3;
     let increments = |name, ink, of: fn(&Tick) -> [f64; 3]| {
-        curve(name, ink, switch.ticks.iter().map(|tick| (time_ms(tick.end_s), arcsec(of(tick)[axis]))))
+        let points = switch.ticks.iter().map(|tick| (time_ms(tick.sent.end_s), arcsec(of(tick)[axis])));
+        Series::line(name, ink, points)
     };
     let interpolated = switch.ticks.iter().filter(|tick| tick.interpolated);
     let accumulated = |name, ink, of: fn(&Tick) -> [f64; 3]| {
         let sums = switch.ticks.iter().scan(0.0, |sum, tick| {
-            *sum += arcsec(minus(of(tick), tick.truth)[axis]);
-            Some((time_ms(tick.end_s), *sum))
+            *sum += arcsec(minus(of(tick), tick.sent.truth)[axis]);
+            Some((time_ms(tick.sent.end_s), *sum))
         });
-        curve(name, ink, sums)
+        Series::line(name, ink, sums)
     };
-    let to = interpolated.map(|tick| time_ms(tick.end_s)).fold(0.0, f64::max);
+    let to = interpolated.map(|tick| time_ms(tick.sent.end_s)).fold(0.0, f64::max);
     let predicted = Stretch { from: 0.0, to, label: "predicted".to_owned(), ink: Ink::Third };
     let lanes = vec![Lane::Stretches { name: "counts".to_owned(), stretches: vec![predicted] }];
     let total = |of: fn(&Tick) -> [f64; 3]| {
-        switch.ticks.iter().map(|tick| arcsec(minus(of(tick), tick.truth)[axis])).sum::<f64>()
+        switch.ticks.iter().map(|tick| arcsec(minus(of(tick), tick.sent.truth)[axis])).sum::<f64>()
     };
-    Chart {
-        caption: format!(
+    Chart::of(
+        format!(
             "One mode switch, {} axis. The counts of the ticks in the bar are meaningless and are predicted; the \
              two-sided fit then restores their angle. Angle error at the right edge: raw {}″, corrected {}″ (what \
              remains is quantisation, about 2″ per count).",
             AXES[axis],
-            signed(total(|tick| tick.raw)),
+            signed(total(|tick| tick.sent.raw)),
             signed(total(|tick| tick.corrected)),
         ),
-        x: Axis::of("event time from the switch command", "ms"),
-        panels: vec![
-            panel(
+        Axis::of("event time from the switch command", "ms"),
+        vec![
+            Panel::of(
                 "angle increments",
                 "″ per tick",
                 190,
                 vec![
-                    increments("raw", Ink::Raw, |tick| tick.raw),
+                    increments("raw", Ink::Raw, |tick| tick.sent.raw),
                     increments("corrected", Ink::Corrected, |tick| tick.corrected),
-                    increments("truth", Ink::Truth, |tick| tick.truth),
+                    increments("truth", Ink::Truth, |tick| tick.sent.truth),
                 ],
             ),
-            Panel {
-                title: String::new(),
-                unit: String::new(),
-                height: 0,
-                logarithmic: false,
-                content: Content::Lanes(lanes),
-            },
-            panel(
+            Panel { content: Content::Lanes(lanes), ..Panel::of("", "", 0, Vec::new()) },
+            Panel::of(
                 "accumulated angle error",
                 "″",
                 130,
                 vec![
-                    accumulated("raw", Ink::Raw, |tick| tick.raw),
+                    accumulated("raw", Ink::Raw, |tick| tick.sent.raw),
                     accumulated("corrected", Ink::Corrected, |tick| tick.corrected),
                 ],
             ),
         ],
-        marks: Vec::new(),
-    }
-}
-
-fn panel(title: &str, unit: &str, height: u32, curves: Vec<Series>) -> Panel {
-    let content = Content::Series(curves);
-    Panel { title: title.to_owned(), unit: unit.to_owned(), height, logarithmic: false, content }
-}
-
-fn curve(name: &str, ink: Ink, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-    Series { name: name.to_owned(), ink, form: Form::Line, samples: Samples::points(points) }
+    )
 }
 
 fn arcsec(rad: f64) -> f64 {

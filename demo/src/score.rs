@@ -12,7 +12,7 @@ use super::switch::{Switch, SwitchWatch, Tick};
 use super::windows::{Mean, Windows};
 
 /// A raw tick that is about to be sent, as far as the account needs it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SentTick {
     pub(crate) sequence: u64,
     /// End of the tick after the start of the run (s of event time).
@@ -111,12 +111,12 @@ impl Score {
             if self.expected.front().is_some_and(|sent| sent.sequence == tick.sequence)
                 && let Some(sent) = self.expected.pop_front()
             {
-                self.compare(&sent, tick);
+                self.compare(sent, tick);
             }
         }
     }
 
-    fn compare(&mut self, sent: &SentTick, tick: &CorrectedTick) {
+    fn compare(&mut self, sent: SentTick, tick: &CorrectedTick) {
         let corrected = tick.delta_angle;
         self.windows.add(
             sent.end_s,
@@ -124,14 +124,8 @@ impl Score {
             minus(sent.raw, sent.truth),
             minus(corrected, sent.truth),
         );
-        self.switches.push(Tick {
-            end_s: sent.end_s,
-            raw: sent.raw,
-            corrected,
-            truth: sent.truth,
-            switch_command: sent.switch_command,
-            interpolated: tick.flags.contains(TickFlags::INTERPOLATED),
-        });
+        let interpolated = tick.flags.contains(TickFlags::INTERPOLATED);
+        self.switches.push(Tick { sent, corrected, interpolated });
     }
 
     /// Raw ticks sent.

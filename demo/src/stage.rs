@@ -4,10 +4,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use isotherm_bus::{Consumer, SessionOptions, presence};
-use isotherm_protocol::codec;
-use isotherm_protocol::document::Document;
-use isotherm_protocol::key;
-use isotherm_protocol::status::Status;
 use zenoh::Session;
 
 use isotherm_service::control::revision::Calibrations;
@@ -31,10 +27,7 @@ impl Stage {
     pub(crate) async fn open(fleet: &[Member]) -> Result<Self, DemoError> {
         let mut calibrations = Calibrations::default();
         for member in fleet {
-            let shipped = member.kind.document();
-            let parsed = Document::parse(shipped.text, Some(shipped.file)).map_err(DemoError::Document)?;
-            let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
-            calibrations.insert(member.id.clone(), Arc::new(parsed.calibration), digest);
+            calibrations.insert(member.id.clone(), Arc::clone(&member.calibration), member.digest);
         }
         let settings = Settings::default();
         let session = isotherm_bus::open(&settings.zenoh.session).await?;
@@ -54,25 +47,11 @@ impl Stage {
     pub(crate) async fn added_latencies(&self, fleet: &[Member]) -> Result<Vec<[u64; 2]>, DemoError> {
         let mut latencies = Vec::new();
         for member in fleet {
-            let status = self
-                .status(member)
-                .await
-                .map_err(|reason| DemoError::Status { unit: member.id.to_string(), reason })?;
+            let status = presence::status(&self.session, &member.id, ANSWER_LIMIT).await;
+            let status = status.ok_or_else(|| DemoError::Status(member.id.clone()))?;
             latencies.push([status.latency.p50_ns, status.latency.p99_ns]);
         }
         Ok(latencies)
-    }
-
-    async fn status(&self, member: &Member) -> Result<Status, String> {
-        let replies = self
-            .session
-            .get(key::status(&member.id))
-            .timeout(ANSWER_LIMIT)
-            .await
-            .map_err(|error| error.to_string())?;
-        let reply = replies.recv_async().await.map_err(|_| "the service does not answer".to_owned())?;
-        let sample = reply.result().map_err(|error| format!("the service refuses: {error}"))?;
-        codec::decode(&sample.payload().to_bytes()).map_err(|error| error.to_string())
     }
 
     /// Ends the subscription, then the service.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::fleet::Member;
 use super::produce::Pace;
 use super::watch::Watched;
-use super::windows::{Mean, Spread, Stage};
+use super::windows::{CORRECTED, Mean, RAW, Spread};
 
 /// Names of the case axes.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -72,17 +72,17 @@ impl UnitSummary {
     pub(crate) fn new(member: &Member, pace: Pace, watched: &Watched, added_latency_ns: [u64; 2]) -> Self {
         let Watched { scored, continuity } = watched;
         let means: &[Mean] = &scored.means;
-        let [raw, corrected] = [Stage::Raw, Stage::Corrected].map(|stage| Spread::overall(means, stage));
+        let [raw, corrected] = [RAW, CORRECTED].map(|stage| Spread::overall(means, stage));
         let axis = |(axis, index)| AxisSummary {
             axis,
-            raw: Spread::about(means, Stage::Raw, index),
-            corrected: Spread::about(means, Stage::Corrected, index),
+            raw: Spread::about(means, RAW, index),
+            corrected: Spread::about(means, CORRECTED, index),
         };
         let [added_latency_p50_us, added_latency_p99_us] = added_latency_ns.map(microseconds);
         let [end_to_end_p50_us, end_to_end_p99_us] = scored.end_to_end_ns.map(microseconds);
         Self {
             unit: member.id.to_string(),
-            kind: member.kind.name(),
+            kind: member.kind.name,
             ticks_in: scored.sent,
             ticks_out: continuity.ticks,
             gaps: continuity.announced_missing,
@@ -94,7 +94,7 @@ impl UnitSummary {
             duplicated: continuity.duplicated,
             event_s: member.scenario.duration_s,
             compression: pace.compression,
-            averaging_s: member.kind.averaging_s(),
+            averaging_s: member.kind.averaging_s,
             raw_rms_deg_per_h: raw.rms_deg_per_h,
             corrected_rms_deg_per_h: corrected.rms_deg_per_h,
             raw_peak_to_peak_deg_per_h: raw.peak_to_peak_deg_per_h,

@@ -2,20 +2,18 @@
 
 use std::collections::VecDeque;
 
+use super::score::SentTick;
+
 /// Ticks shown before the switch command.
 const BEFORE: usize = 16;
 /// Ticks shown from the switch command on.
 const AFTER: usize = 32;
 
-/// One tick: angle increments about the case axes (rad).
+/// One tick, and the corrected angle increments about the case axes (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tick {
-    /// End after the start of the run (s of event time).
-    pub(crate) end_s: f64,
-    pub(crate) raw: [f64; 3],
+    pub(crate) sent: SentTick,
     pub(crate) corrected: [f64; 3],
-    pub(crate) truth: [f64; 3],
-    pub(crate) switch_command: bool,
     pub(crate) interpolated: bool,
 }
 
@@ -39,8 +37,8 @@ impl SwitchWatch {
     pub(crate) fn push(&mut self, tick: Tick) {
         match &mut self.open {
             Some(open) => open.ticks.push(tick),
-            None if tick.switch_command && self.before.len() == BEFORE => {
-                let command_s = self.before.back().map_or(tick.end_s, |last| last.end_s);
+            None if tick.sent.switch_command && self.before.len() == BEFORE => {
+                let command_s = self.before.back().map_or(tick.sent.end_s, |last| last.sent.end_s);
                 let ticks = self.before.iter().copied().chain([tick]).collect();
                 self.open = Some(Switch { ticks, command_s });
             }
@@ -78,19 +76,19 @@ mod tests {
             let since = index % 100;
             let interpolated = since < if (200..500).contains(&index) { 3 } else { 2 };
             let end_s = f64::from(index + 1);
-            let tick = Tick {
+            let sent = SentTick {
+                sequence: index.into(),
                 end_s,
+                duration_s: 1.0,
                 raw: [0.0; 3],
-                corrected: [0.0; 3],
                 truth: [0.0; 3],
                 switch_command: since == 0,
-                interpolated,
             };
-            watch.push(tick);
+            watch.push(Tick { sent, corrected: [0.0; 3], interpolated });
         }
         let switch = watch.finish().unwrap();
         assert_eq!(switch.ticks.len(), BEFORE + AFTER);
         assert!((switch.command_s - 200.0).abs() < 1e-12);
-        assert!(switch.ticks[BEFORE].switch_command && switch.ticks[BEFORE].interpolated);
+        assert!(switch.ticks[BEFORE].sent.switch_command && switch.ticks[BEFORE].interpolated);
     }
 }

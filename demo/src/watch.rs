@@ -8,7 +8,7 @@ use tokio::sync::mpsc::UnboundedReceiver;
 
 use super::fleet::Member;
 use super::score::{Score, Scored, SentBatch};
-use super::windows::{Stage, deg_per_h};
+use super::windows::{deg_per_h, over_axes};
 
 /// How long nothing may arrive after the last producer has ended before the rest counts as lost.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -72,8 +72,8 @@ impl<'a> Tally<'a> {
         let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─");
         let tally = |member: &'a Member| {
             let bar = bars.add(ProgressBar::new(member.ticks).with_style(style.clone()));
-            bar.set_prefix(format!("{} {}", member.id, member.kind.name()));
-            Tally { member, score: Score::new(member.kind.averaging_s()), bar }
+            bar.set_prefix(format!("{} {}", member.id, member.kind.name));
+            Tally { member, score: Score::new(member.kind.averaging_s), bar }
         };
         fleet.iter().map(tally).collect()
     }
@@ -84,8 +84,7 @@ impl<'a> Tally<'a> {
         }
         let out = consumer.continuity(&self.member.id).ticks;
         let error = self.score.latest().map_or_else(String::new, |mean| {
-            let [raw, corrected] =
-                [Stage::Raw, Stage::Corrected].map(|stage| deg_per_h(mean.over_axes(stage)));
+            let [raw, corrected] = [mean.raw, mean.corrected].map(|error| deg_per_h(over_axes(error)));
             format!("  raw {raw:.2} → {corrected:.2} °/h")
         });
         self.bar.set_position(out);

@@ -14,24 +14,13 @@ pub(crate) struct Mean {
 }
 
 /// Which of the two errors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Stage {
-    Raw,
-    Corrected,
-}
+pub(crate) type Stage = fn(&Mean) -> [f64; 3];
+pub(crate) const RAW: Stage = |mean| mean.raw;
+pub(crate) const CORRECTED: Stage = |mean| mean.corrected;
 
-impl Mean {
-    pub(crate) fn error(&self, stage: Stage) -> [f64; 3] {
-        match stage {
-            Stage::Raw => self.raw,
-            Stage::Corrected => self.corrected,
-        }
-    }
-
-    /// Root mean square over the three axes (rad/s).
-    pub(crate) fn over_axes(&self, stage: Stage) -> f64 {
-        (self.error(stage).iter().map(|error| error * error).sum::<f64>() / 3.0).sqrt()
-    }
+/// Root mean square over the three axes.
+pub(crate) fn over_axes(error: [f64; 3]) -> f64 {
+    (error.iter().map(|error| error * error).sum::<f64>() / 3.0).sqrt()
 }
 
 /// Sums the angle errors of the ticks into windows of equal length.
@@ -116,12 +105,12 @@ impl Spread {
 
     /// About one axis.
     pub(crate) fn about(means: &[Mean], stage: Stage, axis: usize) -> Self {
-        Self::of(means.iter().map(|mean| mean.error(stage)[axis]))
+        Self::of(means.iter().map(|mean| stage(mean)[axis]))
     }
 
     /// Root mean square over all three axes; peak to peak about the axis where it is largest.
     pub(crate) fn overall(means: &[Mean], stage: Stage) -> Self {
-        let rms = Self::of(means.iter().map(|mean| mean.over_axes(stage))).rms_deg_per_h;
+        let rms = Self::of(means.iter().map(|mean| over_axes(stage(mean)))).rms_deg_per_h;
         let axes = (0..3).map(|axis| Self::about(means, stage, axis).peak_to_peak_deg_per_h);
         Self { rms_deg_per_h: rms, peak_to_peak_deg_per_h: axes.fold(0.0, f64::max) }
     }
@@ -150,19 +139,19 @@ mod tests {
         let means = windows.finish();
         assert_eq!(means.len(), 5);
         assert!((means[1].time_s - 1.5).abs() < 1e-12);
-        let raw = Spread::overall(&means, Stage::Raw);
+        let raw = Spread::overall(&means, RAW);
         assert!((raw.rms_deg_per_h - 3.0).abs() < 1e-9 && raw.peak_to_peak_deg_per_h < 1e-9, "{raw:?}");
-        assert_eq!(Spread::overall(&means, Stage::Corrected), Spread::default());
+        assert_eq!(Spread::overall(&means, CORRECTED), Spread::default());
     }
 
     #[test]
     fn rms_is_over_all_axes_and_peak_to_peak_of_the_worst_one() {
         let mean = |raw: [f64; 3]| Mean { time_s: 0.0, raw: raw.map(rad_per_s), corrected: [0.0; 3] };
         let means = [mean([1.0, 2.0, 2.0]), mean([-1.0, -2.0, 2.0])];
-        let raw = Spread::overall(&means, Stage::Raw);
+        let raw = Spread::overall(&means, RAW);
         assert!((raw.rms_deg_per_h - 3.0_f64.sqrt()).abs() < 1e-9, "{raw:?}");
         assert!((raw.peak_to_peak_deg_per_h - 4.0).abs() < 1e-9, "{raw:?}");
-        assert_eq!(Spread::overall(&[], Stage::Raw), Spread::default());
+        assert_eq!(Spread::overall(&[], RAW), Spread::default());
     }
 
     #[test]

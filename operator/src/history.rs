@@ -108,40 +108,29 @@ fn table(entries: &[AuditEntry]) -> String {
 /// One line of the table, and what changed.
 fn row(entry: &AuditEntry) -> (Vec<String>, String) {
     let AuditEntry { number, time, by, event, .. } = entry;
-    let [revision, digest, from, changes] = match event {
-        AuditEvent::Accepted(accepted) => [
-            accepted.revision.to_string(),
-            short(&accepted.digest),
-            source(&accepted.source),
+    let (revision, document, changes) = match event {
+        AuditEvent::Accepted(accepted) => (
+            Some(accepted.revision),
+            Some((&accepted.digest, &accepted.source)),
             effect(accepted.schedule, accepted.slew_ms, &accepted.changed),
-        ],
-        AuditEvent::InForce(first) => [
-            first.revision.to_string(),
-            String::new(),
-            String::new(),
-            format!("from tick {} on", first.first_sequence),
-        ],
-        AuditEvent::Withdrawn(withdrawal) => {
-            [withdrawal.revision.to_string(), String::new(), String::new(), event.to_string()]
+        ),
+        AuditEvent::InForce(first) => {
+            (Some(first.revision), None, format!("from tick {} on", first.first_sequence))
         }
-        AuditEvent::Refused(refused) => [
-            String::new(),
-            short(&refused.digest),
-            source(&refused.source),
-            format!(
-                "{}: {}",
-                of(usize::try_from(refused.count).unwrap_or(usize::MAX), "problem"),
-                refused.problems.first().map_or("", String::as_str)
-            ),
-        ],
-        AuditEvent::Command(command) => [
-            String::new(),
-            String::new(),
-            String::new(),
-            format!("{} → {}", command.command, command.reason.as_deref().unwrap_or(&command.state_after)),
-        ],
-        _ => [String::new(), String::new(), String::new(), event.to_string()],
+        AuditEvent::Withdrawn(withdrawal) => (Some(withdrawal.revision), None, event.to_string()),
+        AuditEvent::Refused(refused) => {
+            let problems = of(usize::try_from(refused.count).unwrap_or(usize::MAX), "problem");
+            let first = refused.problems.first().map_or("", String::as_str);
+            (None, Some((&refused.digest, &refused.source)), format!("{problems}: {first}"))
+        }
+        AuditEvent::Command(command) => {
+            let became = command.reason.as_deref().unwrap_or(&command.state_after);
+            (None, None, format!("{} → {became}", command.command))
+        }
+        _ => (None, None, event.to_string()),
     };
+    let revision = revision.map_or_else(String::new, |revision| revision.to_string());
+    let (digest, from) = document.map(|(digest, from)| (short(digest), source(from))).unwrap_or_default();
     // To the second; the JSON has the rest.
     let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
     let cut = |text: &str| page::fit(text, LONGEST_NAME);

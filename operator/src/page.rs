@@ -60,18 +60,6 @@ impl<'a> Unit<'a> {
         let (age, lately) = (Duration::ZERO, Lately::default());
         Self { status, age, gone: None, now_unix_ms, lately, past: &[] }
     }
-
-    /// What is to be noticed, the gravest first.
-    #[must_use]
-    pub fn remarks(&self) -> Vec<Remark> {
-        remark::remarks(self)
-    }
-
-    /// How it is, taken all together.
-    #[must_use]
-    pub fn level(&self) -> Level {
-        remark::level(self, &self.remarks())
-    }
 }
 
 /// Counters that stand in the line of a unit: by how much they grew over the last minute.

@@ -77,7 +77,7 @@ async fn show(feed: &mut Feed, every: Duration) -> std::io::Result<()> {
             event = keys.next() => {
                 match view.take(&event?) {
                     Act::Quit => return Ok(()),
-                    Act::Clear => screen.clear()?,
+                    Act::Clear => screen.terminal.clear()?,
                     Act::Draw => {}
                     Act::Nothing => continue,
                 }
@@ -98,6 +98,6 @@ async fn show(feed: &mut Feed, every: Duration) -> std::io::Result<()> {
         }
         let (now, now_unix_ms) = (Instant::now(), unix_ms());
         fleet.forget(now);
-        screen.draw(|frame| draw::draw(frame, &fleet, &mut view, now, now_unix_ms))?;
+        screen.terminal.draw(|frame| draw::draw(frame, &fleet, &mut view, now, now_unix_ms))?;
     }
 }

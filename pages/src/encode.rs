@@ -2,23 +2,19 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::sync::Arc;
 
 use base64ct::{Base64Unpadded, Encoding};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use serde_json::{Value, json};
 
-use super::chart::{Bits, Chart, Content, Lane, Panel, Places, Samples, Series};
+use super::chart::{Chart, Content, Lane, Panel, Places, Samples, Series};
 
 /// The numbers of a page, each list once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Store {
     /// Each list: kind of its numbers; they themselves, compressed, as base64.
     lists: Vec<(&'static str, String)>,
-    /// Lists that may be given again, with their index. They are kept so that no other can take their place in memory.
-    places: Vec<(Arc<[f64]>, Value)>,
-    bits: Vec<(Arc<Bits>, Value)>,
 }
 
 impl Store {
@@ -68,7 +64,7 @@ impl Store {
         match lane {
             Lane::Stretches { name, stretches } => json!({ "name": name, "stretches": stretches }),
             Lane::Bit { name, ink, bit, bits, places } => {
-                let list = self.flags(bits);
+                let list = json!({ "list": self.add("u32", &bits.0.iter().map(|bits| bits.to_le_bytes())) });
                 let samples = match places {
                     Places::Points(x) => json!({ "x": self.places(x), "bits": list }),
                     Places::Bins { first, width } => json!({ "first": first, "width": width, "bits": list }),
@@ -78,13 +74,8 @@ impl Store {
         }
     }
 
-    fn places(&mut self, list: &Arc<[f64]>) -> Value {
-        if let Some((_, value)) = self.places.iter().find(|(known, _)| Arc::ptr_eq(known, list)) {
-            return value.clone();
-        }
-        let value = json!({ "list": self.add("f64", &list.iter().map(|value| value.to_le_bytes())) });
-        self.places.push((Arc::clone(list), value.clone()));
-        value
+    fn places(&mut self, list: &[f64]) -> Value {
+        json!({ "list": self.add("f64", &list.iter().map(|value| value.to_le_bytes())) })
     }
 
     /// Values as their distances from a middle one, each to 2·10⁻⁶ of itself: what is left of single precision without its last
@@ -99,15 +90,6 @@ impl Store {
         let short = |value| f32::from_bits((distance(value) as f32).to_bits() & !0xf);
         let values = list.iter().map(|value| short(value).to_le_bytes());
         json!({ "list": self.add("f32", &values), "middle": middle })
-    }
-
-    fn flags(&mut self, bits: &Arc<Bits>) -> Value {
-        if let Some((_, value)) = self.bits.iter().find(|(known, _)| Arc::ptr_eq(known, bits)) {
-            return value.clone();
-        }
-        let value = json!({ "list": self.add("u32", &bits.0.iter().map(|bits| bits.to_le_bytes())) });
-        self.bits.push((Arc::clone(bits), value.clone()));
-        value
     }
 
     /// Takes a list of numbers of a kind, in bytes; its index. Equal lists are one.

@@ -5,7 +5,21 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::part::{Format, Pace, Plan};
+use super::subject::Subject;
+use crate::part::Plan;
+
+/// When the source publishes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Pace {
+    /// All units at the same moment, one after the other.
+    #[default]
+    Burst,
+    /// As fast as it can be done, for so long at most (ms).
+    Saturated {
+        /// How long (ms).
+        limit_ms: u64,
+    },
+}
 
 /// What goes on beside the ticks: compared with the same without it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,7 +33,7 @@ pub(crate) enum Beside {
 }
 
 /// A load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
     /// Units.
     pub(crate) units: usize,
@@ -52,17 +66,7 @@ const KEPT: usize = 200_000;
 impl Case {
     /// Units at a rate, for so many seconds.
     pub(crate) fn paced(units: usize, rate_hz: u32, batch: usize, seconds: f64) -> Self {
-        Self {
-            units,
-            rate_hz,
-            batch,
-            pace: Pace::Burst,
-            seconds,
-            ticks: 0,
-            beside: None,
-            state: true,
-            timed_swaps: 0,
-        }
+        Self { units, rate_hz, batch, seconds, state: true, ..Self::default() }
     }
 
     /// As much as will go through, at most so many ticks of all units in so many seconds.
@@ -96,12 +100,24 @@ impl Case {
         Duration::from_secs_f64(4.0 * (self.seconds + WARM_UP_S) + 10.0)
     }
 
+    /// Whether as much is sent as will go through.
+    pub(crate) fn is_saturated(&self) -> bool {
+        self.pace != Pace::Burst
+    }
+
+    /// Duration of a tick (ns).
+    pub(crate) fn tick_ns(&self) -> u64 {
+        1_000_000_000 / u64::from(self.rate_hz)
+    }
+
+    /// Time between two messages of a unit (ns).
+    pub(crate) fn period_ns(&self) -> u64 {
+        self.tick_ns() * self.batch as u64
+    }
+
     /// Messages of each unit that are sent before latency counts.
     pub(crate) fn warm_up_messages(&self) -> usize {
-        match self.pace {
-            Pace::Saturated { .. } => 0,
-            Pace::Burst => self.messages_in(WARM_UP_S),
-        }
+        if self.is_saturated() { 0 } else { self.messages_in(WARM_UP_S) }
     }
 
     #[expect(
@@ -115,27 +131,21 @@ impl Case {
     }
 
     /// What the parts are to do.
-    pub(crate) fn plan(&self, folder: &Path, format: Format) -> Plan {
-        let saturated = matches!(self.pace, Pace::Saturated { .. });
-        let messages =
-            if saturated { self.ticks / self.batch } else { self.messages_in(WARM_UP_S + self.seconds) };
+    pub(crate) fn plan(&self, folder: &Path, subject: Subject) -> Plan {
+        let messages = if self.is_saturated() {
+            self.ticks / self.batch
+        } else {
+            self.messages_in(WARM_UP_S + self.seconds)
+        };
         let prelude = self.messages_in(PRELUDE_S) + 1;
         Plan {
-            units: self.units,
-            rate_hz: self.rate_hz,
-            batch: self.batch,
+            case: self.clone(),
+            subject,
             messages: prelude + messages.max(1),
             prelude,
-            pace: self.pace,
-            block: saturated,
             connect: Vec::new(),
             folder: folder.to_owned(),
             keep: CHECKED.min(KEPT.div_ceil(self.units)),
-            format,
-            declare_keys: false,
-            state: self.state,
-            web: self.beside == Some(Beside::Pages),
-            pair: self.beside == Some(Beside::Standby),
         }
     }
 }

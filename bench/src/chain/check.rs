@@ -19,7 +19,7 @@ use super::subject::{Subject, document};
 use crate::error::Error;
 use crate::part::frames::{Instrument, Message};
 use crate::part::head::{PLAIN_HEAD, PLAIN_TICK};
-use crate::part::{Kept, Plan, Received, open, read_kept, runtime, unit_name};
+use crate::part::{Kept, Plan, Received, open, runtime, unit_name};
 
 /// How long both services may take to say what they are.
 const ANSWER_LIMIT: Duration = Duration::from_secs(5);
@@ -29,36 +29,31 @@ const MOST_UNITS: usize = 100;
 const LARGEST_DIFFERENCE: f64 = 1e-15;
 
 /// Each tick at most once and in order; the first of each unit as an offline correction of the same frames gives them.
-pub(crate) fn check(plan: &Plan, subject: Subject, received: &Received) -> Result<(), Error> {
-    let wrong = |what: String| Error::Output { subject: subject.name().to_owned(), what };
+pub(crate) fn check(plan: &Plan, received: &Received) -> Result<(), Error> {
+    let wrong = |what: String| plan.subject.wrong(what);
     let Received { duplicates, disordered, strange, ticks, .. } = *received;
     if duplicates + disordered + strange > 0 || ticks == 0 {
         return Err(wrong(format!(
             "{ticks} ticks came, {duplicates} of them twice, {disordered} out of order; {strange} messages were none of the bench"
         )));
     }
-    let instrument = Instrument::simulate(plan.rate_hz)?;
+    let instrument = Instrument::simulate(plan.case.rate_hz)?;
     let mut by_unit: BTreeMap<usize, Vec<Kept>> = BTreeMap::new();
-    for kept in read_kept(&plan.folder.join("kept.bin"))? {
+    for kept in plan.load::<Vec<Kept>>("kept.bin")? {
         by_unit.entry(kept.unit).or_default().push(kept);
     }
     let every = by_unit.len().div_ceil(MOST_UNITS).max(1);
     for (unit, kept) in by_unit.into_iter().step_by(every) {
         // The first output waits for the pairing window: what is behind it belongs to it.
-        let messages = (plan.keep * 2).div_ceil(plan.batch).min(plan.messages);
-        let sent = (0..messages).map(|index| instrument.message(plan, unit, index));
+        let messages = (plan.keep * 2).div_ceil(plan.case.batch).min(plan.messages);
+        let sent = (0..messages).map(|index| instrument.message(&plan.case, unit, index));
         let sent: Vec<Message> = sent.collect::<Result<_, _>>()?;
-        match subject {
+        match plan.subject {
             Subject::Relay | Subject::Keyed => relayed(&sent, &kept),
             Subject::Service => corrected(unit, &sent, &kept)?,
             Subject::Python => plain(&sent, &kept),
         }
-        .map_err(|what| {
-            wrong(format!(
-                "{}: {what}",
-                unit_name(unit).map_or_else(|_| unit.to_string(), |id| id.to_string())
-            ))
-        })?;
+        .map_err(|what| wrong(format!("unit {unit}: {what}")))?;
     }
     Ok(())
 }
@@ -71,10 +66,10 @@ pub(crate) fn is_pair(plan: &Plan) -> Result<(), Error> {
     let follows =
         |unit: &&UnitRole| unit.role == Role::Standby && unit.ticks_compared > 0 && unit.ticks_differing == 0;
     match all.filter(follows).count() {
-        count if count == plan.units => Ok(()),
+        count if count == plan.case.units => Ok(()),
         count => {
-            let what = format!("{count} of {} units are followed by the standby: {reports:?}", plan.units);
-            Err(Error::Output { subject: Subject::Service.name().to_owned(), what })
+            let of = plan.case.units;
+            Err(plan.subject.wrong(format!("{count} of {of} units are followed by the standby: {reports:?}")))
         }
     }
 }
@@ -107,17 +102,17 @@ fn without_gap(tick: &CorrectedTick) -> CorrectedTick {
 
 /// What an offline correction gives, by sequence number.
 pub(crate) fn offline(unit: usize, sent: &[Message]) -> Result<BTreeMap<u64, CorrectedTick>, Error> {
-    let parsed = Document::parse(&document(unit, 0)?, None)
-        .map_err(|problems| Error::Part { part: "document", what: format!("{problems:?}") })?;
+    let parsed = Document::parse(&document(unit, 0)?, None);
+    let parsed = parsed.map_err(|problems| Error::of("document")(format!("{problems:?}")))?;
     let mut stream = UnitStream::new(unit_name(unit)?, UnitSettings::default());
     stream.install(Arc::new(parsed.calibration), [0; 8]);
-    let bad = |error: codec::CodecError| Error::Part { part: "offline correction", what: error.to_string() };
+    let bad = Error::of("offline correction");
     for message in sent {
         if let Some(frame) = &message.temperatures {
-            stream.receive(RawStream::Temperature, frame).map_err(bad)?;
+            stream.receive(RawStream::Temperature, frame).map_err(&bad)?;
         }
-        stream.receive(RawStream::Accel, &message.accel).map_err(bad)?;
-        stream.receive(RawStream::Gyro, &message.gyro).map_err(bad)?;
+        stream.receive(RawStream::Accel, &message.accel).map_err(&bad)?;
+        stream.receive(RawStream::Gyro, &message.gyro).map_err(&bad)?;
     }
     stream.flush();
     Ok(stream
@@ -159,36 +154,19 @@ mod tests {
     use isotherm_protocol::corrected::Revision;
 
     use super::*;
-    use crate::part::{Format, Pace};
+    use crate::chain::Case;
 
-    fn sent() -> (Plan, Vec<Message>) {
-        let plan = Plan {
-            units: 1,
-            rate_hz: 1000,
-            batch: 2,
-            messages: 100,
-            prelude: 0,
-            pace: Pace::Burst,
-            block: false,
-            connect: Vec::new(),
-            folder: std::path::PathBuf::new(),
-            keep: 10,
-            format: Format::Raw,
-            state: false,
-            web: false,
-            pair: false,
-            declare_keys: false,
-        };
+    fn sent() -> Vec<Message> {
+        let case = Case::paced(1, 1000, 2, 0.1);
         let instrument = Instrument::simulate(1000).unwrap();
-        let sent = (0..100).map(|index| instrument.message(&plan, 0, index).unwrap()).collect();
-        (plan, sent)
+        (0..100).map(|index| instrument.message(&case, 0, index).unwrap()).collect()
     }
 
     #[test]
     fn every_tick_of_the_bench_is_corrected_soundly() {
         use isotherm_correction::sample::SensorFlags;
 
-        let expected = offline(0, &sent().1).unwrap();
+        let expected = offline(0, &sent()).unwrap();
         assert_eq!(expected.len(), 200);
         for tick in expected.values() {
             let sound = |flags: &SensorFlags| flags.contains(SensorFlags::VALID);
@@ -203,7 +181,7 @@ mod tests {
 
     #[test]
     fn what_a_user_would_write_leaves_the_temperatures_out_and_no_more() {
-        let (_, sent) = sent();
+        let sent = sent();
         let whole = offline(0, &sent).unwrap();
         for (sequence, plain) in sent.iter().flat_map(|message| Constants::OF_MEMS.correct(message)) {
             let tick = &whole[&sequence];
@@ -219,7 +197,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_noticed() {
-        let (_, sent) = sent();
+        let sent = sent();
         let frame = |frame: &[u8]| [Kept { unit: 0, frame: frame.to_vec() }];
         assert!(relayed(&sent, &frame(&sent[3].gyro)).is_ok());
         assert!(relayed(&sent, &frame(&sent[3].accel)).is_err());

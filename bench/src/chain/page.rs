@@ -2,11 +2,10 @@
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
+use super::round::joined;
 use crate::clock::{now_ns, sleep_until};
 use crate::error::Error;
 use crate::part::unit_name;
@@ -18,62 +17,40 @@ const LOOK_NS: u64 = 1_000_000_000;
 /// How long an answer may take.
 const LIMIT: Duration = Duration::from_secs(10);
 
-/// A page of all units, and one of the first unit with its live chart.
-#[derive(Debug)]
-pub(super) struct Pages {
-    closed: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<Result<u64, Error>>>,
-}
-
-impl Pages {
-    /// Opens them at the service's address for HTTP.
-    pub(super) fn open(address: &str) -> Result<Self, Error> {
-        let wrong = |what: String| Error::Part { part: "page", what };
-        let host = address.strip_prefix("http://").unwrap_or(address);
-        let address: SocketAddr = host.parse().map_err(|error| wrong(format!("{address}: {error}")))?;
-        let unit = unit_name(0)?;
-        let closed = Arc::new(AtomicBool::new(false));
-        let asked = [
-            ("/api/units".to_owned(), LOOK_NS),
-            (format!("/api/unit/{unit}"), LOOK_NS),
-            // One answer after the other: each takes half a second.
-            (format!("/api/unit/{unit}/live"), 0),
-        ];
-        let threads = asked.map(|(path, period_ns)| {
-            let closed = Arc::clone(&closed);
-            std::thread::spawn(move || look(address, &path, period_ns, &closed))
+/// A page of all units, and one of the first unit with its live chart, at the service's address for HTTP: open until `closed`. An error
+/// where one was not answered, or never.
+pub(super) fn look(address: &str, closed: &AtomicBool) -> Result<(), Error> {
+    let host = address.strip_prefix("http://").unwrap_or(address);
+    let address: SocketAddr = host.parse().map_err(Error::of("page"))?;
+    let unit = unit_name(0)?;
+    let asked = [
+        ("/api/units".to_owned(), LOOK_NS),
+        (format!("/api/unit/{unit}"), LOOK_NS),
+        // One answer after the other: each takes half a second.
+        (format!("/api/unit/{unit}/live"), 0),
+    ];
+    std::thread::scope(|scope| {
+        let pages = asked.map(|(path, period_ns)| {
+            scope.spawn(move || look_at(address, &path, period_ns, closed).map_err(Error::of("page")))
         });
-        Ok(Self { closed, threads: threads.into() })
-    }
-
-    /// Closes them; an error where one was not answered, or not often enough to count.
-    pub(super) fn close(self) -> Result<(), Error> {
-        self.closed.store(true, Ordering::Relaxed);
-        for thread in self.threads {
-            let gone = |_| Error::Part { part: "page", what: "the thread has ended with a panic".to_owned() };
-            if thread.join().map_err(gone)?? == 0 {
-                return Err(Error::Part { part: "page", what: "it was never answered".to_owned() });
-            }
-        }
-        Ok(())
-    }
+        pages.into_iter().try_for_each(joined)
+    })
 }
 
-/// Asks until the page is closed; how many answers came.
-fn look(address: SocketAddr, path: &str, period_ns: u64, closed: &AtomicBool) -> Result<u64, Error> {
+/// Asks until the page is closed.
+fn look_at(address: SocketAddr, path: &str, period_ns: u64, closed: &AtomicBool) -> Result<(), String> {
     let mut answers = 0;
     while !closed.load(Ordering::Relaxed) {
         let next = now_ns() + period_ns;
-        let answer = ask(address, path)
-            .map_err(|error| Error::Part { part: "page", what: format!("{path}: {error}") })?;
+        let answer = ask(address, path).map_err(|error| format!("{path}: {error}"))?;
         if !answer.starts_with(b"HTTP/1.1 200 ") {
             let head = String::from_utf8_lossy(answer.get(..40).unwrap_or(&answer)).into_owned();
-            return Err(Error::Part { part: "page", what: format!("{path}: {head}") });
+            return Err(format!("{path}: {head}"));
         }
         answers += 1;
         sleep_until(next);
     }
-    Ok(answers)
+    if answers == 0 { Err(format!("{path}: it was never answered")) } else { Ok(()) }
 }
 
 fn ask(address: SocketAddr, path: &str) -> std::io::Result<Vec<u8>> {

@@ -91,7 +91,7 @@ pub(crate) fn relay(plan: &Plan) -> Result<Command, Error> {
     fs::write(&constants, text).map_err(|source| Error::file(&constants, source))?;
     let mut command = Command::new(interpreter()?);
     command.arg("-B").arg(folder().join("relay.py")).arg("--constants").arg(constants);
-    if plan.block {
+    if plan.case.is_saturated() {
         command.arg("--block");
     }
     Ok(command)
@@ -99,7 +99,7 @@ pub(crate) fn relay(plan: &Plan) -> Result<Command, Error> {
 
 /// An interpreter that has what the scripts need; makes its environment where there is none.
 pub(crate) fn interpreter() -> Result<PathBuf, Error> {
-    let skipped = |what: String| Error::Part { part: "python", what };
+    let skipped = Error::of("python");
     let profile = this()?;
     let target = profile.ancestors().nth(2).map(Path::to_owned).unwrap_or_default();
     let environment = target.join("bench-venv");

@@ -1,20 +1,20 @@
 //! One round of one subject: three processes from their start to their end.
 
 use std::fs;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
 use super::case::{Beside, Case};
-use super::check;
-use super::page::Pages;
 use super::profile::Profile;
-use super::subject::Subject;
-use super::swap::{self, Swapper};
+use super::subject::{self, Subject};
+use super::{check, page, swap};
 use crate::error::Error;
 use crate::machine::Usage;
-use crate::part::{Plan, Ready, Received, Sent, read_numbers};
+use crate::part::{Plan, Ready, Received, Sent};
 use crate::process::{Process, this};
 
 /// How long a part may take to be ready.
@@ -62,8 +62,7 @@ pub(crate) struct Outcome {
 /// Runs one round.
 pub(crate) fn run(case: &Case, subject: Subject, profile: &Profile) -> Result<Outcome, Error> {
     let folder = tempfile::tempdir().map_err(|source| Error::file(&std::env::temp_dir(), source))?;
-    let mut plan = case.plan(folder.path(), subject.format());
-    plan.declare_keys = subject == Subject::Keyed;
+    let mut plan = case.plan(folder.path(), subject);
     let plan_file = folder.path().join("plan.json");
     let write = |plan: &Plan| {
         let text = serde_json::to_string(plan).unwrap_or_default();
@@ -71,12 +70,13 @@ pub(crate) fn run(case: &Case, subject: Subject, profile: &Profile) -> Result<Ou
     };
     write(&plan)?;
     let starting = Instant::now();
-    let (middle, locator, http) = subject.start(&plan, &plan_file, profile)?;
+    let (middle, locator, http) = subject::start(&plan, &plan_file, profile)?;
     let start_s = starting.elapsed().as_secs_f64();
     plan.connect.push(locator);
     let mut middle = vec![middle];
-    if plan.pair {
-        let (standby, locator, _) = subject.start(&plan, &plan_file, profile)?;
+    let is_pair = case.beside == Some(Beside::Standby);
+    if is_pair {
+        let (standby, locator, _) = subject::start(&plan, &plan_file, profile)?;
         middle.push(standby);
         plan.connect.push(locator);
     }
@@ -98,22 +98,44 @@ pub(crate) fn run(case: &Case, subject: Subject, profile: &Profile) -> Result<Ou
     }
 
     let before = usage(&middle)?;
-    let swapper = if case.beside == Some(Beside::Swaps) { Some(Swapper::start(&plan)?) } else { None };
-    let pages = http.filter(|_| plan.web).map(|address| Pages::open(&address)).transpose()?;
-    source.tell("go")?;
-    let sent: Sent = source.hear(case.limit() + READY_LIMIT)?;
-    sink.tell(&sent.messages.to_string())?;
-    let received: Received = sink.hear(READY_LIMIT)?;
-    swapper.map(Swapper::stop).transpose()?;
-    pages.map(Pages::close).transpose()?;
+    let ended = AtomicBool::new(false);
+    let (sent, received) = std::thread::scope(|scope| {
+        let beside = scope.spawn(|| match (case.beside, &http) {
+            (Some(Beside::Swaps), _) => swap::again_and_again(&plan, &ended),
+            (Some(Beside::Pages), Some(address)) => page::look(address, &ended),
+            _ => Ok(()),
+        });
+        let measured = measure(&mut source, &mut sink, case);
+        ended.store(true, Ordering::Relaxed);
+        let beside = joined(beside);
+        measured.and_then(|measured| beside.map(|()| measured))
+    })?;
     let after = usage(&middle)?;
-    let swap_ms = if subject == Subject::Service { swap::timed(&plan, case.timed_swaps)? } else { 0.0 };
-    check::check(&plan, subject, &received)?;
-    if plan.pair {
+    let swap_ms = swap::timed(&plan)?;
+    check::check(&plan, &received)?;
+    if is_pair {
         check::is_pair(&plan)?;
     }
     let used = Usage { cpu_s: after.cpu_s - before.cpu_s, ..after };
-    Ok(Outcome { start_s, swap_ms, ..outcome(&plan, case, (&sent, &received), used)? })
+    let outcome = Outcome { start_s, swap_ms, ..outcome(&plan, (&sent, &received), used)? };
+    if case.beside == Some(Beside::Swaps) && outcome.swaps_per_unit == 0 {
+        return Err(subject.wrong("a unit was given no other calibration".to_owned()));
+    }
+    Ok(outcome)
+}
+
+/// Has the source send everything, and the sink take it.
+fn measure(source: &mut Process, sink: &mut Process, case: &Case) -> Result<(Sent, Received), Error> {
+    source.tell("go")?;
+    let sent: Sent = source.hear(case.limit() + READY_LIMIT)?;
+    sink.tell(&sent.messages.to_string())?;
+    Ok((sent, sink.hear(READY_LIMIT)?))
+}
+
+/// What came of a thread.
+pub(super) fn joined(thread: ScopedJoinHandle<'_, Result<(), Error>>) -> Result<(), Error> {
+    let gone = |_| Error::of("thread")("has ended with a panic");
+    thread.join().map_err(gone)?
 }
 
 /// What the processes of the middle have used together.
@@ -127,31 +149,26 @@ fn usage(middle: &[Process]) -> Result<Usage, Error> {
 
 /// Puts together what the parts have written down.
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-fn outcome(
-    plan: &Plan,
-    case: &Case,
-    (sent, received): (&Sent, &Received),
-    used: Usage,
-) -> Result<Outcome, Error> {
-    let [sent_ns, came_ns] =
-        [read_numbers(&plan.folder.join("sent.bin"))?, read_numbers(&plan.folder.join("came.bin"))?];
-    let mut latencies = Histogram::<u64>::new_with_bounds(1, LONGEST_NS, 3)
-        .map_err(|error| Error::Part { part: "latencies", what: error.to_string() })?;
+fn outcome(plan: &Plan, (sent, received): (&Sent, &Received), used: Usage) -> Result<Outcome, Error> {
+    let case = &plan.case;
+    let [sent_ns, came_ns]: [Vec<u64>; 2] = [plan.load("sent.bin")?, plan.load("came.bin")?];
+    let latencies = Histogram::<u64>::new_with_bounds(1, LONGEST_NS, 3);
+    let mut latencies = latencies.map_err(Error::of("latencies"))?;
     for (unit, came) in came_ns.chunks(plan.ticks().max(1)).enumerate() {
         for (message, came) in came
-            .chunks(plan.batch)
+            .chunks(case.batch)
             .enumerate()
             .take(plan.prelude + sent.messages)
             .skip(plan.prelude + case.warm_up_messages())
         {
-            let Some(went) = sent_ns.get(message * plan.units + unit) else { continue };
+            let Some(went) = sent_ns.get(message * case.units + unit) else { continue };
             for came in came.iter().filter(|came| **came > 0) {
                 latencies.saturating_record(came.saturating_sub(*went).max(1));
             }
         }
     }
     let us = |ns: u64| ns as f64 * 1e-3;
-    let total = (sent.messages * plan.units * plan.batch) as u64;
+    let total = (sent.messages * case.units * case.batch) as u64;
     let seconds = (received.between_ns[1] - received.between_ns[0]) as f64 * 1e-9;
     Ok(Outcome {
         latency_us: QUANTILES.map(|share| us(latencies.value_at_quantile(share))),

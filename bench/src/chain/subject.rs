@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::case::Beside;
 use super::page::TOKEN;
 use super::profile::Profile;
 use super::python;
 use crate::error::Error;
-use crate::part::{Format, Plan, Ready, unit_name};
+use crate::part::{Plan, Ready, unit_name};
 use crate::process::{Process, beside, this};
 
 /// What is measured.
@@ -42,80 +43,72 @@ impl Subject {
         }
     }
 
-    /// What it puts out.
-    pub(crate) fn format(self) -> Format {
-        match self {
-            Self::Relay | Self::Keyed => Format::Raw,
-            Self::Service => Format::Corrected,
-            Self::Python => Format::Plain,
-        }
+    /// What it gives is not what it should.
+    pub(crate) fn wrong(self, what: String) -> Error {
+        Error::Output { subject: self.name(), what }
     }
+}
 
-    /// Starts it; the process, where it listens, and where it answers over HTTP.
-    pub(crate) fn start(
-        self,
-        plan: &Plan,
-        plan_file: &Path,
-        profile: &Profile,
-    ) -> Result<(Process, String, Option<String>), Error> {
-        let mut command = match self {
-            Self::Relay | Self::Keyed => {
-                let mut command = Command::new(this()?);
-                command.args(["part", "relay"]).arg(plan_file);
-                command
-            }
-            Self::Service => Self::serve(plan)?,
-            Self::Python => python::relay(plan)?,
-        };
-        // A second one is started where the first is known.
-        let name = if plan.connect.is_empty() { self.name() } else { "standby" };
-        if let Some(runtime) = &profile.runtime {
-            command.env("ZENOH_RUNTIME", runtime);
+/// Starts what stands in the middle; the process, where it listens, and where it answers over HTTP.
+pub(crate) fn start(
+    plan: &Plan,
+    plan_file: &Path,
+    profile: &Profile,
+) -> Result<(Process, String, Option<String>), Error> {
+    let mut command = match plan.subject {
+        Subject::Relay | Subject::Keyed => {
+            let mut command = Command::new(this()?);
+            command.args(["part", "relay"]).arg(plan_file);
+            command
         }
-        let process = Process::start(name, &mut command, &plan.folder)?;
-        let Ready { locators, metrics, .. } = process.hear(START_LIMIT)?;
-        let locator = locators.into_iter().next();
-        let locator =
-            locator.ok_or_else(|| Error::Part { part: name, what: "listens nowhere".to_owned() })?;
-        Ok((process, locator, metrics))
+        Subject::Service => serve(plan)?,
+        Subject::Python => python::relay(plan)?,
+    };
+    // A second one is started where the first is known.
+    let name = if plan.connect.is_empty() { plan.subject.name() } else { "standby" };
+    if let Some(runtime) = &profile.runtime {
+        command.env("ZENOH_RUNTIME", runtime);
     }
+    let process = Process::start(name, &mut command, &plan.folder)?;
+    let Ready { locators, metrics, .. } = process.hear(START_LIMIT)?;
+    let locator = locators.into_iter().next().ok_or_else(|| Error::of(name)("listens nowhere"))?;
+    Ok((process, locator, metrics))
+}
 
-    /// The service, with a document for each unit.
-    fn serve(plan: &Plan) -> Result<Command, Error> {
-        let program = beside("isotherm")?;
-        let documents = plan.folder.join("units");
-        fs::create_dir_all(&documents).map_err(|source| Error::file(&documents, source))?;
-        for unit in 0..plan.units {
-            let path = documents.join(format!("{unit}.toml"));
-            fs::write(&path, document(unit, 0)?).map_err(|source| Error::file(&path, source))?;
-        }
-        let name = if plan.connect.is_empty() { "first" } else { "second" };
-        let settings = plan.folder.join(format!("{name}.toml"));
-        let congestion = if plan.block { "block" } else { "drop" };
-        let state = if plan.state { format!("state = \"{name}\"\n") } else { String::new() };
-        let units = plan.units.max(1);
-        let text =
-            format!("calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n");
-        let text = if plan.web {
-            let token = plan.folder.join("token");
-            fs::write(&token, TOKEN).map_err(|source| Error::file(&token, source))?;
-            let web = "[web]\nenabled = true\ntoken_file = \"token\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n";
-            text + web
-        } else if plan.pair {
-            format!("{text}[pair]\nname = \"{name}\"\n")
-        } else {
-            text
-        };
-        fs::write(&settings, text).map_err(|source| Error::file(&settings, source))?;
-        let mut command = Command::new(program);
-        command
-            .args(["serve", "--announce", "--json", "--listen", "tcp/127.0.0.1:0", "--config"])
-            .arg(settings);
-        for address in &plan.connect {
-            command.arg("--connect").arg(address);
-        }
-        Ok(command)
+/// The service, with a document for each unit.
+fn serve(plan: &Plan) -> Result<Command, Error> {
+    let program = beside("isotherm")?;
+    let write = |name: &str, text: String| {
+        let path = plan.folder.join(name);
+        fs::write(&path, text).map(|()| path.clone()).map_err(|source| Error::file(&path, source))
+    };
+    let documents = plan.folder.join("units");
+    fs::create_dir_all(&documents).map_err(|source| Error::file(&documents, source))?;
+    for unit in 0..plan.case.units {
+        write(&format!("units/{unit}.toml"), document(unit, 0)?)?;
     }
+    let name = if plan.connect.is_empty() { "first" } else { "second" };
+    let congestion = if plan.case.is_saturated() { "block" } else { "drop" };
+    let units = plan.case.units.max(1);
+    let state = if plan.case.state { format!("state = \"{name}\"\n") } else { String::new() };
+    let beside = match plan.case.beside {
+        Some(Beside::Pages) => {
+            write("token", TOKEN.to_owned())?;
+            "[web]\nenabled = true\ntoken_file = \"token\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n".to_owned()
+        }
+        Some(Beside::Standby) => format!("[pair]\nname = \"{name}\"\n"),
+        Some(Beside::Swaps) | None => String::new(),
+    };
+    let text = format!(
+        "calibrations = \"units\"\n{state}max_units = {units}\ncongestion = \"{congestion}\"\n{beside}"
+    );
+    let settings = write(&format!("{name}.toml"), text)?;
+    let mut command = Command::new(program);
+    command.args(["serve", "--announce", "--json", "--listen", "tcp/127.0.0.1:0", "--config"]).arg(settings);
+    for address in &plan.connect {
+        command.arg("--connect").arg(address);
+    }
+    Ok(command)
 }
 
 /// The calibration document that every unit has under its own name.
@@ -129,7 +122,7 @@ pub(crate) fn document(unit: usize, edition: usize) -> Result<String, Error> {
         Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../config/calibration/{DOCUMENT}.toml"));
     let text = fs::read_to_string(&path).map_err(|source| Error::file(&path, source))?;
     if !text.contains(FIGURE) {
-        return Err(Error::Invalid { path, what: format!("has no {FIGURE:?}") });
+        return Err(Error::invalid(&path, format_args!("has no {FIGURE:?}")));
     }
     let text = text.replace(&format!("unit = \"{DOCUMENT}\""), &format!("unit = \"{}\"", unit_name(unit)?));
     Ok(text.replace(FIGURE, &format!("coefficients_deg_per_h = [90.{edition},")))

@@ -2,33 +2,80 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::Table;
-
 use super::case::Beside;
 use super::{Measure, Report, Row};
-use crate::cli::plain;
+
+/// A column: its head, and what stands in it of a row among others.
+type Column = (&'static str, fn(&Row, &[&Row]) -> String);
+
+const LATENCY: [Column; 11] = [
+    ("p50 µs", |row, _| format!("{:.0}", row.median.latency_us[0])),
+    ("p90", |row, _| format!("{:.0}", row.median.latency_us[1])),
+    ("p99", |row, _| format!("{:.0}", row.median.latency_us[2])),
+    ("p99.9", |row, _| format!("{:.0}", row.median.latency_us[3])),
+    ("p50 ratio", |row, _| format!("{:.2}×", row.latency_ratio[0])),
+    ("p99 ratio", |row, _| format!("{:.2}×", row.latency_ratio[2])),
+    LOST,
+    ("CPU µs/tick", |row, _| format!("{:.2}", row.median.cpu_us_per_tick)),
+    ("ratio", |row, _| format!("{:.2}×", row.cpu_ratio)),
+    ("source late µs", |row, _| format!("{:.0}", row.median.source_late_us[1])),
+    ("swaps", |row, _| match row.case.beside {
+        Some(Beside::Swaps) => row.median.swaps_per_unit.to_string(),
+        _ => String::new(),
+    }),
+];
+
+const THROUGHPUT: [Column; 6] = [
+    ("messages/s", |row, _| format!("{:.0}", row.median.messages_per_s)),
+    TICKS,
+    ("ratio", |row, _| format!("{:.2}×", row.throughput_ratio)),
+    LOST,
+    CPU,
+    ("cores", |row, _| format!("{:.2}", row.median.cpu_share)),
+];
+
+const UNITS: [Column; 7] = [
+    TICKS,
+    CPU,
+    LOST,
+    ("resident MiB", |row, _| format!("{:.1}", kib(row) / 1024.0)),
+    ("KiB per further unit", per_further_unit),
+    ("start s", |row, _| format!("{:.2}", row.median.start_s)),
+    ("swap ms", |row, _| format!("{:.1}", row.median.swap_ms)),
+];
+
+const LOST: Column = ("lost", |row, _| row.median.lost.to_string());
+const TICKS: Column = ("ticks/s", |row, _| format!("{:.0}", row.median.ticks_per_s));
+const CPU: Column = ("CPU µs/tick", |row, _| format!("{:.3}", row.median.cpu_us_per_tick));
 
 /// Latency first, then throughput.
 pub(crate) fn table(report: &Report) -> String {
-    let is_paced = |row: &Row| !matches!(row.measure, Measure::Saturation | Measure::Units);
     let mut text = format!("{}\n", report.machine.words());
-    let paced: Vec<&Row> = report.rows.iter().filter(|row| is_paced(row)).collect();
-    if !paced.is_empty() {
-        let _ = writeln!(text, "\n{}", latency(&paced));
-    }
-    let of = |measure| report.rows.iter().filter(move |row| row.measure == measure);
-    let saturated: Vec<&Row> = of(Measure::Saturation).collect();
-    if !saturated.is_empty() {
-        let _ = writeln!(text, "\n{}", throughput(&saturated));
-    }
-    let by_units: Vec<&Row> = of(Measure::Units).collect();
-    if !by_units.is_empty() {
-        let _ = writeln!(text, "\n{}", units(&by_units));
-    }
+    let is_paced = |measure| !matches!(measure, Measure::Saturation | Measure::Units);
+    lines(&mut text, report, is_paced, &LATENCY);
+    lines(&mut text, report, |measure| measure == Measure::Saturation, &THROUGHPUT);
+    lines(&mut text, report, |measure| measure == Measure::Units, &UNITS);
     for words in &report.skipped {
         let _ = writeln!(text, "\nskipped: {words}");
     }
     text
+}
+
+/// The rows of some measures, if there are any, as a table.
+fn lines(text: &mut String, report: &Report, is: impl Fn(Measure) -> bool, columns: &[Column]) {
+    let rows: Vec<&Row> = report.rows.iter().filter(|row| is(row.measure)).collect();
+    if rows.is_empty() {
+        return;
+    }
+    let head = ["load", "in the middle"].into_iter().chain(columns.iter().map(|(head, _)| *head));
+    let mut last = "";
+    let cells = rows.iter().map(|row| {
+        let name = if row.name == last { String::new() } else { row.name.clone() };
+        last = &row.name;
+        let cells = columns.iter().map(|(_, cell)| cell(row, &rows));
+        [name, middle(row)].into_iter().chain(cells).collect::<Vec<_>>()
+    });
+    let _ = writeln!(text, "\n{}", isotherm_cli::table(head, cells, 1..));
 }
 
 /// What stands in the middle, with settings that are not the project's own.
@@ -39,103 +86,18 @@ fn middle(row: &Row) -> String {
     }
 }
 
-fn latency(rows: &[&Row]) -> Table {
-    let mut table = plain(&[
-        "load",
-        "in the middle",
-        "p50 µs",
-        "p90",
-        "p99",
-        "p99.9",
-        "p50 ratio",
-        "p99 ratio",
-        "lost",
-        "CPU µs/tick",
-        "ratio",
-        "source late µs",
-        "swaps",
-    ]);
-    let mut last = "";
-    for row in rows {
-        let [p50, p90, p99, p999] = row.median.latency_us;
-        let [half, .., ratio, _] = row.latency_ratio;
-        table.add_row([
-            if row.name == last { String::new() } else { row.name.clone() },
-            middle(row),
-            format!("{p50:.0}"),
-            format!("{p90:.0}"),
-            format!("{p99:.0}"),
-            format!("{p999:.0}"),
-            format!("{half:.2}×"),
-            format!("{ratio:.2}×"),
-            row.median.lost.to_string(),
-            format!("{:.2}", row.median.cpu_us_per_tick),
-            format!("{:.2}×", row.cpu_ratio),
-            format!("{:.0}", row.median.source_late_us[1]),
-            if row.case.beside == Some(Beside::Swaps) {
-                row.median.swaps_per_unit.to_string()
-            } else {
-                String::new()
-            },
-        ]);
-        last = &row.name;
-    }
-    table
-}
-
-fn throughput(rows: &[&Row]) -> Table {
-    let mut table =
-        plain(&["load", "in the middle", "messages/s", "ticks/s", "ratio", "lost", "CPU µs/tick", "cores"]);
-    let mut last = "";
-    for row in rows {
-        table.add_row([
-            if row.name == last { String::new() } else { row.name.clone() },
-            middle(row),
-            format!("{:.0}", row.median.messages_per_s),
-            format!("{:.0}", row.median.ticks_per_s),
-            format!("{:.2}×", row.throughput_ratio),
-            row.median.lost.to_string(),
-            format!("{:.3}", row.median.cpu_us_per_tick),
-            format!("{:.2}", row.median.cpu_share),
-        ]);
-        last = &row.name;
-    }
-    table
-}
-
-/// What a number of units takes.
+/// Resident memory (KiB).
 #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-fn units(rows: &[&Row]) -> Table {
-    let mut table = plain(&[
-        "load",
-        "in the middle",
-        "ticks/s",
-        "CPU µs/tick",
-        "lost",
-        "resident MiB",
-        "KiB per further unit",
-        "start s",
-        "swap ms",
-    ]);
-    for row in rows {
-        let (outcome, units) = (&row.median, row.case.units);
-        // One unit has what all share too.
-        let first = rows.iter().find(|first| first.subject == row.subject && first.case.units < units);
-        let per_unit = first.map_or_else(String::new, |first| {
-            let further_kib = outcome.resident_kib as f64 - first.median.resident_kib as f64;
-            format!("{:.1}", further_kib / (units - first.case.units) as f64)
-        });
-        table.add_row([
-            row.name.clone(),
-            middle(row),
-            format!("{:.0}", outcome.ticks_per_s),
-            format!("{:.3}", outcome.cpu_us_per_tick),
-            outcome.lost.to_string(),
-            format!("{:.1}", outcome.resident_kib as f64 / 1024.0),
-            per_unit,
-            format!("{:.2}", outcome.start_s),
-            format!("{:.1}", outcome.swap_ms),
-        ]);
-    }
-    table
+fn kib(row: &Row) -> f64 {
+    row.median.resident_kib as f64
+}
+
+/// What each unit takes beyond those of the case with fewest: one unit has what all share too.
+#[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
+fn per_further_unit(row: &Row, rows: &[&Row]) -> String {
+    let is_first = |first: &&&Row| first.subject == row.subject && first.case.units < row.case.units;
+    let first = rows.iter().find(is_first);
+    first.map_or_else(String::new, |first| {
+        format!("{:.1}", (kib(row) - kib(first)) / (row.case.units - first.case.units) as f64)
+    })
 }

@@ -31,9 +31,9 @@ impl Decode {
     /// Batches of `size`.
     pub(super) fn of(size: usize) -> Result<Self, Error> {
         let unit = unit::zeeman()?;
-        let [output, _] = unit.outputs();
         let ticks: Vec<_> = unit.gyro_ticks().take(TICKS).cloned().collect();
-        let batches = ticks.chunks(size).map(|ticks| GyroBatch { output, ticks: ticks.to_vec() });
+        let batches =
+            ticks.chunks(size).map(|ticks| GyroBatch { output: unit.output, ticks: ticks.to_vec() });
         let frames = batches.filter_map(|batch| codec::encode(&batch).ok());
         let name = format!("decode raw gyros, batches of {size}");
         Ok(Self { name, frames: frames.collect(), ticks, reader: TickReader::default() })

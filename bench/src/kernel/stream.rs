@@ -29,7 +29,6 @@ impl Stream {
     /// Frames of the Zeeman unit: temperatures when they are due, ticks in batches of `size`.
     pub(super) fn of(size: usize) -> Result<Self, Error> {
         let unit = unit::zeeman()?;
-        let [output, accel_output] = unit.outputs();
         let gyros: Vec<_> = unit.gyro_ticks().take(TICKS).cloned().collect();
         let accels: Vec<_> = unit.accel_ticks().take(TICKS).cloned().collect();
         let readings: Vec<_> = unit.temperatures().copied().collect();
@@ -41,15 +40,15 @@ impl Stream {
                 let readings = TemperatureBatch { readings: readings.to_vec() };
                 frames.extend(codec::encode(&readings).map(|frame| (RawStream::Temperature, frame)));
             }
-            let accels = AccelBatch { output: accel_output, ticks: accels.to_vec() };
-            let gyros = GyroBatch { output, ticks: gyros.to_vec() };
+            let accels = AccelBatch { output: unit.accel_output, ticks: accels.to_vec() };
+            let gyros = GyroBatch { output: unit.output, ticks: gyros.to_vec() };
             frames.extend(codec::encode(&accels).map(|frame| (RawStream::Accel, frame)));
             frames.extend(codec::encode(&gyros).map(|frame| (RawStream::Gyro, frame)));
         }
-        let id = UnitId::new("ZLG-0001").map_err(|error| Error::Count(error.to_string()))?;
+        let id = UnitId::new("ZLG-0001").map_err(Error::of("kernel"))?;
         Ok(Self {
             name: format!("raw frames in, corrected frames out, batches of {size}"),
-            calibration: Arc::clone(unit.calibration()),
+            calibration: unit.calibration,
             id,
             frames,
             sequences: gyros.iter().map(|tick| tick.sequence).collect(),

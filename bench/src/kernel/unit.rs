@@ -1,6 +1,6 @@
 //! Units of several kinds through the state machine, on simulated ticks.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::Calibration;
@@ -38,9 +38,10 @@ struct Bundle {
 pub(crate) struct UnitCase {
     name: &'static str,
     settings: UnitSettings,
-    calibration: Arc<Calibration>,
-    output: OutputKind,
-    accel_output: OutputKind,
+    pub(super) calibration: Arc<Calibration>,
+    /// What the readings of its gyros stand for.
+    pub(super) output: OutputKind,
+    pub(super) accel_output: OutputKind,
     bundles: Vec<Bundle>,
     truth: [f64; 3],
     /// Whether the calibration is the one that fits the simulated unit.
@@ -132,33 +133,17 @@ fn strip_all(document: &mut Document) {
 /// Three more sensors of each kind, along the axes of a dodecahedron as the simulated unit has them.
 fn skew(document: &mut Document) {
     let rows = isotherm_simulator::orientation::Orientation::dodecahedron().rows;
-    let gyros = document.gyro.sensor.clone();
-    document.gyro.sensor =
-        gyros.iter().chain(&gyros).cloned().zip(0..).map(|(sensor, index)| renamed(sensor, index)).collect();
-    document.gyro.orientation.rows.clone_from(&rows);
-    document.gyro.orientation.thermal = None;
+    let gyro = &mut document.gyro;
+    gyro.sensor.extend(gyro.sensor.clone());
+    (0..).zip(&mut gyro.sensor).for_each(|(index, sensor)| sensor.name = format!("g{index}"));
+    gyro.orientation.rows.clone_from(&rows);
+    gyro.orientation.thermal = None;
     if let Some(accel) = &mut document.accel {
-        let sensors = accel.sensor.clone();
-        accel.sensor = sensors.iter().chain(&sensors).cloned().collect();
-        for (index, sensor) in accel.sensor.iter_mut().enumerate() {
-            sensor.name = format!("a{index}");
-        }
+        accel.sensor.extend(accel.sensor.clone());
+        (0..).zip(&mut accel.sensor).for_each(|(index, sensor)| sensor.name = format!("a{index}"));
         accel.orientation.rows.clone_from(&rows);
         accel.orientation.thermal = None;
     }
-}
-
-fn renamed(
-    mut sensor: isotherm_protocol::document::GyroSensor,
-    index: usize,
-) -> isotherm_protocol::document::GyroSensor {
-    sensor.name = format!("g{index}");
-    sensor
-}
-
-/// A shipped document.
-fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration").join(name)
 }
 
 impl UnitCase {
@@ -169,9 +154,9 @@ impl UnitCase {
         scenario: &Scenario,
         fits: bool,
     ) -> Result<Self, Error> {
-        let path = path(document);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/calibration").join(document);
         let text = std::fs::read_to_string(&path).map_err(|source| Error::file(&path, source))?;
-        let invalid = |what: String| Error::Invalid { path: path.clone(), what };
+        let invalid = |what: String| Error::invalid(&path, what);
         let mut document =
             Document::parse(&text, None).map_err(|found| invalid(format!("{found:?}")))?.document;
         change(&mut document);
@@ -292,16 +277,6 @@ impl UnitCase {
     /// Its temperature readings in order.
     pub(crate) fn temperatures(&self) -> impl Iterator<Item = &TemperatureReading> {
         self.bundles.iter().flat_map(|bundle| &bundle.temperatures)
-    }
-
-    /// What the readings of its gyros and of its accelerometers stand for.
-    pub(crate) fn outputs(&self) -> [OutputKind; 2] {
-        [self.output, self.accel_output]
-    }
-
-    /// The calibration.
-    pub(crate) fn calibration(&self) -> &Arc<Calibration> {
-        &self.calibration
     }
 
     /// Every corrected tick.

@@ -9,7 +9,7 @@ use isotherm_protocol::codec;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, MAX_CHANNELS, TemperatureBatch};
 use isotherm_simulator::{Scenario, Simulation, presets};
 
-use super::Plan;
+use crate::chain::Case;
 use crate::error::Error;
 
 /// Ticks of the simulation that are repeated again and again.
@@ -43,8 +43,7 @@ impl Instrument {
     /// Simulates it.
     pub(crate) fn simulate(rate_hz: u32) -> Result<Self, Error> {
         let scenario = Scenario { tick_ns: 1_000_000_000 / i64::from(rate_hz), ..presets::mems_chamber(1) };
-        let simulation = Simulation::new(&scenario)
-            .map_err(|error| Error::Part { part: "simulation", what: error.to_string() })?;
+        let simulation = Simulation::new(&scenario).map_err(Error::of("simulation"))?;
         let mut instrument =
             Self { gyro: Vec::new(), accel: Vec::new(), channels: ArrayVec::new(), temperatures: Vec::new() };
         for step in simulation.take(REPEATED) {
@@ -59,20 +58,20 @@ impl Instrument {
     }
 
     /// Message `index` of a unit.
-    pub(crate) fn message(&self, plan: &Plan, unit: usize, index: usize) -> Result<Message, Error> {
-        let first = index * plan.batch;
-        let (start_ns, tick_ns) = (START_NS.cast_signed(), plan.tick_ns().cast_signed());
+    pub(crate) fn message(&self, case: &Case, unit: usize, index: usize) -> Result<Message, Error> {
+        let first = index * case.batch;
+        let (start_ns, tick_ns) = (START_NS.cast_signed(), case.tick_ns().cast_signed());
         let end_time = |tick: usize| Timestamp::from_ns(start_ns + (tick as u64 + 1).cast_signed() * tick_ns);
         let (output, duration) = (OutputKind::Mean, Span::from_ns(tick_ns));
         let means = |of: &[Readings], tick: usize| {
             let place = (tick + unit * AHEAD) % of.len().max(1);
             of.get(place).copied().unwrap_or_default()
         };
-        let ticks = first..first + plan.batch;
-        let second = ticks.clone().find(|tick| tick % plan.rate_hz as usize == 0);
+        let ticks = first..first + case.batch;
+        let second = ticks.clone().find(|tick| tick % case.rate_hz as usize == 0);
         let temperatures = second.map(|tick| {
             let time = Timestamp::from_ns(end_time(tick).as_ns() - tick_ns);
-            let place = tick / plan.rate_hz as usize % self.temperatures.len().max(1);
+            let place = tick / case.rate_hz as usize % self.temperatures.len().max(1);
             let raw = self.temperatures.get(place).cloned().unwrap_or_default();
             let reading = |(&channel, raw)| TemperatureReading { channel, time, raw };
             TemperatureBatch { readings: self.channels.iter().zip(raw).map(reading).collect() }
@@ -92,11 +91,11 @@ impl Instrument {
             ..GyroTick::default()
         });
         let gyro = GyroBatch { output, ticks: gyros.collect() };
-        let encoding = |error: codec::CodecError| Error::Part { part: "source", what: error.to_string() };
+        let encoding = Error::of("source");
         Ok(Message {
-            temperatures: temperatures.map(|batch| codec::encode(&batch)).transpose().map_err(encoding)?,
-            accel: codec::encode(&accel).map_err(encoding)?,
-            gyro: codec::encode(&gyro).map_err(encoding)?,
+            temperatures: temperatures.map(|batch| codec::encode(&batch)).transpose().map_err(&encoding)?,
+            accel: codec::encode(&accel).map_err(&encoding)?,
+            gyro: codec::encode(&gyro).map_err(&encoding)?,
         })
     }
 }

@@ -6,7 +6,7 @@ use isotherm_protocol::corrected::{AppliedTemperature, Revision};
 use isotherm_protocol::raw::MAX_CHANNELS;
 use serde::Deserialize;
 
-use super::Format;
+use crate::chain::Subject;
 
 /// Bytes of one tick in what the Python script writes.
 pub(crate) const PLAIN_TICK: usize = 48;
@@ -35,20 +35,20 @@ struct Corrected<'a> {
     first: u64,
 }
 
-/// Reads the head of a frame; `None` where it has none.
-pub(crate) fn read(format: Format, frame: &[u8]) -> Option<Head> {
+/// Reads the head of a frame of what stands in the middle; `None` where it has none.
+pub(crate) fn read(subject: Subject, frame: &[u8]) -> Option<Head> {
     // Kind and version; the checksum is behind the body.
     let body = frame.get(2..)?;
-    match format {
-        Format::Raw => {
+    match subject {
+        Subject::Relay | Subject::Keyed => {
             let ((first, _series, ticks), _) = postcard::take_from_bytes::<(u64, u64, u64)>(body).ok()?;
             Some(Head { first, ticks, revision: 0 })
         }
-        Format::Corrected => {
+        Subject::Service => {
             let (head, _) = postcard::take_from_bytes::<Corrected<'_>>(body).ok()?;
             Some(Head { first: head.first, ticks: head.ticks, revision: head.revision.counter })
         }
-        Format::Plain => {
+        Subject::Python => {
             let (first, ticks) = frame.split_first_chunk::<PLAIN_HEAD>()?;
             let whole = !ticks.is_empty() && ticks.len() % PLAIN_TICK == 0;
             whole.then(|| Head {
@@ -72,34 +72,16 @@ mod tests {
     use isotherm_protocol::raw::GyroBatch;
 
     use super::*;
+    use crate::chain::Case;
     use crate::part::frames::Instrument;
-    use crate::part::{Pace, Plan, unit_name};
-
-    fn plan() -> Plan {
-        Plan {
-            units: 1,
-            rate_hz: 1000,
-            batch: 3,
-            messages: 10,
-            prelude: 0,
-            pace: Pace::Burst,
-            block: false,
-            connect: Vec::new(),
-            folder: std::path::PathBuf::new(),
-            keep: 3,
-            format: Format::Raw,
-            state: false,
-            web: false,
-            pair: false,
-            declare_keys: false,
-        }
-    }
+    use crate::part::unit_name;
 
     #[test]
     fn the_head_is_what_the_whole_frame_says() {
-        let message = Instrument::simulate(1000).unwrap().message(&plan(), 4, 7).unwrap();
+        let message =
+            Instrument::simulate(1000).unwrap().message(&Case::paced(1, 1000, 3, 0.1), 4, 7).unwrap();
         let raw: GyroBatch = codec::decode(&message.gyro).unwrap();
-        assert_eq!(read(Format::Raw, &message.gyro), Some(Head { first: 21, ticks: 3, revision: 0 }));
+        assert_eq!(read(Subject::Relay, &message.gyro), Some(Head { first: 21, ticks: 3, revision: 0 }));
         assert_eq!((raw.ticks[0].sequence, raw.ticks.len()), (21, 3));
 
         let tick = CorrectedTick { sequence: 300, ticks: 1, ..CorrectedTick::default() };
@@ -112,11 +94,11 @@ mod tests {
             sigmas: Vec::new(),
         };
         let frame = codec::encode(&batch).unwrap();
-        assert_eq!(read(Format::Corrected, &frame), Some(Head { first: 300, ticks: 2, revision: 1000 }));
+        assert_eq!(read(Subject::Service, &frame), Some(Head { first: 300, ticks: 2, revision: 1000 }));
 
         let plain = [&7_u64.to_le_bytes()[..], &[0; 2 * PLAIN_TICK]].concat();
-        assert_eq!(read(Format::Plain, &plain), Some(Head { first: 7, ticks: 2, revision: 0 }));
-        assert_eq!(read(Format::Plain, &plain[..60]), None);
+        assert_eq!(read(Subject::Python, &plain), Some(Head { first: 7, ticks: 2, revision: 0 }));
+        assert_eq!(read(Subject::Python, &plain[..60]), None);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use zenoh::sample::Locality;
 use zenoh::{Session, Wait};
 
 use super::{Plan, Ready, declare_keys, head, hear, open, say, unit_name};
+use crate::chain::Subject;
 use crate::error::Error;
 
 /// Relays until stdin ends.
@@ -13,7 +14,8 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     let session = open(plan)?;
     let outputs = outputs(&session, plan)?;
     let of_unit = |unit: &UnitId| RawStream::ALL.map(|stream| key::raw(unit, stream));
-    let _declared = plan.declare_keys.then(|| declare_keys(&session, plan, of_unit)).transpose()?;
+    let _declared =
+        (plan.subject == Subject::Keyed).then(|| declare_keys(&session, plan, of_unit)).transpose()?;
     let subscriber = session
         .declare_subscriber(key::ALL_RAW)
         .allowed_origin(Locality::Remote)
@@ -28,10 +30,10 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
             }
         })
         .wait();
-    let _subscriber = subscriber.map_err(|error| Error::zenoh("relay", &error))?;
+    let _subscriber = subscriber.map_err(Error::zenoh("relay"))?;
     // Last of all: where it answers, the subscription is known. The query ends where it is dropped.
     let answers = session.declare_queryable(key::ALL_STATUS).callback(drop).wait();
-    let _answers = answers.map_err(|error| Error::zenoh("relay", &error))?;
+    let _answers = answers.map_err(Error::zenoh("relay"))?;
     say(&Ready { locators: isotherm_bus::locators(&session), metrics: None })?;
     while hear().is_some() {}
     Ok(())
@@ -39,7 +41,8 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
 
 /// One declared publisher for each unit, with the service's quality of service.
 fn outputs(session: &Session, plan: &Plan) -> Result<Vec<zenoh::pubsub::Publisher<'static>>, Error> {
-    let congestion = if plan.block { CongestionControl::Block } else { CongestionControl::Drop };
+    let congestion =
+        if plan.case.is_saturated() { CongestionControl::Block } else { CongestionControl::Drop };
     let declare = |unit| {
         session
             .declare_publisher(key::corrected(&unit_name(unit)?))
@@ -47,7 +50,7 @@ fn outputs(session: &Session, plan: &Plan) -> Result<Vec<zenoh::pubsub::Publishe
             .priority(Priority::RealTime)
             .express(false)
             .wait()
-            .map_err(|error| Error::zenoh("relay", &error))
+            .map_err(Error::zenoh("relay"))
     };
-    (0..plan.units).map(declare).collect()
+    (0..plan.case.units).map(declare).collect()
 }

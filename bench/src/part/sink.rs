@@ -1,7 +1,5 @@
 //! The sink: writes down what came when, and keeps the first ticks of every unit for the check.
 
-use std::fs;
-use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -13,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use zenoh::Wait;
 use zenoh::sample::Sample;
 
-use super::{Plan, Ready, declare_keys, head, hear, open, path, say, wait_for_middle, write_numbers};
+use super::{Plan, Ready, declare_keys, head, hear, open, say, wait_for_middle};
+use crate::chain::Beside;
 use crate::clock::now_ns;
 use crate::error::Error;
 
@@ -42,6 +41,7 @@ struct Book {
     account: Received,
     /// When each tick came: by unit, then by tick; 0 is never.
     came_ns: Vec<u64>,
+    kept: Vec<Kept>,
     units: Vec<Unit>,
 }
 
@@ -51,7 +51,6 @@ struct Unit {
     next: u64,
     revision: u64,
     changes: u64,
-    kept: Vec<Vec<u8>>,
     arbiter: FirstWins,
 }
 
@@ -61,8 +60,9 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         plan: plan.clone(),
         account: Received::default(),
         // Written to, so that the pages are there before the clock runs.
-        came_ns: vec![1; plan.units * plan.ticks()],
-        units: vec![Unit::default(); plan.units],
+        came_ns: vec![1; plan.case.units * plan.ticks()],
+        kept: Vec::new(),
+        units: vec![Unit::default(); plan.case.units],
     }));
     lock(&book).came_ns.fill(0);
     let session = open(plan)?;
@@ -76,10 +76,10 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
             lock(&writing).take(&sample, now);
         })
         .wait();
-    let _subscriber = subscriber.map_err(|error| Error::zenoh("sink", &error))?;
+    let _subscriber = subscriber.map_err(Error::zenoh("sink"))?;
     wait_for_middle(&session)?;
-    say(&Ready { locators: Vec::new(), metrics: None })?;
-    let of_each = |messages: u64| messages * plan.units as u64 * plan.batch as u64;
+    say(&Ready::default())?;
+    let of_each = |messages: u64| messages * (plan.case.units * plan.case.batch) as u64;
     if hear().is_none() {
         return Ok(());
     }
@@ -91,7 +91,7 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
         return Err(Error::Part { part: "sink", what });
     }
     lock(&book).begin();
-    say(&Ready { locators: Vec::new(), metrics: None })?;
+    say(&Ready::default())?;
     // How many messages of each unit the source has sent behind the prelude.
     let Some(line) = hear() else { return Ok(()) };
     let sent: u64 = line.parse().unwrap_or(0);
@@ -100,8 +100,8 @@ pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     let mut book = lock(&book);
     let changes = book.units.iter().map(|unit| unit.changes).min();
     book.account.fewest_changes = changes.unwrap_or(0);
-    write_numbers(&path(plan, "came.bin"), &book.came_ns)?;
-    write_kept(&path(plan, "kept.bin"), &book.units)?;
+    plan.save("came.bin", &book.came_ns)?;
+    plan.save("kept.bin", &book.kept)?;
     say(&book.account)
 }
 
@@ -134,7 +134,7 @@ impl Book {
 
     /// Takes a message that came at a time; of a pair, if its ticks are used: the time is when that is known.
     fn take(&mut self, sample: &Sample, now: u64) {
-        if !self.plan.pair {
+        if self.plan.case.beside != Some(Beside::Standby) {
             return self.enter(sample, now);
         }
         let batch = codec::decode::<CorrectedBatch>(&sample.payload().to_bytes()).ok();
@@ -159,13 +159,10 @@ impl Book {
             account.between_ns[0] = now;
         }
         account.between_ns[1] = now;
-        let head = head::read(self.plan.format, &frame);
+        let head = head::read(self.plan.subject, &frame).filter(|head| head.first + head.ticks <= all);
         let number = head::unit_of(sample.key_expr().as_str());
-        let (Some(head), Some(number)) = (head, number) else {
-            account.strange += 1;
-            return;
-        };
-        let Some(unit) = self.units.get_mut(number).filter(|_| head.first + head.ticks <= all) else {
+        let unit = number.and_then(|number| self.units.get_mut(number));
+        let (Some(head), Some(number), Some(unit)) = (head, number, unit) else {
             account.strange += 1;
             return;
         };
@@ -178,7 +175,7 @@ impl Book {
         }
         unit.next = head.first + head.ticks;
         if head.first < keep {
-            unit.kept.push(frame.to_vec());
+            self.kept.push(Kept { unit: number, frame: frame.to_vec() });
         }
         for tick in head.first..head.first + head.ticks {
             let place = number as u64 * all + tick;
@@ -195,40 +192,12 @@ impl Book {
 }
 
 /// A frame that was kept.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Kept {
     /// Number of its unit.
     pub(crate) unit: usize,
     /// The frame.
     pub(crate) frame: Vec<u8>,
-}
-
-/// Writes frames: number of the unit and length, 4 bytes each, little-endian, then the frame.
-fn write_kept(path: &Path, units: &[Unit]) -> Result<(), Error> {
-    let mut bytes = Vec::new();
-    for (number, unit) in (0_u32..).zip(units) {
-        for frame in &unit.kept {
-            bytes.extend(number.to_le_bytes());
-            bytes.extend(u32::try_from(frame.len()).unwrap_or_default().to_le_bytes());
-            bytes.extend(frame);
-        }
-    }
-    fs::write(path, bytes).map_err(|source| Error::file(path, source))
-}
-
-/// Reads them back.
-pub(crate) fn read_kept(path: &Path) -> Result<Vec<Kept>, Error> {
-    let bytes = fs::read(path).map_err(|source| Error::file(path, source))?;
-    let (mut rest, mut kept) = (&bytes[..], Vec::new());
-    while let Some((unit, behind)) = rest.split_first_chunk::<4>() {
-        let cut = || Error::Invalid { path: path.to_owned(), what: "a frame is cut off".to_owned() };
-        let (length, behind) = behind.split_first_chunk::<4>().ok_or_else(cut)?;
-        let length = u32::from_le_bytes(*length) as usize;
-        let (frame, behind) = behind.split_at_checked(length).ok_or_else(cut)?;
-        kept.push(Kept { unit: u32::from_le_bytes(*unit) as usize, frame: frame.to_vec() });
-        rest = behind;
-    }
-    Ok(kept)
 }
 
 fn lock(book: &Mutex<Book>) -> MutexGuard<'_, Book> {

@@ -1,7 +1,8 @@
 //! The source: publishes raw ticks of simulated units at their times, and writes down when.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use isotherm_bus::presence::wait_for_subscriber;
 use isotherm_protocol::key::{self, RawStream};
 use serde::{Deserialize, Serialize};
 use zenoh::pubsub::Publisher;
@@ -9,9 +10,8 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
 use super::frames::{Instrument, Message};
-use super::{
-    LONGEST_WAIT_S, Pace, Plan, Ready, hear, open, path, say, unit_name, wait_for_middle, write_numbers,
-};
+use super::{LONGEST_WAIT, Plan, Ready, hear, open, runtime, say, unit_name, wait_for_middle};
+use crate::chain::{Case, Pace};
 use crate::clock::{now_ns, sleep_until};
 use crate::error::Error;
 
@@ -36,32 +36,36 @@ struct Outlets {
 /// Publishes when it is told to.
 pub(crate) fn run(plan: &Plan) -> Result<(), Error> {
     let session = open(plan)?;
+    let case = &plan.case;
     let units: Vec<_> =
-        (0..plan.units).map(|unit| Outlets::declare(&session, unit)).collect::<Result<_, _>>()?;
+        (0..case.units).map(|unit| Outlets::declare(&session, unit)).collect::<Result<_, _>>()?;
     wait_for_middle(&session)?;
-    units.iter().try_for_each(|outlets| wait_for_subscriber(&outlets.gyro))?;
+    let runtime = runtime()?;
+    for outlets in &units {
+        runtime.block_on(wait_for_subscriber(&outlets.gyro, LONGEST_WAIT))?;
+    }
 
-    let instrument = Instrument::simulate(plan.rate_hz)?;
+    let instrument = Instrument::simulate(case.rate_hz)?;
     let mut bursts = Vec::with_capacity(plan.messages);
     for index in 0..plan.messages {
-        let burst = (0..plan.units).map(|unit| instrument.message(plan, unit, index));
+        let burst = (0..case.units).map(|unit| instrument.message(case, unit, index));
         bursts.push(burst.collect::<Result<Vec<_>, _>>()?);
     }
     // The pages are there before the clock runs.
-    let mut sent = vec![u64::MAX; plan.units * plan.messages];
-    say(&Ready { locators: Vec::new(), metrics: None })?;
+    let mut sent = vec![u64::MAX; case.units * plan.messages];
+    say(&Ready::default())?;
     if hear().is_none() {
         return Ok(());
     }
     let rest = bursts.split_off(plan.prelude.min(bursts.len()));
     prelude(&units, bursts)?;
-    say(&Ready { locators: Vec::new(), metrics: None })?;
+    say(&Ready::default())?;
     if hear().is_none() {
         return Ok(());
     }
-    let behind = sent.get_mut(plan.prelude * plan.units..).unwrap_or_default();
-    let report = publish(plan, &units, rest, behind)?;
-    write_numbers(&path(plan, "sent.bin"), &sent)?;
+    let behind = sent.get_mut(plan.prelude * case.units..).unwrap_or_default();
+    let report = publish(case, &units, rest, behind)?;
+    plan.save("sent.bin", &sent)?;
     say(&report)?;
     // The session stays open until everything has come through.
     while hear().is_some() {}
@@ -86,7 +90,7 @@ fn prelude(units: &[Outlets], bursts: Vec<Vec<Message>>) -> Result<(), Error> {
 
 /// Publishes everything; `sent` is by message, then by unit.
 fn publish(
-    plan: &Plan,
+    case: &Case,
     units: &[Outlets],
     bursts: Vec<Vec<Message>>,
     sent: &mut [u64],
@@ -94,9 +98,9 @@ fn publish(
     let begin = now_ns() + 1_000_000;
     let mut late = Vec::with_capacity(bursts.len());
     let mut messages = 0;
-    for ((index, burst), sent) in (0_u64..).zip(bursts).zip(sent.chunks_mut(plan.units.max(1))) {
-        let due = begin + index * plan.period_ns();
-        match plan.pace {
+    for ((index, burst), sent) in (0_u64..).zip(bursts).zip(sent.chunks_mut(case.units.max(1))) {
+        let due = begin + index * case.period_ns();
+        match case.pace {
             Pace::Burst => late.push(sleep_until(due)),
             Pace::Saturated { limit_ms } if now_ns() > begin + limit_ms * 1_000_000 => break,
             Pace::Saturated { .. } => {}
@@ -129,7 +133,7 @@ impl Outlets {
                 .congestion_control(CongestionControl::Block)
                 .priority(Priority::RealTime)
                 .wait()
-                .map_err(|error| Error::zenoh("source", &error))
+                .map_err(Error::zenoh("source"))
         };
         Ok(Self {
             temperatures: declare(RawStream::Temperature)?,
@@ -140,7 +144,7 @@ impl Outlets {
 
     fn put(&self, message: Message) -> Result<(), Error> {
         let put = |publisher: &Publisher<'static>, frame: Vec<u8>| {
-            publisher.put(frame).wait().map_err(|error| Error::zenoh("source", &error))
+            publisher.put(frame).wait().map_err(Error::zenoh("source"))
         };
         if let Some(frame) = message.temperatures {
             put(&self.temperatures, frame)?;
@@ -148,23 +152,4 @@ impl Outlets {
         put(&self.accel, message.accel)?;
         put(&self.gyro, message.gyro)
     }
-}
-
-/// Waits until somebody subscribes to what a publisher publishes.
-fn wait_for_subscriber(publisher: &Publisher<'static>) -> Result<(), Error> {
-    let deadline = Instant::now() + Duration::from_secs(LONGEST_WAIT_S);
-    let failed = |error: zenoh::Error| Error::zenoh("source", &error);
-    if publisher.matching_status().wait().map_err(failed)?.matching() {
-        return Ok(());
-    }
-    let listener = publisher.matching_listener().wait().map_err(failed)?;
-    if publisher.matching_status().wait().map_err(failed)?.matching() {
-        return Ok(());
-    }
-    while let Ok(Some(status)) = listener.recv_deadline(deadline) {
-        if status.matching() {
-            return Ok(());
-        }
-    }
-    Err(Error::Part { part: "source", what: format!("nobody subscribes to {}", publisher.key_expr()) })
 }

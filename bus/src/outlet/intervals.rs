@@ -12,8 +12,10 @@ pub(super) struct Intervals {
     stretches: VecDeque<(u64, u64)>,
     /// Everything up to here counts as in it.
     forgotten: Option<u64>,
-    /// Numbers between the first and the last that are not in it.
-    missing: u64,
+    /// The smallest number ever added.
+    smallest: Option<u64>,
+    /// How many there are.
+    count: u64,
 }
 
 impl Intervals {
@@ -24,7 +26,8 @@ impl Intervals {
 
     /// Numbers between the smallest and the largest that are not in it.
     pub(super) fn missing(&self) -> u64 {
-        self.missing
+        let ends = self.last().zip(self.smallest);
+        ends.map_or(0, |(last, smallest)| (last - smallest).saturating_add(1).saturating_sub(self.count))
     }
 
     /// Adds the numbers from `first` to `last`; gives those that are new, as stretches.
@@ -33,78 +36,28 @@ impl Intervals {
         if first > last {
             return Vec::new();
         }
-        // The usual case: it goes on where the last stretch ends, or behind a hole.
-        match self.stretches.back_mut() {
-            None => {
-                self.stretches.push_back((first, last));
-                return vec![(first, last)];
-            }
-            Some((_, end)) if first.checked_sub(1) == Some(*end) => {
-                *end = last;
-                return vec![(first, last)];
-            }
-            Some((_, end)) if first > *end => {
-                self.missing = self.missing.saturating_add(first - *end - 1);
-                self.push_back(first, last);
-                return vec![(first, last)];
-            }
-            Some(_) => {}
-        }
-        self.fill(first, last)
-    }
-
-    /// Adds numbers of which some lie before the last.
-    fn fill(&mut self, first: u64, last: u64) -> Vec<(u64, u64)> {
-        let (mut new, mut next) = (Vec::new(), first);
-        for &(begin, end) in &self.stretches {
-            if next > last || begin > last {
-                break;
-            }
+        // What touches them becomes one stretch with them.
+        let from = self.stretches.partition_point(|(_, end)| end.saturating_add(1) < first);
+        let to = self.stretches.partition_point(|(begin, _)| *begin <= last.saturating_add(1));
+        let (mut new, mut next, mut joined) = (Vec::new(), first, (first, last));
+        for (begin, end) in self.stretches.drain(from..to) {
             if next < begin {
                 new.push((next, begin - 1));
             }
             next = next.max(end.saturating_add(1));
+            joined = (joined.0.min(begin), joined.1.max(end));
         }
         if next <= last {
             new.push((next, last));
         }
-        let (smallest, largest) = match (self.stretches.front(), self.stretches.back()) {
-            (Some((smallest, _)), Some((_, largest))) => (*smallest, *largest),
-            _ => (first, last),
-        };
-        for &(begin, end) in &new {
-            if end < smallest {
-                self.missing = self.missing.saturating_add(smallest - end - 1);
-            } else if begin <= largest {
-                self.missing = self.missing.saturating_sub(end - begin + 1);
-            }
+        self.stretches.insert(from, joined);
+        let count: u64 = new.iter().map(|(first, last)| last - first + 1).sum();
+        self.count = self.count.saturating_add(count);
+        self.smallest = Some(self.smallest.map_or(first, |smallest| smallest.min(first)));
+        if self.stretches.len() > MAX_STRETCHES {
+            self.forgotten = self.stretches.pop_front().map(|(_, last)| last);
         }
-        self.join(first, last);
         new
-    }
-
-    /// Makes one stretch of `first` to `last` and of what touches them.
-    fn join(&mut self, first: u64, last: u64) {
-        let touches =
-            |&(begin, end): &(u64, u64)| begin <= last.saturating_add(1) && first <= end.saturating_add(1);
-        let at = self.stretches.iter().position(|stretch| stretch.1.saturating_add(1) >= first);
-        let at = at.unwrap_or(self.stretches.len());
-        let (mut begin, mut end) = (first, last);
-        while self.stretches.get(at).is_some_and(touches) {
-            if let Some((other_begin, other_end)) = self.stretches.remove(at) {
-                (begin, end) = (begin.min(other_begin), end.max(other_end));
-            }
-        }
-        self.stretches.insert(at, (begin, end));
-    }
-
-    fn push_back(&mut self, first: u64, last: u64) {
-        self.stretches.push_back((first, last));
-        if self.stretches.len() > MAX_STRETCHES
-            && let Some((_, last)) = self.stretches.pop_front()
-        {
-            self.forgotten = Some(last);
-        }
     }
 }
 

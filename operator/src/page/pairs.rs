@@ -1,5 +1,7 @@
 //! Instances of a pair: who speaks for how many units, what the others do, and units that nobody takes.
 
+use std::collections::BTreeMap;
+
 use isotherm_cli::grouped;
 use isotherm_document::few;
 use isotherm_protocol::pair::{PairReport, Role, UnitRole};
@@ -47,10 +49,12 @@ pub fn said(reports: &[PairReport]) -> Vec<(Level, Vec<String>)> {
                 (Level::Fault, vec![format!("{}: bits differ: {difference}", report.member.name)])
             }));
         }
-        let twice = named(reports, |report, unit| {
-            let speaks = |other: &PairReport| other.role(unit) == Some(Role::Speaking);
-            speaks(report) && reports.iter().filter(|other| speaks(other)).count() > 1
-        });
+        let mut speakers = BTreeMap::<&String, usize>::new();
+        for unit in reports.iter().flat_map(|report| &report.units).filter(|it| it.role == Role::Speaking) {
+            *speakers.entry(&unit.unit).or_default() += 1;
+        }
+        let twice = speakers.into_iter().filter(|(_, count)| *count > 1);
+        let twice: Vec<String> = twice.map(|(unit, _)| unit.clone()).collect();
         if !twice.is_empty() {
             said.push((Level::Fault, vec![format!("two instances publish {}", few(&twice))]));
         }
@@ -98,15 +102,6 @@ pub(super) fn of_unit(reports: &[PairReport], serial: &str) -> Option<Line<'stat
         .filter_map(|report| Some(format!("{} {}", report.member.name, report.role(serial)?.name())))
         .collect();
     (reports.len() > 1).then(|| Line::from(format!("instances  {}", roles.join(", "))))
-}
-
-fn named(reports: &[PairReport], is: impl Fn(&PairReport, &str) -> bool) -> Vec<String> {
-    let units = reports.iter().flat_map(|report| report.units.iter().map(move |unit| (report, &unit.unit)));
-    let mut named: Vec<_> =
-        units.filter(|(report, unit)| is(report, unit)).map(|(_, unit)| unit.clone()).collect();
-    named.sort_unstable();
-    named.dedup();
-    named
 }
 
 #[cfg(test)]

@@ -91,24 +91,29 @@ pub fn knows_rates(status: &Status) -> bool {
     !status.instance.is_empty()
 }
 
-/// The whole of a unit: a unit that is gone is that before all else.
-pub(super) fn level(unit: &Unit<'_>, remarks: &[Remark]) -> Level {
-    if unit.gone.is_some() { Level::Gone } else { remarks.first().map_or(Level::Fine, |remark| remark.level) }
-}
+impl Unit<'_> {
+    /// How it is, taken all together: a unit that is gone is that before all else.
+    #[must_use]
+    pub fn level(&self) -> Level {
+        let gone = self.gone.map(|_| Level::Gone);
+        gone.or(self.remarks().first().map(|remark| remark.level)).unwrap_or(Level::Fine)
+    }
 
-/// What is to be noticed of a unit, the gravest first.
-pub(super) fn remarks(unit: &Unit<'_>) -> Vec<Remark> {
-    let mut remarks = Vec::new();
-    let mut add = |level, words: String| remarks.push(Remark { level, words });
-    presence(unit, &mut add);
-    faults(unit, &mut add);
-    flow(unit, &mut add);
-    unit.status.channels.iter().for_each(|channel| self::channel(channel, &mut add));
-    unit.status.sensors.iter().for_each(|sensor| self::sensor(sensor, &mut add));
-    work(unit.status, &mut add);
-    // Stable: within a level the order above stays.
-    remarks.sort_by_key(|remark| std::cmp::Reverse((remark.level == Level::Gone, remark.level)));
-    remarks
+    /// What is to be noticed, the gravest first.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        let mut add = |level, words: String| remarks.push(Remark { level, words });
+        presence(self, &mut add);
+        faults(self, &mut add);
+        flow(self, &mut add);
+        self.status.channels.iter().for_each(|channel| self::channel(channel, &mut add));
+        self.status.sensors.iter().for_each(|sensor| self::sensor(sensor, &mut add));
+        work(self.status, &mut add);
+        // Stable: within a level the order above stays.
+        remarks.sort_by_key(|remark| std::cmp::Reverse((remark.level == Level::Gone, remark.level)));
+        remarks
+    }
 }
 
 fn presence(unit: &Unit<'_>, add: &mut impl FnMut(Level, String)) {

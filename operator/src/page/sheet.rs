@@ -52,16 +52,15 @@ impl Section {
         }
     }
 
-    /// A table, moved in from the left; how wide it is.
+    /// A table, moved in from the left; how wide it is. None where it has no rows.
     fn grid(&mut self, layout: &[Column], rows: &[Vec<Span<'static>>], columns: usize) -> usize {
+        if rows.is_empty() {
+            return 0;
+        }
         let grid = Grid::set(layout, rows, columns.saturating_sub(2));
         let width = usize::from(grid.width) + 2;
         self.lines.extend(grid.indented());
         width
-    }
-
-    fn is_empty(&self) -> bool {
-        self.lines.is_empty()
     }
 
     /// With its heading, and a blank line behind it.
@@ -94,8 +93,8 @@ pub fn sheet(
     let mut lines = title(unit, columns.min(WIDEST));
     let status = unit.status;
     let sections = [
-        Some(calibration::section(status, of_one)),
-        Some(stream(status, service, &name(instances, &status.instance), of_one)),
+        calibration::section(status, of_one),
+        stream(status, service, &name(instances, &status.instance), of_one),
         temperatures::section(unit, of_one),
         calibration::correction(status, of_one),
         sensors::sensors(status, of_one),
@@ -103,11 +102,11 @@ pub fn sheet(
         work::pre_launch(status, of_one),
         work::self_test(status, of_one),
         counters::faults(unit, of_one),
-        Some(latency::section(&status.latency, of_one)),
+        latency::section(&status.latency, of_one),
         counters::counters(status, of_one),
     ];
     let set: Vec<_> =
-        sections.into_iter().flatten().filter(|section| !section.is_empty()).map(Section::set).collect();
+        sections.into_iter().filter(|section| !section.lines.is_empty()).map(Section::set).collect();
     if two {
         lines.extend(side_by_side(set, of_one));
     } else {

@@ -21,29 +21,28 @@ pub(super) enum Sort {
 }
 
 impl Sort {
-    const ALL: [Self; 5] = [Self::State, Self::Serial, Self::Temperature, Self::Latency, Self::Gaps];
+    /// In the order of the variants, with their names.
+    const ALL: [(Self, &'static str); 5] = [
+        (Self::State, "state"),
+        (Self::Serial, "serial"),
+        (Self::Temperature, "temperature"),
+        (Self::Latency, "latency"),
+        (Self::Gaps, "gaps"),
+    ];
 
     /// Its name.
     pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Serial => "serial",
-            Self::State => "state",
-            Self::Temperature => "temperature",
-            Self::Latency => "latency",
-            Self::Gaps => "gaps",
-        }
+        Self::ALL[self as usize].1
     }
 
     /// The next one.
     pub(super) fn next(self) -> Self {
-        let mut after = Self::ALL.into_iter().cycle().skip_while(|sort| *sort != self);
-        after.nth(1).unwrap_or_default()
+        Self::ALL[(self as usize + 1) % Self::ALL.len()].0
     }
 
     /// The one before.
     pub(super) fn previous(self) -> Self {
-        let mut after = Self::ALL.into_iter().rev().cycle().skip_while(|sort| *sort != self);
-        after.nth(1).unwrap_or_default()
+        Self::ALL[(self as usize + Self::ALL.len() - 1) % Self::ALL.len()].0
     }
 
     fn compare(self, a: &Unit<'_>, b: &Unit<'_>) -> Ordering {

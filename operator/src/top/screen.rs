@@ -1,12 +1,10 @@
 //! The terminal: taken, drawn on, and given back whatever happens.
 
 use std::io;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event};
-use ratatui::{DefaultTerminal, Frame};
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
 /// How long the reading thread may go on after the end.
@@ -17,7 +15,7 @@ const POLL: Duration = Duration::from_millis(100);
 /// A panic gives it back first, so that its words can be read.
 #[derive(Debug)]
 pub(super) struct Screen {
-    terminal: DefaultTerminal,
+    pub(super) terminal: DefaultTerminal,
 }
 
 impl Screen {
@@ -31,16 +29,6 @@ impl Screen {
                 Err(error)
             }
         }
-    }
-
-    /// Draws it anew.
-    pub(super) fn draw(&mut self, drawn: impl FnOnce(&mut Frame<'_>)) -> io::Result<()> {
-        self.terminal.draw(drawn).map(|_| ())
-    }
-
-    /// Wipes away what others have written on it.
-    pub(super) fn clear(&mut self) -> io::Result<()> {
-        self.terminal.clear()
     }
 }
 
@@ -56,19 +44,14 @@ impl Drop for Screen {
 
 /// Keys and changes of size, read on a thread of their own.
 #[derive(Debug)]
-pub(super) struct Keys {
-    events: UnboundedReceiver<io::Result<Event>>,
-    ended: Arc<AtomicBool>,
-}
+pub(super) struct Keys(UnboundedReceiver<io::Result<Event>>);
 
 impl Keys {
     /// Begins to read.
     pub(super) fn read() -> Self {
         let (sender, events) = unbounded_channel();
-        let ended = Arc::new(AtomicBool::new(false));
-        let is_over = Arc::clone(&ended);
         std::thread::spawn(move || {
-            while !is_over.load(Ordering::Relaxed) {
+            while !sender.is_closed() {
                 let event = match event::poll(POLL) {
                     Ok(false) => continue,
                     Ok(true) => event::read(),
@@ -80,18 +63,12 @@ impl Keys {
                 }
             }
         });
-        Self { events, ended }
+        Self(events)
     }
 
     /// The next one.
     pub(super) async fn next(&mut self) -> io::Result<Event> {
         let ended = || Err(io::Error::new(io::ErrorKind::UnexpectedEof, "no more keys come"));
-        self.events.recv().await.unwrap_or_else(ended)
-    }
-}
-
-impl Drop for Keys {
-    fn drop(&mut self) {
-        self.ended.store(true, Ordering::Relaxed);
+        self.0.recv().await.unwrap_or_else(ended)
     }
 }

@@ -96,15 +96,26 @@ impl View {
         Act::Draw
     }
 
-    fn table_key(&mut self, code: KeyCode) -> Act {
+    /// How many lines a key goes down.
+    fn motion(&self, code: KeyCode) -> Option<isize> {
         let page = isize::try_from(self.height.max(2) - 1).unwrap_or(1);
+        Some(match code {
+            KeyCode::Up | KeyCode::Char('k') => -1,
+            KeyCode::Down | KeyCode::Char('j') => 1,
+            KeyCode::PageUp => -page,
+            KeyCode::PageDown | KeyCode::Char(' ') => page,
+            KeyCode::Home | KeyCode::Char('g') => isize::MIN,
+            KeyCode::End | KeyCode::Char('G') => isize::MAX,
+            _ => return None,
+        })
+    }
+
+    fn table_key(&mut self, code: KeyCode) -> Act {
+        if let Some(by) = self.motion(code) {
+            self.select(by);
+            return Act::Draw;
+        }
         match code {
-            KeyCode::Up | KeyCode::Char('k') => self.select(-1),
-            KeyCode::Down | KeyCode::Char('j') => self.select(1),
-            KeyCode::PageUp => self.select(-page),
-            KeyCode::PageDown | KeyCode::Char(' ') => self.select(page),
-            KeyCode::Home | KeyCode::Char('g') => self.select(isize::MIN),
-            KeyCode::End | KeyCode::Char('G') => self.select(isize::MAX),
             KeyCode::Enter if self.selected.is_some() => self.show(Shown::Page),
             KeyCode::Char('s') => self.sort_by(self.sort.next(), false),
             KeyCode::Char('S') => self.sort_by(self.sort.previous(), false),
@@ -139,17 +150,9 @@ impl View {
     }
 
     fn scroll(&mut self, code: KeyCode) -> Act {
-        let page = self.height.max(2) - 1;
-        self.page_first = match code {
-            KeyCode::Up | KeyCode::Char('k') => self.page_first.saturating_sub(1),
-            KeyCode::Down | KeyCode::Char('j') => self.page_first.saturating_add(1),
-            KeyCode::PageUp => self.page_first.saturating_sub(page),
-            KeyCode::PageDown | KeyCode::Char(' ') => self.page_first.saturating_add(page),
-            KeyCode::Home | KeyCode::Char('g') => 0,
-            // What draws it knows where its end is.
-            KeyCode::End | KeyCode::Char('G') => usize::MAX,
-            _ => return Act::Nothing,
-        };
+        let Some(by) = self.motion(code) else { return Act::Nothing };
+        // What draws it knows where its end is.
+        self.page_first = self.page_first.saturating_add_signed(by);
         Act::Draw
     }
 

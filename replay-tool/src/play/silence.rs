@@ -24,7 +24,7 @@ const QUIET: Duration = Duration::from_secs(3);
 const ANSWER: Duration = Duration::from_secs(2);
 
 /// What is under way of each unit; the player adds to it.
-pub(super) type Shared = Arc<Mutex<Vec<UnderWay>>>;
+pub(super) type Shared = Arc<Mutex<Vec<Arc<UnderWay>>>>;
 
 /// When a unit's last batch came back.
 struct Since {

@@ -80,8 +80,9 @@ fn day(unix_s: i64) -> Option<String> {
 }
 
 /// What is subtracted at present, by case axis.
-pub(super) fn correction(status: &Status, columns: usize) -> Option<Section> {
-    let applied = status.applied?;
+pub(super) fn correction(status: &Status, columns: usize) -> Section {
+    let mut section = Section::new("Correction subtracted, in case axes");
+    let Some(applied) = status.applied else { return section };
     let rates = applied.angular_rate_rad_per_s.map(figure::deg_per_h);
     let forces = applied.specific_force_m_per_s2.map(figure::milli_g);
     let row = |name: &'static str, values: [f64; 3]| {
@@ -90,7 +91,6 @@ pub(super) fn correction(status: &Status, columns: usize) -> Option<Section> {
     };
     let [x, y, z] = ["x", "y", "z"].map(|axis| Column::number(axis, 0, 9));
     let layout = [Column::words("", 0, super::NAME - 2), x, y, z];
-    let mut section = Section::new("Correction subtracted, in case axes");
     section.grid(&layout, &[row("°/h", rates), row("mg", forces)], columns);
-    Some(section)
+    section
 }

@@ -21,11 +21,8 @@ const ORDINARY: [&str; 8] = [
 ];
 
 /// Faults by kind, the latest first: how many, how long ago, and the first one in words.
-pub(super) fn faults(unit: &Unit<'_>, columns: usize) -> Option<Section> {
+pub(super) fn faults(unit: &Unit<'_>, columns: usize) -> Section {
     let mut faults: Vec<&Fault> = unit.status.faults.iter().collect();
-    if faults.is_empty() {
-        return None;
-    }
     faults.sort_by_key(|fault| std::cmp::Reverse(fault.last_unix_ms));
     let mut section = Section::new("Faults since the start");
     for fault in faults {
@@ -39,15 +36,12 @@ pub(super) fn faults(unit: &Unit<'_>, columns: usize) -> Option<Section> {
             section.lines.push(Line::from(format!("    {part}")));
         }
     }
-    Some(section)
+    section
 }
 
 /// Counters that are not zero, in as many columns as there is room for.
-pub(super) fn counters(status: &Status, columns: usize) -> Option<Section> {
+pub(super) fn counters(status: &Status, columns: usize) -> Section {
     let mut counters: Vec<_> = status.counters.iter().filter(|counter| counter.value > 0).collect();
-    if counters.is_empty() {
-        return None;
-    }
     // Stable: within the ordinary and the others the order of the status stays.
     counters.sort_by_key(|counter| !ORDINARY.contains(&counter.name.as_str()));
     let values: Vec<String> = counters.iter().map(|counter| grouped(counter.value)).collect();
@@ -68,5 +62,5 @@ pub(super) fn counters(status: &Status, columns: usize) -> Option<Section> {
         }
         line
     });
-    Some(Section { title: "Counters that are not zero", lines: lines.collect() })
+    Section { title: "Counters that are not zero", lines: lines.collect() }
 }

@@ -12,10 +12,7 @@ use super::super::tone;
 use super::{Section, sensor_name};
 
 /// A line a sensor: how it is now, and how many ticks something was wrong with.
-pub(super) fn sensors(status: &Status, columns: usize) -> Option<Section> {
-    if status.sensors.is_empty() {
-        return None;
-    }
+pub(super) fn sensors(status: &Status, columns: usize) -> Section {
     let number = |head, rank| Column::number(head, rank, head.len());
     let layout = [
         Column::words("", 0, 8),
@@ -31,7 +28,7 @@ pub(super) fn sensors(status: &Status, columns: usize) -> Option<Section> {
     let rows: Vec<_> = status.sensors.iter().map(row).collect();
     let mut section = Section::new("Sensors, in ticks since the start");
     section.grid(&layout, &rows, columns);
-    Some(section)
+    section
 }
 
 fn row(sensor: &SensorStatus) -> Vec<Span<'static>> {
@@ -64,34 +61,29 @@ fn now(sensor: &SensorStatus) -> (String, Style) {
 }
 
 /// Estimates of the drift estimator, and whether the unit stands still for it.
-pub(super) fn drift(status: &Status, columns: usize) -> Option<Section> {
-    if status.drift.is_empty() && status.rest.is_none() {
-        return None;
-    }
+pub(super) fn drift(status: &Status, columns: usize) -> Section {
     let mut section = Section::new("Drift estimates");
-    if !status.drift.is_empty() {
-        let layout = [
-            Column::words("", 0, 8),
-            Column::number("°/h", 0, 8),
-            Column::number("σ °/h", 0, 7),
-            Column::number("°/h per h", 3, 8),
-            Column::number("used", 2, 5),
-            Column::number("refused", 2, 7),
-            Column::number("NIS", 4, 5),
-            Column::words("", 1, 10),
-        ];
-        let rows: Vec<_> = status.drift.iter().map(estimate).collect();
-        section.grid(&layout, &rows, columns);
-    }
+    let layout = [
+        Column::words("", 0, 8),
+        Column::number("°/h", 0, 8),
+        Column::number("σ °/h", 0, 7),
+        Column::number("°/h per h", 3, 8),
+        Column::number("used", 2, 5),
+        Column::number("refused", 2, 7),
+        Column::number("NIS", 4, 5),
+        Column::words("", 1, 10),
+    ];
+    let rows: Vec<_> = status.drift.iter().map(estimate).collect();
+    section.grid(&layout, &rows, columns);
     let rest = match &status.rest {
-        None => return Some(section),
+        None => return section,
         Some(Rest::Learning) => "declared; too few ticks yet".to_owned(),
         Some(Rest::Still) => "declared; the unit is still".to_owned(),
         Some(Rest::Moved(words)) => format!("declared, but it moved: {words}"),
     };
     let style = if matches!(status.rest, Some(Rest::Moved(_))) { tone::WARNING } else { tone::PLAIN };
     section.field("rest", &rest, style, columns);
-    Some(section)
+    section
 }
 
 fn estimate(drift: &DriftStatus) -> Vec<Span<'static>> {

@@ -22,11 +22,7 @@ const LEAST_SPAN_DEG_C: f64 = 0.1;
 const LEAST_SPAN_DEG_C_PER_S: f64 = 0.001;
 
 /// A line a channel.
-pub(super) fn section(unit: &Unit<'_>, columns: usize) -> Option<Section> {
-    let channels = &unit.status.channels;
-    if channels.is_empty() {
-        return None;
-    }
+pub(super) fn section(unit: &Unit<'_>, columns: usize) -> Section {
     let layout = [
         Column::words("channel", 0, 9),
         Column::number("°C", 0, 6),
@@ -34,11 +30,11 @@ pub(super) fn section(unit: &Unit<'_>, columns: usize) -> Option<Section> {
         Column::number("calibrated", 2, 9),
         Column::words("", 1, 6),
     ];
-    let rows: Vec<_> = channels.iter().map(row).collect();
+    let rows: Vec<_> = unit.status.channels.iter().map(row).collect();
     let mut section = Section::new("Temperatures");
     let used = section.grid(&layout, &rows, columns);
     courses(&mut section.lines, unit, columns.saturating_sub(used));
-    Some(section)
+    section
 }
 
 fn row(channel: &ChannelStatus) -> Vec<Span<'static>> {

@@ -16,7 +16,7 @@ use super::Section;
 const BAR: usize = 30;
 
 /// The pre-launch calibration that is running, or else what came of the last one.
-pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
+pub(super) fn pre_launch(status: &Status, columns: usize) -> Section {
     let mut section = Section::new("Pre-launch calibration");
     if let Some(progress) = &status.pre_launch {
         let (share, left) = figure::progress(progress);
@@ -30,9 +30,9 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
         ];
         let rows: Vec<_> = progress.gyros.iter().map(gyro).collect();
         section.grid(&layout, &rows, columns);
-        return Some(section);
+        return section;
     }
-    let outcome = status.pre_launch_outcome.as_ref()?;
+    let Some(outcome) = &status.pre_launch_outcome else { return section };
     match &outcome.verdict {
         PreLaunchVerdict::Accepted(changes) => {
             let overlay = outcome.overlay.map_or_else(
@@ -60,7 +60,7 @@ pub(super) fn pre_launch(status: &Status, columns: usize) -> Option<Section> {
             section.field("last one", "aborted; the constants stay", tone::PLAIN, columns);
         }
     }
-    Some(section)
+    section
 }
 
 fn gyro(gyro: &PreLaunchGyro) -> Vec<Span<'static>> {
@@ -92,9 +92,9 @@ fn change(change: &ConstantsChange) -> Vec<Span<'static>> {
 }
 
 /// The last self-test: what failed in it, and how much was checked.
-pub(super) fn self_test(status: &Status, columns: usize) -> Option<Section> {
-    let report = status.self_test.as_ref()?;
+pub(super) fn self_test(status: &Status, columns: usize) -> Section {
     let mut section = Section::new("Self-test");
+    let Some(report) = &status.self_test else { return section };
     let failed: Vec<_> = report.items.iter().filter(|item| !item.passed).collect();
     let checked = of(report.items.len(), "check");
     let (words, style) = if report.passed {
@@ -107,7 +107,7 @@ pub(super) fn self_test(status: &Status, columns: usize) -> Option<Section> {
         let name = Span::styled(format!("  ! {}: ", item.name), tone::FAULT);
         section.lines.push(Line::from_iter([name, Span::raw(measured(item))]));
     }
-    Some(section)
+    section
 }
 
 /// Value and limits of a check.

@@ -11,31 +11,36 @@ use tokio::sync::Notify;
 use zenoh::Session;
 use zenoh::pubsub::Subscriber;
 
-use super::tally::{Sent, TickTally};
-use super::{Account, GyroTicks};
+use super::tally::TickTally;
 use crate::BusError;
 
 /// The gyro ticks of a unit under way.
 ///
 /// What comes back is matched by sequence number, not counted: where an acknowledging message is lost, the next one
 /// passes over its ticks, and ticks that the service has announced as missing count as done.
-#[derive(Debug, Default)]
-pub(super) struct InFlight {
+#[derive(Debug)]
+pub struct UnderWay {
+    unit: UnitId,
     tally: Mutex<TickTally>,
     /// Batches that came back.
     batches: AtomicU64,
     progress: Notify,
 }
 
-impl InFlight {
+impl UnderWay {
+    fn of(unit: &UnitId) -> Self {
+        let (tally, batches, progress) = Default::default();
+        Self { unit: unit.clone(), tally, batches, progress }
+    }
+
     /// Subscribes to what comes back for `unit`.
     pub(super) async fn declare(
         session: &Session,
         unit: &UnitId,
     ) -> Result<(Arc<Self>, Subscriber<()>), BusError> {
-        let in_flight = Arc::new(Self::default());
+        let under_way = Arc::new(Self::of(unit));
         let key = key::corrected(unit);
-        let back = Arc::clone(&in_flight);
+        let back = Arc::clone(&under_way);
         let subscriber = session
             .declare_subscriber(&key)
             .callback(move |sample| {
@@ -46,16 +51,12 @@ impl InFlight {
             })
             .await
             .map_err(|source| BusError::Declare { key, source })?;
-        Ok((in_flight, subscriber))
+        Ok((under_way, subscriber))
     }
 
-    fn tally(&self) -> MutexGuard<'_, TickTally> {
+    /// The account of the ticks.
+    pub(super) fn tally(&self) -> MutexGuard<'_, TickTally> {
         self.tally.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Enters what is about to be sent.
-    pub(super) fn sent(&self, ticks: GyroTicks) -> Sent {
-        self.tally().sent(ticks)
     }
 
     /// Enters what came back.
@@ -67,18 +68,22 @@ impl InFlight {
         self.progress.notify_waiters();
     }
 
-    /// Ticks under way.
-    pub(super) fn ticks(&self) -> u64 {
+    /// The unit.
+    #[must_use]
+    pub fn unit(&self) -> &UnitId {
+        &self.unit
+    }
+
+    /// Gyro ticks under way.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
         self.tally().under_way()
     }
 
     /// Batches that came back so far: where it stands still, nothing comes.
-    pub(super) fn batches(&self) -> u64 {
+    #[must_use]
+    pub fn batches(&self) -> u64 {
         self.batches.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn account(&self) -> Account {
-        self.tally().account()
     }
 
     /// Waits until fewer than `limit` ticks are under way; gives their number where nothing came back for `patience`.
@@ -100,12 +105,13 @@ impl InFlight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::outlet::GyroTicks;
 
     #[tokio::test]
     async fn waiting_ends_with_the_number_under_way() {
-        let in_flight = InFlight::default();
-        in_flight.sent(GyroTicks { series: 1, first: 0, count: 8 });
-        assert_eq!(in_flight.wait_below(9, Duration::ZERO).await, Ok(()));
-        assert_eq!(in_flight.wait_below(8, Duration::from_millis(1)).await, Err(8));
+        let under_way = UnderWay::of(&UnitId::new("ZLG-0001").unwrap());
+        under_way.tally().sent(GyroTicks { series: 1, first: 0, count: 8 });
+        assert_eq!(under_way.wait_below(9, Duration::ZERO).await, Ok(()));
+        assert_eq!(under_way.wait_below(8, Duration::from_millis(1)).await, Err(8));
     }
 }
