@@ -101,8 +101,8 @@ impl Messages {
     /// # Errors
     /// [`Error::File`].
     pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
-        let log = Log::corrected(path, unit)?;
-        Ok(Self { log, units: part.units.clone(), window: part.window(), beginning_ns: None, over: false })
+        let log = Log::corrected(path, unit, part)?;
+        Ok(Self { log, units: part.units.clone(), window: None, beginning_ns: None, over: false })
     }
 
     /// The next message; `None` behind the last.

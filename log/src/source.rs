@@ -105,12 +105,12 @@ impl Log {
         Ok(Self { source: Source::Text(Box::new(text)), progress })
     }
 
-    /// Opens a CSV of corrected ticks of a unit.
+    /// Opens a part of a CSV of corrected ticks of a unit.
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn corrected(path: &Path, unit: &UnitId) -> Result<Self, Error> {
-        let ticks = CorrectedLog::open(path, &BTreeSet::new(), unit)?;
+    pub(crate) fn corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
+        let ticks = CorrectedLog::open(path, &Part { units: BTreeSet::new(), ..part.clone() }, unit)?;
         let progress = ticks.progress();
         let csv = CorrectedCsv { ticks, ready: VecDeque::new(), rows: 0 };
         Ok(Self { source: Source::Corrected(Box::new(csv)), progress })

@@ -31,6 +31,7 @@ pub(crate) use dates::{DAY_NS, is_date, is_next_day, says_order, stamp_ns};
 pub(crate) use input::{Source as Bytes, open as open_raw};
 
 pub use error::{LogError, LogFault, Reason};
+pub(crate) use window::Stretch;
 pub use window::Window;
 
 /// Lines of a file, decompressed and decoded.

@@ -62,6 +62,7 @@ impl DriftArgs {
                     .to_owned(),
             ));
         }
+        self.refuse_mixture()?;
         let logs = Logs { unnamed: Some(unnamed()?), ..Logs::together(&self.log, &self.base) };
         let task = Task::new("Noise and drift of several units", files, logs);
         task.run_on(|| self.units(&task.logs), |job| self.analyse(job))
@@ -96,6 +97,26 @@ impl DriftArgs {
         Ok(Done { report, document })
     }
 
+    /// Raw ticks beside corrected ones would be left out without a word.
+    fn refuse_mixture(&self) -> Result<(), Error> {
+        let logs = &self.log.log;
+        let corrected = logs.iter().find(|path| is_csv(path)).filter(|_| !self.corrected);
+        let raw = logs.iter().find(|path| !is_csv(path));
+        let words = match (corrected, raw) {
+            (Some(corrected), Some(raw)) => format!(
+                "{} is a CSV of corrected ticks, {} is not: give logs of one kind, or --corrected for the corrected ticks of recordings",
+                corrected.display(),
+                raw.display()
+            ),
+            (Some(corrected), None) if self.increment_weight.is_some() => format!(
+                "{} is a CSV of corrected ticks: --increment-weight is for raw counts; leave it out",
+                corrected.display()
+            ),
+            _ => return Ok(()),
+        };
+        Err(Error::Usage(words))
+    }
+
     fn is_corrected(&self) -> bool {
         self.corrected || self.log.log.iter().any(|path| is_csv(path))
     }
@@ -104,11 +125,7 @@ impl DriftArgs {
         let work = job.work;
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
         if self.is_corrected() {
-            let unit = self.log.reading.serial()?;
-            let mut bar = job.at_work("reading");
-            let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, &work.cut, || bar.step());
-            bar.finish();
-            return columns;
+            return self.log.reading.corrected(&self.log.log, kind, &work.cut, job.at_work("reading"));
         }
         let run = work.run()?;
         if let Some(document) = &work.base {

@@ -201,13 +201,9 @@ impl ImpactArgs {
 
     fn columns(&self, logs: &[PathBuf], cut: &Cut) -> Result<Columns, Error> {
         let args = LogArgs { log: logs.to_vec(), reading: self.reading.clone() };
-        let unit = self.reading.serial()?;
         let raw = self.reading.mapping.is_some();
         if !raw && (logs.iter().all(|path| is_csv(path)) || self.document.is_none()) {
-            let mut bar = Bar::at_work("reading");
-            let columns = Columns::of_corrected(logs, unit.as_ref(), Kind::Rate, cut, || bar.step());
-            bar.finish();
-            return columns;
+            return self.reading.corrected(logs, Kind::Rate, cut, Bar::at_work("reading"));
         }
         let Some(document) = &self.document else {
             return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));

@@ -11,9 +11,13 @@ use isotherm_log::part::{LogFiles, Part, are_recordings};
 use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
+use isotherm_cli::Bar;
+
 use super::bar;
 use crate::document::{name_of, recordings_in};
 use crate::error::Error;
+use crate::fits::drift::columns::{Columns, Kind};
+use crate::runs::cut::Cut;
 use crate::runs::{Run, units_of};
 
 /// Gyro ticks in a batch of a text log.
@@ -78,6 +82,32 @@ impl Reading {
         [start, end.unwrap_or(f64::INFINITY)]
     }
 
+    /// The part of each log's time.
+    pub(super) fn part(&self) -> Result<Part, Error> {
+        let length = |length: Span| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns()));
+        let end = self.end.or_else(|| self.duration.map(length));
+        if let Some(end) = end.filter(|end| *end < self.start) {
+            let words =
+                format!("--end is {} s, must not be before --start, {} s", end.as_s(), self.start.as_s());
+            return Err(Error::Usage(words));
+        }
+        Ok(Part { start: self.start, end, ..Part::default() })
+    }
+
+    /// Corrected ticks of these logs.
+    pub(super) fn corrected(
+        &self,
+        logs: &[PathBuf],
+        kind: Kind,
+        cut: &Cut,
+        mut bar: Bar,
+    ) -> Result<Columns, Error> {
+        let part = Part { units: self.serial()?.into_iter().collect(), ..self.part()? };
+        let columns = Columns::of_corrected(logs, &part, kind, cut, || bar.step());
+        bar.finish();
+        columns
+    }
+
     /// Runs by unit, each log for itself: every recording is a run, and of text logs as many files as the mapping has.
     pub(super) fn runs(
         &self,
@@ -102,14 +132,7 @@ impl Reading {
         log: &[PathBuf],
         fallback: Option<&UnitId>,
     ) -> Result<BTreeMap<UnitId, Run>, Error> {
-        let length = |length: Span| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns()));
-        let end = self.end.or_else(|| self.duration.map(length));
-        if let Some(end) = end.filter(|end| *end < self.start) {
-            let words =
-                format!("--end is {} s, must not be before --start, {} s", end.as_s(), self.start.as_s());
-            return Err(Error::Usage(words));
-        }
-        let part = Part { start: self.start, end, ..Part::default() };
+        let part = self.part()?;
         let given = self.serial()?;
         let name = names(log);
         let files = &unfolded(log)?;

@@ -21,7 +21,7 @@ use crate::progress::Progress;
 use crate::recording::RecordingReport;
 use crate::replica::{entry_words, join};
 use crate::source::{LogReport, is_recording};
-use crate::text::{Bytes, open_raw};
+use crate::text::{Bytes, Stretch, open_raw};
 
 /// Rows of a CSV that are read together.
 const ROWS: usize = 512;
@@ -41,6 +41,8 @@ pub struct Ticks {
 pub struct CorrectedLog {
     path: PathBuf,
     source: Source,
+    /// The part of a CSV or wire file that is taken.
+    part: Stretch,
     progress: Progress,
 }
 
@@ -72,15 +74,16 @@ pub fn is_csv(path: &Path) -> bool {
 }
 
 impl CorrectedLog {
-    /// Opens a log: of `units`, all of a recording's where there are none; a CSV is of the first of them, or of `unnamed`.
+    /// Opens a part of a log. A CSV is of the first of its units, or of `unnamed`.
+    ///
+    /// A recording is cut between messages, a CSV or wire file between ticks.
     ///
     /// # Errors
     /// [`Error::File`] where it cannot be opened.
-    pub fn open(path: &Path, units: &BTreeSet<UnitId>, unnamed: &UnitId) -> Result<Self, Error> {
-        let read = Arc::default();
+    pub fn open(path: &Path, part: &Part, unnamed: &UnitId) -> Result<Self, Error> {
+        let (read, units) = (Arc::default(), &part.units);
         let (source, progress) = if is_recording(path) {
-            let part = Part { units: units.clone(), ..Part::default() };
-            let messages = LogFiles::Recordings(vec![path.to_owned()]).open(&part)?;
+            let messages = LogFiles::Recordings(vec![path.to_owned()]).open(part)?;
             let (progress, joiner) = (messages.progress(), Joiner::new());
             let recording = Recording { messages, joiner, events: BTreeMap::new(), ready: VecDeque::new() };
             (Source::Recording(Box::new(recording)), progress)
@@ -95,7 +98,8 @@ impl CorrectedLog {
             };
             (source, Progress::new(read, length))
         };
-        Ok(Self { path: path.to_owned(), source, progress })
+        let part = Stretch::new(part.start, part.duration());
+        Ok(Self { path: path.to_owned(), source, part, progress })
     }
 
     /// The next ticks; `None` behind the last.
@@ -105,12 +109,20 @@ impl CorrectedLog {
     pub fn next_ticks(&mut self) -> Result<Option<Ticks>, Error> {
         let path = &self.path;
         let failed = |source| Error::file(path, "read the corrected log", source);
+        let part = &mut self.part;
+        let mut is_in_part = |LogTick { tick, .. }: &LogTick| part.holds(tick.end_time - tick.duration, tick.end_time);
         match &mut self.source {
             Source::Recording(recording) => recording.next_ticks(),
-            Source::Csv { lines, unit, line } => {
-                let ticks = read_rows(lines, line).map_err(failed)?;
-                Ok((!ticks.is_empty()).then(|| Ticks { unit: unit.clone(), ticks }))
-            }
+            Source::Csv { lines, unit, line } => loop {
+                let mut ticks = read_rows(lines, line).map_err(failed)?;
+                if ticks.is_empty() {
+                    return Ok(None);
+                }
+                ticks.retain(&mut is_in_part);
+                if !ticks.is_empty() {
+                    return Ok(Some(Ticks { unit: unit.clone(), ticks }));
+                }
+            },
             Source::Wire { bytes, units, frame, begun } => loop {
                 let read = read_frame(bytes, frame).map_err(|source| match source.kind() {
                     // What does not begin as one is a file of another kind: a CSV of other columns, say.
@@ -121,8 +133,9 @@ impl CorrectedLog {
                 });
                 let Some(batch) = read? else { return Ok(None) };
                 *begun = true;
-                let ticks = ticks_of(batch)?;
-                if units.is_empty() || units.contains(&ticks.unit) {
+                let mut ticks = ticks_of(batch)?;
+                ticks.ticks.retain(&mut is_in_part);
+                if !ticks.ticks.is_empty() && (units.is_empty() || units.contains(&ticks.unit)) {
                     return Ok(Some(ticks));
                 }
             },

@@ -1,6 +1,5 @@
 //! Two logs of the same readings, and what differs.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use isotherm_correction::sample::{CorrectedTick, TickFlags};
@@ -9,6 +8,7 @@ use isotherm_correction::units::{Span, Timestamp};
 use super::*;
 use crate::offline::rows::{write_header, write_tick};
 use crate::offline::unit_id;
+use crate::part::Part;
 
 fn tick(sequence: u64) -> CorrectedTick {
     let n = f64::from(u32::try_from(sequence).unwrap());
@@ -41,7 +41,7 @@ fn compared(a: &[CorrectedTick], b: &[CorrectedTick], options: DiffOptions) -> A
     let folder = tempfile::tempdir().unwrap();
     let unit = unit_id("U-1").unwrap();
     let open =
-        |name, ticks| CorrectedLog::open(&csv(folder.path(), name, ticks), &BTreeSet::new(), &unit).unwrap();
+        |name, ticks| CorrectedLog::open(&csv(folder.path(), name, ticks), &Part::default(), &unit).unwrap();
     let mut accounts = compare(&mut open("a", a), &mut open("b", b), options, |_| {}).unwrap();
     accounts.remove(&unit).unwrap_or_default()
 }
@@ -126,7 +126,7 @@ fn what_is_no_corrected_log_is_refused_with_its_place() {
     .map(|(name, bytes)| {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let mut log = CorrectedLog::open(&path, &BTreeSet::new(), &unit).unwrap();
+        let mut log = CorrectedLog::open(&path, &Part::default(), &unit).unwrap();
         log.next_ticks().unwrap_err().to_string()
     });
     insta::assert_snapshot!(refused.join("\n").replace(folder.path().to_str().unwrap(), "FOLDER"));

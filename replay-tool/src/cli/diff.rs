@@ -11,6 +11,7 @@ use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
+use isotherm_log::part::Part;
 use isotherm_log::replica::{check_units, scan};
 use isotherm_log::source::is_recording;
 use isotherm_protocol::key::UnitId;
@@ -86,8 +87,9 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
     }
     let unnamed = unnamed(args, &units)?;
     let named = !(units.is_empty() && is_csv(&args.a) && is_csv(&args.b));
-    let mut a = CorrectedLog::open(&args.a, &units, &unnamed)?;
-    let mut b = CorrectedLog::open(&args.b, &units, &unnamed)?;
+    let part = Part { units, ..Part::default() };
+    let mut a = CorrectedLog::open(&args.a, &part, &unnamed)?;
+    let mut b = CorrectedLog::open(&args.b, &part, &unnamed)?;
     let tolerance = Tolerance {
         angle_rad: args.tolerance_angle,
         velocity_m_per_s: args.tolerance_velocity,
@@ -139,7 +141,7 @@ fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
         let outlines = scan(std::slice::from_ref(other))?;
         outlines.units.into_iter().filter(|(_, unit)| unit.has_corrected).map(|(unit, _)| unit).collect()
     } else {
-        let mut log = CorrectedLog::open(other, units, &unit_id("unit")?)?;
+        let mut log = CorrectedLog::open(other, &Part::default(), &unit_id("unit")?)?;
         log.next_ticks()?.map(|ticks| ticks.unit).into_iter().collect()
     };
     match of_other.as_slice() {

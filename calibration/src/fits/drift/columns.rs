@@ -142,22 +142,21 @@ impl Columns {
         columns.finish()
     }
 
-    /// From a log of corrected ticks, as `isotherm-replay correct` writes it; `cut` learns where it is cut short.
+    /// From a part of each log of corrected ticks, as `isotherm-replay correct` writes it; `cut` learns where it is cut short.
     ///
     /// # Errors
     /// [`Error::Refused`] where it has none, or of several units; [`Error::Log`].
     pub fn of_corrected(
         paths: &[PathBuf],
-        unit: Option<&UnitId>,
+        part: &Part,
         kind: Kind,
         cut: &Cut,
         mut progress: impl FnMut(),
     ) -> Result<Self, Error> {
         let unnamed = unnamed()?;
-        let units = unit.cloned().into_iter().collect();
         let mut columns: Option<Self> = None;
         for path in paths {
-            let mut log = CorrectedLog::open(path, &units, &unnamed)?;
+            let mut log = CorrectedLog::open(path, part, &unnamed)?;
             while let Some(ticks) = log.next_ticks()? {
                 let columns = columns.get_or_insert_with(|| Self::empty(ticks.unit.clone(), kind));
                 if columns.unit != ticks.unit {
