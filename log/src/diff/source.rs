@@ -110,7 +110,8 @@ impl CorrectedLog {
         let path = &self.path;
         let failed = |source| Error::file(path, "read the corrected log", source);
         let part = &mut self.part;
-        let mut is_in_part = |LogTick { tick, .. }: &LogTick| part.holds(tick.end_time - tick.duration, tick.end_time);
+        let mut is_in_part =
+            |LogTick { tick, .. }: &LogTick| part.holds(tick.end_time - tick.duration, tick.end_time);
         match &mut self.source {
             Source::Recording(recording) => recording.next_ticks(),
             Source::Csv { lines, unit, line } => loop {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use isotherm_correction::sample::{CorrectedTick, OutputKind, SensorFlags};
 use isotherm_log::diff::CorrectedLog;
 use isotherm_log::offline::{Loaded, unit_id};
+use isotherm_log::part::Part;
 use isotherm_protocol::key::UnitId;
 
 use super::DEG_PER_H_IN_RAD_PER_S;
