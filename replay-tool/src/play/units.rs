@@ -36,7 +36,7 @@ pub(super) struct PlayedUnit {
 #[derive(Debug)]
 pub(super) struct Units<'a> {
     options: &'a PlayOptions,
-    all: Vec<PlayedUnit>,
+    pub(super) all: Vec<PlayedUnit>,
     /// Places of the units that one of the log is played as.
     of: BTreeMap<UnitId, Range<usize>>,
     serials: BTreeSet<UnitId>,
@@ -98,22 +98,6 @@ impl<'a> Units<'a> {
             Acknowledge::Bounded(Some(given)) => Some(given),
             Acknowledge::Bounded(None) => Some((ALL_IN_FLIGHT / self.all.len().max(1) as u64).min(IN_FLIGHT)),
         }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.all.len()
-    }
-
-    pub(super) fn get_mut(&mut self, place: usize) -> Option<&mut PlayedUnit> {
-        self.all.get_mut(place)
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = &PlayedUnit> {
-        self.all.iter()
-    }
-
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut PlayedUnit> {
-        self.all.iter_mut()
     }
 }
 
