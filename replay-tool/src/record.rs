@@ -37,7 +37,7 @@ use files::Files;
 use inquiry::Question;
 use queue::Queue;
 use report::{fill, finish};
-use services::{await_service, follow_services, open, start_asker};
+use services::{await_service, follow_services, note, open, start_asker};
 use writer::{FileWriter, Told};
 
 pub use queue::TopicCount;
@@ -176,7 +176,7 @@ async fn on_session(
                 Told::Failed => break EndedBy::Failure,
             },
             Some(life) = lives.recv() => {
-                if life.note(&mut alive, &mut report) {
+                if note(life, &mut alive, &mut report) {
                     // It may not have heard of the subscriptions when its first units began.
                     ask(&mut repeat_from);
                 }

@@ -256,11 +256,6 @@ impl Iterator for Simulation {
     fn next(&mut self) -> Option<Step> {
         (self.sequence < self.ticks).then(|| self.step())
     }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        let remaining = usize::try_from(self.remaining());
-        (remaining.unwrap_or(usize::MAX), remaining.ok())
-    }
 }
 
 #[expect(
