@@ -32,6 +32,12 @@ pub struct Converted {
     pub duplicates: u64,
     /// What should have been written and could not be, by reason.
     pub lost: BTreeMap<&'static str, u64>,
+    /// Topics of a ROS 2 bag.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<crate::bag::BagTopic>,
+    /// Units that have nothing in a ROS 2 bag, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 impl Converted {
@@ -51,12 +57,6 @@ impl Converted {
         self.lose("too late to be sorted", tally.late);
         self.lose("two different ticks or readings at one time", tally.conflicts);
     }
-
-    /// Whether anything was lost.
-    #[must_use]
-    pub fn lost_data(&self) -> bool {
-        !self.lost.is_empty()
-    }
 }
 
 /// What a conversion came to, and the reading of its log.
@@ -65,26 +65,15 @@ pub struct Outcome {
     /// What was written, and what was not.
     #[serde(flatten)]
     pub converted: Converted,
-    /// Topics of a ROS 2 bag.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub topics: Vec<crate::bag::BagTopic>,
-    /// Units that have nothing in a ROS 2 bag, and why.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub notes: Vec<String>,
     /// What reading the log came to.
     pub log: LogReport,
 }
 
 impl Outcome {
-    /// Files written and what was lost, without topics.
-    pub(super) fn of(converted: Converted, log: LogReport) -> Self {
-        Self { converted, topics: Vec::new(), notes: Vec::new(), log }
-    }
-
     /// Whether anything was lost, in the log or on the way.
     #[must_use]
     pub fn lost_data(&self) -> bool {
-        self.converted.lost_data() || self.log.lost_data()
+        !self.converted.lost.is_empty() || self.log.lost_data()
     }
 }
 

@@ -59,5 +59,5 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
         }
         partial.keep()?;
     }
-    Ok(Outcome::of(converted, log))
+    Ok(Outcome { converted, log })
 }

@@ -37,5 +37,5 @@ pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
     partial.keep()?;
     let unit = topics.first().and_then(Topic::unit).map(ToString::to_string);
     let files = vec![Written { path, unit, what: "recording", rows }];
-    Ok(Outcome::of(Converted { files, ..Converted::default() }, log))
+    Ok(Outcome { converted: Converted { files, ..Converted::default() }, log })
 }

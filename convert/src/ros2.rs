@@ -71,21 +71,13 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     }
     let (summary, yaml) = writer.finish(&file)?;
     let metadata = conversion.place.write(&conversion.out.join("metadata.yaml"), &yaml)?;
-    converted.files.push(Written {
-        path: bag.path().to_owned(),
-        unit: None,
-        what: "ROS 2 bag",
-        rows: summary.messages(),
-    });
-    converted.files.push(Written {
-        path: metadata.path().to_owned(),
-        unit: None,
-        what: "its description",
-        rows: 1,
-    });
-    bag.keep()?;
-    metadata.keep()?;
-    Ok(Outcome { topics: summary.topics, notes, ..Outcome::of(converted, log) })
+    let files = [(bag, "ROS 2 bag", summary.messages()), (metadata, "its description", 1)];
+    for (partial, what, rows) in files {
+        converted.files.push(Written { path: partial.path().to_owned(), unit: None, what, rows });
+        partial.keep()?;
+    }
+    (converted.topics, converted.notes) = (summary.topics, notes);
+    Ok(Outcome { converted, log })
 }
 
 /// The topics of a unit.

@@ -49,7 +49,7 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
         partials.extend(text.finish(&mut converted)?);
     }
     partials.into_iter().try_for_each(Partial::keep)?;
-    Ok(Outcome::of(converted, log))
+    Ok(Outcome { converted, log })
 }
 
 /// Names of a unit's files.

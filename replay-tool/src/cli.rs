@@ -88,7 +88,7 @@ fn run(cli: Cli) -> Result<Exit, Error> {
 
 /// Writes to standard output; a reader that has gone away is no error.
 fn print(text: &[u8]) -> Result<(), Error> {
-    to_stdout(text).map_err(|source| Error::Stdout { source })
+    to_stdout(text).map_err(Error::Stdout)
 }
 
 /// Runs the program and says how it ended.

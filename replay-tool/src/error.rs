@@ -19,43 +19,25 @@ pub enum Error {
     #[error("{}", .0.join("\n"))]
     Scenario(Vec<String>),
     /// Standard output that cannot be written.
-    #[error("cannot write to standard output: {source}")]
-    Stdout {
-        /// Why.
-        source: io::Error,
-    },
+    #[error("cannot write to standard output: {0}")]
+    Stdout(#[source] io::Error),
     /// Arguments that do not go together.
     #[error("{0}")]
     Usage(String),
-    /// A tick that does not fit a frame.
-    #[error("cannot write a frame: {0}")]
-    Codec(#[from] isotherm_protocol::codec::CodecError),
     /// Zenoh.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// No service where one is needed.
-    #[error("{words}")]
-    NoService {
-        /// What was waited for, and what else could be done.
-        words: String,
-    },
-    /// Nothing comes back of what is played.
-    #[error("{words}")]
-    Silent {
-        /// Of which unit, and why.
-        words: String,
-    },
+    /// No service where one is needed, or none that sends anything back.
+    #[error("{0}")]
+    Service(String),
     /// A log without a message to play or to correct.
     #[error(
         "nothing was {0}: there is no raw message of these units, topics and times; `isotherm-replay list LOG` shows what there is"
     )]
     Nothing(&'static str),
     /// The asynchronous runtime does not start.
-    #[error("cannot start the runtime: {source}")]
-    Runtime {
-        /// Why.
-        source: io::Error,
-    },
+    #[error("cannot start the runtime: {0}")]
+    Runtime(#[source] io::Error),
     /// Ctrl-C or a stop signal.
     #[error("stopped by a signal")]
     Stopped,

@@ -73,7 +73,8 @@ pub struct Pacer {
     speed: Speed,
     /// When a message was due, and its time in the log (ns).
     origin: Option<(Instant, i64)>,
-    late: Late,
+    /// How late messages were; nothing at `max`, where none is due.
+    pub(crate) late: Late,
 }
 
 impl Pacer {
@@ -122,12 +123,6 @@ impl Pacer {
             self.late.note(due.elapsed());
         }
     }
-
-    /// How late messages were; nothing at `max`, where none is due.
-    #[must_use]
-    pub fn lateness(&self) -> Lateness {
-        self.late.lateness()
-    }
 }
 
 /// How late messages went out.
@@ -149,7 +144,7 @@ pub struct Lateness {
 
 /// Counts latenesses.
 #[derive(Debug)]
-struct Late {
+pub(crate) struct Late {
     /// In µs, to 1 %.
     counts: Option<Histogram<u64>>,
     misses: u64,
@@ -173,7 +168,7 @@ impl Late {
         self.latest = self.latest.max(late);
     }
 
-    fn lateness(&self) -> Lateness {
+    pub(crate) fn lateness(&self) -> Lateness {
         #[expect(clippy::cast_precision_loss, reason = "a day has 8.64e10 µs")]
         let at = |quantile| {
             self.counts.as_ref().map_or(0.0, |counts| counts.value_at_quantile(quantile) as f64 * 1e-3)
@@ -223,7 +218,7 @@ mod tests {
         // 10 s of log at 100×: at least 100 ms, and no thousand rounded-up sleeps of a millisecond each.
         let took = begun.elapsed();
         assert!(took >= Duration::from_millis(100) && took < Duration::from_millis(700), "{took:?}");
-        let late = pacer.lateness();
+        let late = pacer.late.lateness();
         assert_eq!(late.messages, 1001);
         assert!(late.p50_ms <= late.p99_ms && late.p99_ms <= late.max_ms, "{late:?}");
     }

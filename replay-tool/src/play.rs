@@ -148,9 +148,9 @@ pub async fn play(
             report.units.iter_mut().for_each(|unit| unit.note_services(&reports));
         }
         if ended.is_ok() && options.acknowledge != Acknowledge::No {
-            silence::note_unknown_channels(&opened, player.channels(), &mut report).await;
+            silence::note_unknown_channels(&opened, &player.playlist.channels, &mut report).await;
         }
-        Played { report, log: player.log_report(), ended }
+        Played { report, log: player.playlist.messages.report(), ended }
     };
     let closed = isotherm_bus::close(opened, CLOSE_LIMIT).await;
     // Where playing has failed, that is what counts.
@@ -177,7 +177,7 @@ async fn run<W: Watch>(
         biased;
         ended = player.run() => match ended {
             Err(Error::Bus(BusError::NoAcknowledgement { unit, in_flight, waited, .. })) => {
-                Err(Error::Silent { words: silence::explained(session, &unit, in_flight, waited).await })
+                Err(Error::Service(silence::explained(session, &unit, in_flight, waited).await))
             }
             ended => ended,
         },

@@ -37,7 +37,7 @@ use files::Files;
 use inquiry::Question;
 use queue::Queue;
 use report::{fill, finish};
-use services::{await_service, follow_services, open, start_asker};
+use services::{await_service, follow_services, note, open, start_asker};
 use writer::{FileWriter, Told};
 
 pub use queue::TopicCount;
@@ -148,7 +148,7 @@ async fn on_session(
         tell,
     )?;
     let thread = std::thread::Builder::new().name("recording".to_owned()).spawn(move || writer.run());
-    let thread = thread.map_err(|source| Error::Runtime { source })?;
+    let thread = thread.map_err(Error::Runtime)?;
 
     let begun = Instant::now();
     let (asker, questions, mut answers) = start_asker(session, options, &queue);
@@ -176,7 +176,7 @@ async fn on_session(
                 Told::Failed => break EndedBy::Failure,
             },
             Some(life) = lives.recv() => {
-                if life.note(&mut alive, &mut report) {
+                if note(life, &mut alive, &mut report) {
                     // It may not have heard of the subscriptions when its first units began.
                     ask(&mut repeat_from);
                 }
@@ -216,7 +216,7 @@ async fn on_session(
         report.warnings.push(words);
     }
     fill(&mut report, &queue, begun);
-    let lost_thread = || Error::Runtime { source: std::io::Error::other("the writing thread has ended") };
+    let lost_thread = || Error::Runtime(std::io::Error::other("the writing thread has ended"));
     finish(
         &mut report,
         done.ok().and_then(Result::ok).ok_or_else(lost_thread)?,

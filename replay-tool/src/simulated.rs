@@ -11,18 +11,20 @@ use isotherm_simulator::{Scenario, Simulation, Step};
 
 use crate::error::Error;
 
-/// What the columns of a simulated log are.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Columns {
-    raw: RawColumns,
+/// Writes the rows of a simulated log.
+#[derive(Debug)]
+pub struct LogWriter {
+    columns: RawColumns,
     /// What the gyros' readings stand for.
     gyro: OutputKind,
     /// What the accelerometers' readings stand for.
     accel: OutputKind,
+    /// Readings that have not been written yet, in time order.
+    readings: Vec<TemperatureReading>,
 }
 
-impl Columns {
-    /// The columns that a scenario's ticks need.
+impl LogWriter {
+    /// With the columns that a scenario's ticks need.
     ///
     /// # Errors
     /// [`Error::Scenario`] with everything that is wrong with the scenario.
@@ -46,32 +48,22 @@ impl Columns {
                 .extend(step.accel.as_ref().map(|tick| (Shape::of(accel, &tick.readings, false), 1)));
             (contents.mode, contents.meander) = (tick.mode.is_some(), tick.meander.is_some());
         }
-        Ok(Self { raw: RawColumns::of(&scenario.unit, &contents), gyro, accel })
+        let columns = RawColumns::of(&scenario.unit, &contents);
+        Ok(Self { columns, gyro, accel, readings: Vec::new() })
     }
 
     /// The mapping that reads the log back.
     #[must_use]
     pub fn mapping(&self) -> String {
-        self.raw.mapping()
+        self.columns.mapping()
     }
-}
 
-/// Writes the rows of a simulated log.
-#[derive(Debug)]
-pub struct LogWriter {
-    columns: Columns,
-    /// Readings that have not been written yet, in time order.
-    readings: Vec<TemperatureReading>,
-}
-
-impl LogWriter {
     /// Writes the header.
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn new(columns: Columns, writer: &mut dyn Write) -> io::Result<Self> {
-        columns.raw.write_header(writer)?;
-        Ok(Self { columns, readings: Vec::new() })
+    pub fn write_header(&self, writer: &mut dyn Write) -> io::Result<()> {
+        self.columns.write_header(writer)
     }
 
     /// Writes the rows of one step.
@@ -79,7 +71,7 @@ impl LogWriter {
     /// # Errors
     /// Those of the writer; [`io::ErrorKind::InvalidData`] for counts that are not whole.
     pub fn write(&mut self, step: &Step, writer: &mut dyn Write) -> io::Result<()> {
-        let Columns { raw, gyro, accel } = &self.columns;
+        let Self { columns, gyro, accel, .. } = self;
         let (gyro, accel) = (*gyro, *accel);
         self.readings.extend_from_slice(&step.temperatures);
         let end = step.gyro.end_time;
@@ -92,7 +84,7 @@ impl LogWriter {
         // Readings of the same time share a row; those at the tick's end share the tick's.
         while let Some(time) = self.readings.first().map(|reading| reading.time).filter(|time| *time < end) {
             let temperatures = take(&mut self.readings, time);
-            raw.write_row(&Row { time_ns: time.as_ns(), temperatures, ..Row::default() }, writer)?;
+            columns.write_row(&Row { time_ns: time.as_ns(), temperatures, ..Row::default() }, writer)?;
         }
         let row = Row {
             time_ns: end.as_ns(),
@@ -100,7 +92,7 @@ impl LogWriter {
             accel: step.accel.clone().map(|tick| (accel, tick)),
             gyro: Some((gyro, step.gyro.clone())),
         };
-        raw.write_row(&row, writer).map(drop)
+        columns.write_row(&row, writer).map(drop)
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct Stop(Vec<Signal>);
 impl Stop {
     /// Listens; from the call on none of these signals ends the program by itself.
     pub(crate) fn on(kinds: &[SignalKind]) -> Result<Self, Error> {
-        let listen = |kind: &SignalKind| signal(*kind).map_err(|source| Error::Runtime { source });
+        let listen = |kind: &SignalKind| signal(*kind).map_err(Error::Runtime);
         Ok(Self(kinds.iter().map(listen).collect::<Result<_, _>>()?))
     }
 
@@ -34,7 +34,7 @@ impl Stop {
 /// From the call on, a stop signal ends the program and leaves nothing behind that is not whole.
 pub(crate) fn without_traces() -> Result<(), Error> {
     let runtime = Builder::new_current_thread().enable_io().build();
-    let runtime = runtime.map_err(|source| Error::Runtime { source })?;
+    let runtime = runtime.map_err(Error::Runtime)?;
     let mut stop = {
         let _inside = runtime.enter();
         Stop::on(&[SignalKind::interrupt(), SignalKind::terminate()])?

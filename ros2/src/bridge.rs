@@ -10,7 +10,6 @@ mod publishing;
 mod services;
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
 use isotherm_bus::{BoxFuture, BusError, Consumer, presence};
@@ -27,7 +26,7 @@ use zenoh::query::Queryable;
 use zenoh::{Session, Wait};
 
 use crate::Error;
-use crate::graph::{Graph, Topics};
+use crate::graph::{self, Topics};
 use crate::interface::{DIAGNOSTICS, IMU, Interface, TEMPERATURE};
 use crate::mapping::{Mapping, UnitMapping};
 use crate::name::{self, Kind, Node};
@@ -53,7 +52,7 @@ pub struct Bridge {
     rest: Vec<JoinHandle<()>>,
     _statuses: Vec<Subscriber<()>>,
     _services: Vec<Queryable<()>>,
-    _graph: Graph,
+    _graph: Subscriber<()>,
     _tokens: Vec<LivelinessToken>,
 }
 
@@ -62,7 +61,8 @@ pub struct Bridge {
 pub(crate) struct Declarer {
     session: Session,
     node: Node,
-    numbers: AtomicU32,
+    /// Number of the last endpoint.
+    number: u32,
     tokens: Vec<LivelinessToken>,
 }
 
@@ -74,8 +74,7 @@ impl Declarer {
             namespace: mapping.namespace.clone(),
             name: mapping.node.clone(),
         };
-        let mut declarer =
-            Self { session: session.clone(), node, numbers: AtomicU32::new(1), tokens: Vec::new() };
+        let mut declarer = Self { session: session.clone(), node, number: 0, tokens: Vec::new() };
         declarer.token(declarer.node.token()).await?;
         Ok(declarer)
     }
@@ -94,8 +93,8 @@ impl Declarer {
         interface: Interface,
         qos: Qos,
     ) -> Result<String, BusError> {
-        let number = self.numbers.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let token = self.node.endpoint(number, kind, topic, interface, qos);
+        self.number += 1;
+        let token = self.node.endpoint(self.number, kind, topic, interface, qos);
         self.token(token.clone()).await?;
         Ok(token)
     }
@@ -172,7 +171,7 @@ impl Bridge {
                 units.push(unit);
             }
             let left = move |gid| queues.iter().for_each(|queue| queue.push(Arrived::Left(gid)));
-            let graph = Graph::declare(&ros, domain, Topics::of(mapping), left).await?;
+            let graph = graph::watch(&ros, domain, Topics::of(mapping), left).await?;
             let outlet = declarer.publisher(&mapping.diagnostics, DIAGNOSTICS, Qos::DIAGNOSTICS).await?;
             rest.push(tokio::spawn(diagnostics::publish(units.clone(), ros.clone(), outlet)));
             Ok(Self {

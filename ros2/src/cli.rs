@@ -62,15 +62,9 @@ pub struct BridgeArgs {
     /// Mapping of topics to units (TOML)
     #[arg(value_name = "MAPPING")]
     pub mapping: PathBuf,
-    /// Router of ROS 2 to connect to, repeatable (default: 127.0.0.1:7447 unless --listen or --zenoh-config is given)
-    #[arg(long, value_name = "HOST:PORT", value_parser = endpoint)]
-    pub connect: Vec<String>,
-    /// Be the router of ROS 2, on this address, repeatable; port 0: chosen by the system
-    #[arg(long, value_name = "HOST:PORT", value_parser = endpoint)]
-    pub listen: Vec<String>,
-    /// Zenoh configuration (JSON5) of the session with ROS 2
-    #[arg(long, value_name = "FILE", hide_short_help = true)]
-    pub zenoh_config: Option<PathBuf>,
+    /// The session with ROS 2
+    #[command(flatten)]
+    pub ros: RosOptions,
     /// Domain of ROS 2
     #[arg(long, env = "ROS_DOMAIN_ID", default_value_t = 0, value_name = "NUMBER")]
     pub domain: u32,
@@ -138,12 +132,7 @@ async fn serve(args: &BridgeArgs) -> Result<Option<Totals>, Error> {
     };
     let starting = async {
         let (service, bus) = correct(args).await?;
-        let options = RosOptions {
-            config: args.zenoh_config.clone(),
-            connect: args.connect.clone(),
-            listen: args.listen.clone(),
-        };
-        let ros = open_config(options.to_config()?).await?;
+        let ros = open_config(args.ros.to_config()?).await?;
         Ok::<_, Error>((service, Bridge::start(&mapping, args.domain, ros, bus).await?))
     };
     let (service, bridge) = tokio::select! {

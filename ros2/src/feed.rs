@@ -168,13 +168,9 @@ impl Feeder {
             return Err(Refusal::NoRate);
         }
         let rates = <[f64; 3]>::from(angular_velocity);
-        if self.mapping.gyro.output == OutputKind::Counts && !rates.into_iter().all(is_count) {
-            return Err(Refusal::NotCounts);
-        }
         let forces = <[f64; 3]>::from(linear_acceleration);
         let accel = self.mapping.accel.filter(|_| !is_missing(&linear_acceleration_covariance));
-        if accel.is_some_and(|accel| accel.output == OutputKind::Counts) && !forces.into_iter().all(is_count)
-        {
+        if !fits(self.mapping.gyro, rates) || accel.is_some_and(|accel| !fits(accel, forces)) {
             return Err(Refusal::NotCounts);
         }
 
@@ -195,11 +191,17 @@ impl Feeder {
             .map(|last| stamp.saturating_sub(last.stamp).saturating_sub(self.mapping.tick.as_ns()));
         self.last = Some(Last { gid: attachment.gid, sequence: attachment.sequence, stamp, tick });
         (self.gone, self.contradicting) = (false, 0);
-        let accel = accel.map(|accel| (accel.output, accel_tick(&timing, accel, forces)));
+        let Timing { sequence, end_ns, duration } = timing;
+        let end_time = Timestamp::from_ns(end_ns);
+        let accel = accel.map(|accel| {
+            let readings = readings(accel, forces, duration).collect();
+            (accel.output, AccelTick { sequence, end_time, duration, readings })
+        });
+        let readings = readings(self.mapping.gyro, rates, duration).collect();
         Ok(Ticks {
             restart,
             output: self.mapping.gyro.output,
-            gyro: gyro_tick(&timing, self.mapping.gyro, rates),
+            gyro: GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() },
             accel,
             frame_id: header.frame_id,
             missing,
@@ -266,8 +268,11 @@ fn is_missing(covariance: &[f64; 9]) -> bool {
     covariance.first().is_some_and(|first| first.total_cmp(&-1.0).is_eq())
 }
 
-fn is_count(reading: f64) -> bool {
-    reading.fract().abs().total_cmp(&0.0).is_eq() && reading.abs() <= f64::from(i32::MAX)
+/// Whether readings that the mapping says to be counts are whole numbers of 32 bits.
+fn fits(mapping: SensorsMapping, readings: [f64; 3]) -> bool {
+    let is_count =
+        |reading: f64| reading.fract().abs().total_cmp(&0.0).is_eq() && reading.abs() <= f64::from(i32::MAX);
+    mapping.output == OutputKind::Mean || readings.into_iter().all(is_count)
 }
 
 fn readings(mapping: SensorsMapping, values: [f64; 3], duration: Span) -> impl Iterator<Item = f64> {
@@ -277,25 +282,6 @@ fn readings(mapping: SensorsMapping, values: [f64; 3], duration: Span) -> impl I
         OutputKind::Mean if conversion.per_tick => conversion.of(value) / duration.as_s(),
         OutputKind::Mean => conversion.of(value),
     })
-}
-
-fn gyro_tick(timing: &Timing, mapping: SensorsMapping, rates: [f64; 3]) -> GyroTick {
-    GyroTick {
-        sequence: timing.sequence,
-        end_time: Timestamp::from_ns(timing.end_ns),
-        duration: timing.duration,
-        readings: readings(mapping, rates, timing.duration).collect(),
-        ..GyroTick::default()
-    }
-}
-
-fn accel_tick(timing: &Timing, mapping: SensorsMapping, forces: [f64; 3]) -> AccelTick {
-    AccelTick {
-        sequence: timing.sequence,
-        end_time: Timestamp::from_ns(timing.end_ns),
-        duration: timing.duration,
-        readings: readings(mapping, forces, timing.duration).collect(),
-    }
 }
 
 #[cfg(test)]

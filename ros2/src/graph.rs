@@ -13,13 +13,19 @@ use crate::mapping::Mapping;
 use crate::name::{self, Gid, Kind, Seen};
 
 /// What is to be known of a publisher on one of the bridge's topics.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Finding {
     /// Its release has no hashes of types: none of its messages arrives.
+    #[error(
+        "its publisher is of ROS 2 humble, whose keys have no hash of the type: nothing is received from it; use \
+         jazzy or later"
+    )]
     Humble,
     /// Its type, or version of the type, is another one.
+    #[error("its publisher has another type than the mapping's topic: nothing is received from it ({0})")]
     OtherType(String),
     /// It publishes where corrected messages go.
+    #[error("it publishes on the topic of corrected messages: subscribers receive both")]
     OnOutput,
 }
 
@@ -65,67 +71,34 @@ impl Topics {
     }
 }
 
-/// Watches the graph for as long as it is kept.
-#[derive(Debug)]
-pub struct Graph {
-    _subscriber: Subscriber<()>,
-}
-
-impl Graph {
-    /// Begins to watch. `left` hears of every publisher that leaves.
-    ///
-    /// # Errors
-    /// [`BusError::Declare`].
-    pub async fn declare(
-        session: &Session,
-        domain: u32,
-        topics: Topics,
-        left: impl Fn(Gid) + Send + Sync + 'static,
-    ) -> Result<Self, BusError> {
-        let key = name::all_tokens(domain);
-        // Each publisher is named once.
-        let named: Mutex<BTreeSet<String>> = Mutex::default();
-        let hear = move |sample: Sample| {
-            let token = sample.key_expr().as_str();
-            let Some(seen) = name::parse(token) else { return };
-            if sample.kind() == SampleKind::Delete {
-                if seen.kind == Kind::Publisher {
-                    left(name::gid(token));
-                }
-                return;
+/// Watches the graph for as long as the subscriber is kept. `left` hears of every publisher that leaves.
+///
+/// # Errors
+/// [`BusError::Declare`].
+pub async fn watch(
+    session: &Session,
+    domain: u32,
+    topics: Topics,
+    left: impl Fn(Gid) + Send + Sync + 'static,
+) -> Result<Subscriber<()>, BusError> {
+    let key = name::all_tokens(domain);
+    // Each publisher is named once.
+    let named: Mutex<BTreeSet<String>> = Mutex::default();
+    let hear = move |sample: Sample| {
+        let token = sample.key_expr().as_str();
+        let Some(seen) = name::parse(token) else { return };
+        if sample.kind() == SampleKind::Delete {
+            if seen.kind == Kind::Publisher {
+                left(name::gid(token));
             }
-            let Some(finding) = topics.judge(&seen) else { return };
-            if named.lock().unwrap_or_else(PoisonError::into_inner).insert(token.to_owned()) {
-                tell(&seen, &finding);
-            }
-        };
-        let subscriber = session.liveliness().declare_subscriber(&key).history(true).callback(hear);
-        let subscriber = subscriber.await.map_err(|source| BusError::Declare { key, source })?;
-        Ok(Self { _subscriber: subscriber })
-    }
-}
-
-fn tell(seen: &Seen, finding: &Finding) {
-    let (node, topic) = (&seen.node, seen.topic.as_ref().map_or("", |(topic, ..)| topic));
-    match finding {
-        Finding::Humble => tracing::warn!(
-            node,
-            topic,
-            "its publisher is of ROS 2 humble, whose keys have no hash of the type: nothing is received from it; use \
-             jazzy or later"
-        ),
-        Finding::OtherType(is) => tracing::warn!(
-            node,
-            topic,
-            is,
-            "its publisher has another type than the mapping's topic: nothing is received from it"
-        ),
-        Finding::OnOutput => {
-            tracing::warn!(
-                node,
-                topic,
-                "it publishes on the topic of corrected messages: subscribers receive both"
-            );
+            return;
         }
-    }
+        let Some(finding) = topics.judge(&seen) else { return };
+        if named.lock().unwrap_or_else(PoisonError::into_inner).insert(token.to_owned()) {
+            let (node, topic) = (seen.node, seen.topic.map_or_else(String::new, |(topic, ..)| topic));
+            tracing::warn!(node, topic, "{finding}");
+        }
+    };
+    let subscriber = session.liveliness().declare_subscriber(&key).history(true).callback(hear);
+    subscriber.await.map_err(|source| BusError::Declare { key, source })
 }

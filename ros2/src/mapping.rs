@@ -169,7 +169,7 @@ fn unit(r: &mut Reader<'_>, path: &str, keys: UnitKeys) -> Option<UnitMapping> {
         gyro,
         accel,
         temperatures: temperatures.collect::<Option<_>>()?,
-        output: keys.output.into(),
+        output: keys.output,
     })
 }
 

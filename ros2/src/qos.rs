@@ -31,13 +31,16 @@ pub enum History {
 }
 
 /// Quality of service of a publisher, subscription or service; always volatile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
 pub struct Qos {
     /// Whether what is lost would be sent again.
     pub reliability: Reliability,
     /// How much is kept.
     pub history: History,
     /// Messages that are kept; says nothing where all are.
+    #[schemars(range(min = 1, max = 1_000_000))]
     pub depth: u32,
 }
 
@@ -45,12 +48,11 @@ impl Qos {
     /// Of sensor data, as a subscription asks for it.
     pub const SENSOR_DATA: Self =
         Self { reliability: Reliability::BestEffort, history: History::KeepLast, depth: 5 };
-    /// Of services.
+    /// Of services, and of corrected messages where nothing else is stated.
     pub const SERVICES: Self =
         Self { reliability: Reliability::Reliable, history: History::KeepLast, depth: 10 };
     /// Of diagnostics.
-    pub const DIAGNOSTICS: Self =
-        Self { reliability: Reliability::Reliable, history: History::KeepLast, depth: 1 };
+    pub const DIAGNOSTICS: Self = Self { depth: 1, ..Self::SERVICES };
 
     /// What becomes of a message where a subscriber does not keep up: the rule of `rmw_zenoh`.
     #[must_use]
@@ -59,6 +61,12 @@ impl Qos {
             (Reliability::Reliable, History::KeepAll) => CongestionControl::Block,
             _ => CongestionControl::Drop,
         }
+    }
+}
+
+impl Default for Qos {
+    fn default() -> Self {
+        Self::SERVICES
     }
 }
 

@@ -1,7 +1,10 @@
 //! The session that ROS 2 sees: a peer of their router, or a router of its own.
 
+use std::path::PathBuf;
+
+use clap::Args;
 use isotherm_bus::session::set;
-use isotherm_bus::{BusError, SessionOptions};
+use isotherm_bus::{BusError, SessionOptions, endpoint};
 use zenoh::Config;
 
 /// Where nodes look for the router.
@@ -13,23 +16,26 @@ const LEASE_MS: u32 = 60_000;
 const KEEP_ALIVE: u32 = 2;
 
 /// Where the session connects and listens.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct RosOptions {
-    /// Zenoh configuration, which is taken as it is, but for endpoints given here.
-    pub config: Option<std::path::PathBuf>,
-    /// Routers to connect to.
+    /// Router of ROS 2 to connect to, repeatable (default: 127.0.0.1:7447 unless --listen or --zenoh-config is given)
+    #[arg(long, value_name = "HOST:PORT", value_parser = endpoint)]
     pub connect: Vec<String>,
-    /// Endpoints to listen on, which makes it a router.
+    /// Be the router of ROS 2, on this address, repeatable; port 0: chosen by the system
+    #[arg(long, value_name = "HOST:PORT", value_parser = endpoint)]
     pub listen: Vec<String>,
+    /// Zenoh configuration (JSON5) of the session with ROS 2
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
+    pub zenoh_config: Option<PathBuf>,
 }
 
 impl RosOptions {
-    /// The configuration that these options stand for.
+    /// The configuration that these options stand for: a file's is taken as it is, but for endpoints given here.
     ///
     /// # Errors
     /// As [`SessionOptions::to_config`].
     pub fn to_config(&self) -> Result<Config, BusError> {
-        let Self { config, connect, listen } = self.clone();
+        let Self { connect, listen, zenoh_config: config } = self.clone();
         let own = config.is_none();
         let router = !listen.is_empty();
         let (connect, listen) = match (own, router) {

@@ -5,10 +5,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::counter::Counter;
+use crate::gyros::TickTime;
 use crate::noise::{Noise, Purpose};
 use crate::orientation::Orientation;
 use crate::polynomial;
-use crate::thermal::{Interval, Node, NodeState};
+use crate::thermal::{Node, NodeState};
 use crate::vector::dot;
 
 /// One accelerometer: output `U = K(T)·f/r(T_board) + S(T)`, f the specific force along its input axis.
@@ -82,7 +83,7 @@ impl Accelerometers {
 #[derive(Debug, Clone)]
 pub(crate) struct AccelerometersState {
     output: AccelerometerOutput,
-    orientation: Orientation,
+    pub(crate) orientation: Orientation,
     sensors: Vec<AccelerometerState>,
 }
 
@@ -90,7 +91,6 @@ pub(crate) struct AccelerometersState {
 struct AccelerometerState {
     sensor: Accelerometer,
     node: NodeState,
-    deg_c: Interval,
     noise: Noise,
     counter: Counter,
 }
@@ -99,11 +99,9 @@ impl AccelerometersState {
     pub(crate) fn new(block: &Accelerometers, seed: u64, step_s: f64, initial: impl Fn(Node) -> f64) -> Self {
         let sensor = |(sensor, index): (&Accelerometer, u32)| {
             let mut noise = Noise::new(seed, Purpose::Accelerometer(index));
-            let deg_c = initial(sensor.node);
             AccelerometerState {
                 sensor: *sensor,
-                node: NodeState::new(sensor.node, step_s, deg_c),
-                deg_c: Interval::constant(deg_c),
+                node: NodeState::new(sensor.node, step_s, initial(sensor.node)),
                 counter: Counter::starting_at(noise.uniform()),
                 noise,
             }
@@ -117,52 +115,39 @@ impl AccelerometersState {
 
     pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
         for state in &mut self.sensors {
-            state.deg_c.advance(state.node.step(from_deg_c, to_deg_c));
+            state.node.step(from_deg_c, to_deg_c);
         }
     }
 
     pub(crate) fn deg_c(&self, share: f64) -> Sensors<f64> {
-        self.sensors.iter().map(|state| state.deg_c.at(share)).collect()
+        self.sensors.iter().map(|state| state.node.deg_c.at(share)).collect()
     }
 
-    /// Input axes at a housing temperature.
-    pub(crate) fn axes(&self, housing_deg_c: f64) -> Sensors<[f64; 3]> {
-        self.orientation.axes(housing_deg_c)
-    }
-
-    /// Readings of a tick with axes turned as at `axes_deg_c`; `extra` is added to each sensor's specific force (m/s²).
+    /// Readings of a tick with these input axes; `extra` is added to each sensor's specific force (m/s²).
     pub(crate) fn tick(
         &mut self,
         velocity_m_per_s: [f64; 3],
-        length_s: f64,
-        (axes_deg_c, board_deg_c): (f64, f64),
-        share: f64,
+        time: TickTime,
+        axes: &[[f64; 3]],
+        board_deg_c: f64,
         extra: impl Fn(usize) -> f64,
     ) -> Readings {
-        let axes = self.orientation.axes(axes_deg_c);
         let output = self.output;
         let states = self.sensors.iter_mut().zip(axes).enumerate();
-        let read = |(index, (state, axis)): (usize, (&mut AccelerometerState, [f64; 3]))| {
-            let force = dot(axis, velocity_m_per_s) / length_s + extra(index);
-            state.read(force, length_s, board_deg_c, share, output)
+        let read = |(index, (state, &axis)): (usize, (&mut AccelerometerState, &[f64; 3]))| {
+            let force = dot(axis, velocity_m_per_s) / time.length_s + extra(index);
+            state.read(force, time, board_deg_c, output)
         };
         states.map(read).collect()
     }
 }
 
 impl AccelerometerState {
-    fn read(
-        &mut self,
-        force: f64,
-        length_s: f64,
-        board_deg_c: f64,
-        share: f64,
-        output: AccelerometerOutput,
-    ) -> f64 {
+    fn read(&mut self, force: f64, time: TickTime, board_deg_c: f64, output: AccelerometerOutput) -> f64 {
+        let TickTime { length_s, share, .. } = time;
         let sensor = &self.sensor;
-        let away_k = self.deg_c.at(share) - sensor.reference_deg_c;
-        let walk = sensor.velocity_random_walk_m_per_s_per_sqrt_s;
-        let noise = if walk > 0.0 { walk * self.noise.normal() / libm::sqrt(length_s) } else { 0.0 };
+        let away_k = self.node.deg_c.at(share) - sensor.reference_deg_c;
+        let noise = self.noise.mean(sensor.velocity_random_walk_m_per_s_per_sqrt_s, length_s);
         let scale = polynomial::at(&sensor.scale_v_per_m_per_s2, away_k);
         let ratio = polynomial::at(&sensor.board_ratio, board_deg_c - sensor.reference_deg_c);
         let volts = scale * (force + noise) / ratio + polynomial::at(&sensor.bias_v, away_k);

@@ -9,7 +9,6 @@ use crate::error::ScenarioError;
 use crate::failure::{FailingSensor, Failure, Fault};
 use crate::instrument::{Gyros, Instrument};
 use crate::motion::Path;
-use crate::noise::GyroNoise;
 use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::scenario::Scenario;
@@ -101,22 +100,6 @@ impl Report {
         }
     }
 
-    /// κ1 and κ2 of a scale factor.
-    fn scale_per_k(&mut self, key: &str, [first, second]: [f64; 2]) {
-        self.number(&format!("{key}.scale_per_k[0]"), first, [-2e-3, 2e-3]);
-        self.number(&format!("{key}.scale_per_k[1]"), second, [-5e-6, 5e-6]);
-    }
-
-    fn noise(&mut self, key: &str, noise: &GyroNoise) {
-        if noise.markov_drift_rad_per_s > 0.0 {
-            self.number(
-                &format!("{key}.noise.markov_correlation_s"),
-                noise.markov_correlation_s,
-                [1e-12, 1e12],
-            );
-        }
-    }
-
     fn reversal(&mut self, reversal: &Reversal, tick_s: f64) {
         let key = "instrument.gyros.zeeman.reversal";
         self.number(&format!("{key}.lost_max_s"), reversal.lost_max_s, [reversal.lost_min_s, 1.0]);
@@ -138,25 +121,25 @@ fn instrument(report: &mut Report, instrument: &Instrument, tick_s: f64) {
         report.add("instrument.gyros", message);
     }
     report.orientation("instrument.gyro_orientation", &instrument.gyro_orientation, count);
-    let mut gyro = |key: &str, index: usize, scale_per_k, noise| {
-        let key = format!("instrument.gyros.{key}[{index}]");
-        report.scale_per_k(&key, scale_per_k);
-        report.noise(&key, noise);
-    };
-    match &instrument.gyros {
+    let (key, gyros): (_, Vec<_>) = match &instrument.gyros {
         Gyros::Zeeman(unit) => {
-            let gyros = unit.gyros.iter().enumerate();
-            gyros.for_each(|(index, it)| gyro("zeeman.gyros", index, it.scale_per_k, &it.noise));
-            report.reversal(&unit.reversal, tick_s);
+            ("zeeman.gyros", unit.gyros.iter().map(|gyro| (gyro.scale_per_k, gyro.noise)).collect())
         }
         Gyros::FibreOptic(gyros) => {
-            let gyros = gyros.iter().enumerate();
-            gyros.for_each(|(index, it)| gyro("fibre_optic", index, it.scale_per_k, &it.noise));
+            ("fibre_optic", gyros.iter().map(|gyro| (gyro.scale_per_k, gyro.noise)).collect())
         }
-        Gyros::Mems(gyros) => {
-            let gyros = gyros.iter().enumerate();
-            gyros.for_each(|(index, it)| gyro("mems", index, it.scale_per_k, &it.noise));
+        Gyros::Mems(gyros) => ("mems", gyros.iter().map(|gyro| (gyro.scale_per_k, gyro.noise)).collect()),
+    };
+    for (index, ([first, second], noise)) in gyros.into_iter().enumerate() {
+        let at = |field: &str| format!("instrument.gyros.{key}[{index}].{field}");
+        report.number(&at("scale_per_k[0]"), first, [-2e-3, 2e-3]);
+        report.number(&at("scale_per_k[1]"), second, [-5e-6, 5e-6]);
+        if noise.markov_drift_rad_per_s > 0.0 {
+            report.number(&at("noise.markov_correlation_s"), noise.markov_correlation_s, [1e-12, 1e12]);
         }
+    }
+    if let Gyros::Zeeman(unit) = &instrument.gyros {
+        report.reversal(&unit.reversal, tick_s);
     }
     if let Some(block) = &instrument.accelerometers {
         let key = "instrument.accelerometers";

@@ -7,6 +7,7 @@ use isotherm_correction::sample::Sensors;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::gyros::TickTime;
 use crate::thermal::Interval;
 use crate::trajectory::{Increments, Trajectory};
 use crate::vector::{Vector, add, cross, dot, scale};
@@ -120,13 +121,8 @@ pub struct Supply {
 
 impl Supply {
     /// Voltage beyond the nominal one at a time (V).
-    fn beyond_v(&self, time_s: f64) -> f64 {
+    pub(crate) fn beyond_v(&self, time_s: f64) -> f64 {
         self.swing_v * libm::sin(core::f64::consts::TAU * time_s / self.period_s)
-    }
-
-    /// Its reading at a time (V).
-    pub(crate) fn reading_v(&self, time_s: f64) -> f64 {
-        self.nominal_v + self.beyond_v(time_s)
     }
 }
 
@@ -157,13 +153,6 @@ pub struct AxesPlay {
     pub share: f64,
 }
 
-impl AxesPlay {
-    /// By how much the axes are behind the housing's temperature (K), as a play.
-    const fn behind(self) -> Play {
-        Play { half_width_k: self.half_width_k, per_k: self.share }
-    }
-}
-
 /// A play with its memory.
 #[derive(Debug, Clone, Copy, Default)]
 struct PlayState {
@@ -187,20 +176,25 @@ impl PlayState {
 pub(crate) struct EffectsState {
     gyros: Sensors<(GyroEffects, PlayState)>,
     accelerometers: Sensors<(AccelerometerEffects, PlayState)>,
-    /// Of the gyros' and the accelerometers' axes.
-    axes: [(Option<Play>, PlayState); 2],
-    supply: Option<Supply>,
+    pub(crate) gyro_axes: AxesState,
+    pub(crate) accel_axes: AxesState,
+    pub(crate) supply: Option<Supply>,
 }
 
-/// Where and when a tick is sensed.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sensed<'a> {
-    pub(crate) middle_s: f64,
-    pub(crate) length_s: f64,
-    /// Place of the middle between two steps of the thermal clock.
-    pub(crate) share: f64,
-    pub(crate) sensors_deg_c: &'a [f64],
-    pub(crate) housing_deg_c: f64,
+/// Axes of the sensors of one kind with the play in their mounts, if any: by how much they are behind the housing (K).
+#[derive(Debug, Clone)]
+pub(crate) struct AxesState(Option<Play>, PlayState);
+
+impl AxesState {
+    fn new(axes: Option<AxesPlay>) -> Self {
+        let play = axes.map(|axes| Play { half_width_k: axes.half_width_k, per_k: axes.share });
+        Self(play, PlayState::default())
+    }
+
+    /// Temperature as which they turn (°C), in a housing of `housing_deg_c`.
+    pub(crate) fn deg_c(&self, housing_deg_c: f64, share: f64) -> f64 {
+        if self.0.is_some() { housing_deg_c + self.1.error.at(share) } else { housing_deg_c }
+    }
 }
 
 /// What the accelerometers sense of one tick beside the specific force at the reference point.
@@ -210,7 +204,7 @@ struct Felt {
     /// Integral of the specific force (m/s).
     velocity: Vector,
     /// Rate and specific force at instants of the tick, each with its share of it.
-    instants: Vec<(f64, Vector, Vector)>,
+    instants: Vec<(f64, (Vector, Vector))>,
 }
 
 impl EffectsState {
@@ -222,15 +216,15 @@ impl EffectsState {
                 .iter()
                 .map(|accel| (*accel, PlayState::default()))
                 .collect(),
+            gyro_axes: AxesState::new(effects.gyro_axes),
+            accel_axes: AxesState::new(effects.accelerometer_axes),
             supply: effects.supply.clone(),
-            axes: [effects.gyro_axes, effects.accelerometer_axes]
-                .map(|play| (play.map(AxesPlay::behind), PlayState::default())),
         }
     }
 
     /// Follows the temperatures of sensors and housing (°C) at the end of a step of the thermal clock.
     pub(crate) fn thermal_step(&mut self, gyros_deg_c: &[f64], accels_deg_c: &[f64], housing_deg_c: f64) {
-        for (play, state) in &mut self.axes {
+        for AxesState(play, state) in [&mut self.gyro_axes, &mut self.accel_axes] {
             state.step(*play, housing_deg_c);
         }
         for ((gyro, play), deg_c) in self.gyros.iter_mut().zip(gyros_deg_c) {
@@ -241,32 +235,14 @@ impl EffectsState {
         }
     }
 
-    /// Temperatures as which the gyros' and the accelerometers' axes turn (°C), in a housing of `housing_deg_c`.
-    pub(crate) fn axes_deg_c(&self, housing_deg_c: f64, share: f64) -> [f64; 2] {
-        [0, 1].map(|kind: usize| match &self.axes[kind] {
-            (Some(_), state) => housing_deg_c + state.error.at(share),
-            (None, _) => housing_deg_c,
-        })
-    }
-
     /// By how much of a tick a gyro's reading lags.
     pub(crate) fn gyro_delay_ticks(&self, index: usize) -> f64 {
         self.gyros.get(index).map_or(0.0, |(gyro, _)| gyro.delay_ticks)
     }
 
-    /// Whether gyros have any.
-    pub(crate) fn has_gyros(&self) -> bool {
-        !self.gyros.is_empty()
-    }
-
     /// Supply voltage beyond the nominal one (V).
     fn beyond_v(&self, time_s: f64) -> f64 {
         self.supply.as_ref().map_or(0.0, |supply| supply.beyond_v(time_s))
-    }
-
-    /// Reading of the supply, where it has a channel: name and voltage.
-    pub(crate) fn supply_reading(&self, time_s: f64) -> Option<(&str, f64)> {
-        self.supply.as_ref().map(|supply| (supply.channel.as_str(), supply.reading_v(time_s)))
     }
 
     /// Changes the input angles (rad) of both halves of a tick, over which the increments are `parts`; gives what
@@ -275,7 +251,8 @@ impl EffectsState {
         &self,
         halves: &mut Sensors<[f64; 2]>,
         parts: &[Increments; 2],
-        Sensed { middle_s, length_s, share, sensors_deg_c, housing_deg_c }: Sensed<'_>,
+        TickTime { middle_s, length_s, share, housing_deg_c, .. }: TickTime,
+        sensors_deg_c: &[f64],
     ) -> Sensors<f64> {
         let beyond_v = self.beyond_v(middle_s);
         let gyros = self.gyros.iter().zip(halves).zip(sensors_deg_c);
@@ -307,17 +284,18 @@ impl EffectsState {
     pub(crate) fn feel(
         &self,
         trajectory: &Trajectory,
-        Sensed { middle_s, length_s, share, sensors_deg_c, housing_deg_c }: Sensed<'_>,
-        axes: impl FnOnce() -> Sensors<Vector>,
+        TickTime { middle_s, length_s, share, housing_deg_c, .. }: TickTime,
+        sensors_deg_c: &[f64],
+        axes: &[Vector],
     ) -> Sensors<f64> {
         if self.accelerometers.is_empty() {
             return Sensors::new();
         }
         let on_time = Felt::of(trajectory, middle_s, length_s);
         let beyond_v = self.beyond_v(middle_s);
-        let sensors = self.accelerometers.iter().zip(axes()).zip(sensors_deg_c);
+        let sensors = self.accelerometers.iter().zip(axes).zip(sensors_deg_c);
         sensors
-            .map(|(((accel, play), axis), deg_c)| {
+            .map(|(((accel, play), &axis), deg_c)| {
                 let arm = accel.position_m;
                 let late = (accel.delay_ticks != 0.0)
                     .then(|| Felt::of(trajectory, middle_s - accel.delay_ticks * length_s, length_s));
@@ -327,7 +305,7 @@ impl EffectsState {
                     sum +=
                         dot(axis, scale(add(late.velocity, scale(on_time.velocity, -1.0)), 1.0 / length_s));
                 }
-                for (weight, rate, force) in &felt.instants {
+                for (weight, (rate, force)) in &felt.instants {
                     let along = dot(axis, *force);
                     let centripetal = dot(axis, cross(*rate, cross(*rate, arm)));
                     sum += weight * (centripetal + accel.second_order_s2_per_m * along * along);
@@ -358,10 +336,7 @@ impl Felt {
         let nodes = centres_s.flat_map(|centre_s| {
             NODES.map(|(node, weight)| (weight / f64::from(PANELS), centre_s + 0.5 * node * panel_s))
         });
-        let instants = nodes.map(|(weight, time_s)| {
-            let (rate, force) = at(time_s);
-            (weight, rate, force)
-        });
+        let instants = nodes.map(|(weight, time_s)| (weight, at(time_s)));
         Self {
             mean_change: scale(add(ends[0], scale(ends[1], -1.0)), 1.0 / length_s),
             velocity: trajectory.increments(middle_s, length_s).velocity,

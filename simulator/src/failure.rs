@@ -1,5 +1,6 @@
 //! Sensors that fail in the middle of a run.
 
+use isotherm_correction::sample::Readings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -48,22 +49,14 @@ pub enum Fault {
     NotFinite,
 }
 
-/// The failures of a run and what they need to remember.
+/// The failures of a run.
 #[derive(Debug, Clone)]
-pub(crate) struct Failures {
-    failures: Vec<Failure>,
-}
+pub(crate) struct Failures(pub(crate) Vec<Failure>);
 
 impl Failures {
-    pub(crate) fn new(failures: &[Failure]) -> Self {
-        Self { failures: failures.to_vec() }
-    }
-
     fn of(&self, sensor: FailingSensor, time_s: f64) -> impl Iterator<Item = Fault> {
-        self.failures
-            .iter()
-            .filter(move |failure| failure.sensor == sensor && time_s >= failure.at_s)
-            .map(|f| f.fault)
+        let of = self.0.iter().filter(move |failure| failure.sensor == sensor && time_s >= failure.at_s);
+        of.map(|failure| failure.fault)
     }
 
     /// What is added to a sensor's input (rad/s or m/s²).
@@ -76,17 +69,35 @@ impl Failures {
         self.of(sensor, time_s).map(jump).sum()
     }
 
-    /// Whether a sensor repeats its last reading.
-    pub(crate) fn stuck(&self, sensor: FailingSensor, time_s: f64) -> bool {
-        self.of(sensor, time_s).any(|fault| fault == Fault::Stuck)
+    /// Puts the last values of sensors that are stuck, zero where there were none, in the place of the present ones.
+    pub(crate) fn repeat<T: Copy + Default>(
+        &self,
+        sensor: fn(usize) -> FailingSensor,
+        time_s: f64,
+        values: &mut [T],
+        last: &[T],
+    ) {
+        for (index, value) in values.iter_mut().enumerate() {
+            if self.of(sensor(index), time_s).any(|fault| fault == Fault::Stuck) {
+                *value = last.get(index).copied().unwrap_or_default();
+            }
+        }
     }
 
-    /// Whether a sensor's reading is not a number.
-    pub(crate) fn not_finite(&self, sensor: FailingSensor, time_s: f64) -> bool {
-        self.of(sensor, time_s).any(|fault| fault == Fault::NotFinite)
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.failures.is_empty()
+    /// Changes the readings of sensors that are stuck or give no numbers; remembers them in `last`.
+    pub(crate) fn change(
+        &self,
+        sensor: fn(usize) -> FailingSensor,
+        time_s: f64,
+        readings: &mut Readings,
+        last: &mut Readings,
+    ) {
+        self.repeat(sensor, time_s, readings, last);
+        for (index, reading) in readings.iter_mut().enumerate() {
+            if self.of(sensor(index), time_s).any(|fault| fault == Fault::NotFinite) {
+                *reading = f64::NAN;
+            }
+        }
+        last.clone_from(readings);
     }
 }

@@ -79,7 +79,7 @@ pub(crate) struct FibreOpticState {
     shupe: Shupe,
     markov: Markov,
     noise: Noise,
-    sensor_deg_c: Interval,
+    pub(crate) sensor_deg_c: Interval,
     mean_deg_c: Interval,
     drift_rad_per_s: Interval,
 }
@@ -104,7 +104,7 @@ impl FibreOpticState {
         let reference = self.gyro.reference_deg_c;
         let layers = self.conduction.layers(housing_deg_c).map(|(deg_c, rate)| (deg_c - reference, rate));
         let optics = self.gyro.bias.rad_per_s(self.mean_deg_c.to - reference);
-        self.shupe.rad_per_s(layers) + optics + self.markov.value()
+        self.shupe.rad_per_s(layers) + optics + self.markov.value.to
     }
 
     pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
@@ -121,18 +121,12 @@ impl FibreOpticState {
         self.drift_rad_per_s.advance(drift);
     }
 
-    pub(crate) fn sensor_deg_c(&self, share: f64) -> f64 {
-        self.sensor_deg_c.at(share)
-    }
-
-    /// Reading and true drift (both rad/s) of a tick.
-    pub(crate) fn tick(&mut self, input_rad: f64, length_s: f64, share: f64) -> (f64, f64) {
+    /// Reading, true drift and servo transient (rad/s) of a tick.
+    pub(crate) fn tick(&mut self, input_rad: f64, length_s: f64, share: f64) -> (f64, f64, f64) {
         let drift = self.drift_rad_per_s.at(share);
         let away_k = self.mean_deg_c.at(share) - self.gyro.reference_deg_c;
-        let [first, second] = self.gyro.scale_per_k;
-        let scale = self.gyro.scale * polynomial::at(&[1.0, first, second], away_k);
-        let walk = self.gyro.noise.angle_random_walk_rad_per_sqrt_s;
-        let noise = if walk > 0.0 { walk * self.noise.normal() / libm::sqrt(length_s) } else { 0.0 };
-        ((input_rad / length_s + drift + noise) / scale, drift)
+        let scale = self.gyro.scale * polynomial::scale(self.gyro.scale_per_k, away_k);
+        let noise = self.noise.mean(self.gyro.noise.angle_random_walk_rad_per_sqrt_s, length_s);
+        ((input_rad / length_s + drift + noise) / scale, drift, 0.0)
     }
 }

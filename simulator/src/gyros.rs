@@ -5,18 +5,21 @@ use isotherm_correction::sample::{HalfPeriodCounts, LasingMode, Readings, Sensor
 use crate::fibre_optic::FibreOpticState;
 use crate::instrument::Gyros;
 use crate::mems::MemsState;
-use crate::reversal::Clockwork;
+use crate::reversal::{Clockwork, Phase};
 use crate::thermal::Node;
 use crate::zeeman::ZeemanState;
 
-/// When a tick takes place.
+/// When and in which housing a tick takes place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TickTime {
     pub(crate) start_s: f64,
+    pub(crate) middle_s: f64,
     pub(crate) length_s: f64,
     pub(crate) nominal_s: f64,
     /// Place of the tick's middle between two steps of the thermal clock.
     pub(crate) share: f64,
+    /// Temperature of the housing in the middle.
+    pub(crate) housing_deg_c: f64,
 }
 
 /// What a tick of all gyros gives.
@@ -33,10 +36,18 @@ pub(crate) struct GyroOutput {
 }
 
 #[derive(Debug, Clone)]
-pub(crate) enum GyrosState {
-    Zeeman { clockwork: Clockwork, gyros: Vec<ZeemanState> },
-    FibreOptic(Vec<FibreOpticState>),
-    Mems(Vec<MemsState>),
+enum GyroState {
+    Zeeman(ZeemanState),
+    FibreOptic(Box<FibreOpticState>),
+    Mems(MemsState),
+}
+
+/// All gyros of a unit with their memory.
+#[derive(Debug, Clone)]
+pub(crate) struct GyrosState {
+    /// Of gyros that switch their mode; they are dithered.
+    clockwork: Option<Clockwork>,
+    gyros: Vec<GyroState>,
 }
 
 impl GyrosState {
@@ -48,103 +59,77 @@ impl GyrosState {
         housing_deg_c: f64,
         initial: impl Fn(Node) -> f64,
     ) -> Self {
-        match gyros {
+        let mut clockwork = None;
+        let gyros = match gyros {
             Gyros::Zeeman(unit) => {
-                let numbered = unit.gyros.iter().zip(0..);
+                clockwork = Some(Clockwork::new(unit.reversal, seed));
                 let state =
                     |(gyro, index)| ZeemanState::new(unit, gyro, seed, index, step_s, initial(gyro.node));
-                Self::Zeeman {
-                    clockwork: Clockwork::new(unit.reversal, seed),
-                    gyros: numbered.map(state).collect(),
-                }
+                unit.gyros.iter().zip(0..).map(state).map(GyroState::Zeeman).collect()
             }
             Gyros::FibreOptic(gyros) => {
                 let state = |(gyro, index)| FibreOpticState::new(gyro, seed, index, step_s, housing_deg_c);
-                Self::FibreOptic(gyros.iter().zip(0..).map(state).collect())
+                gyros.iter().zip(0..).map(state).map(Box::new).map(GyroState::FibreOptic).collect()
             }
             Gyros::Mems(gyros) => {
-                let numbered = gyros.iter().zip(0..);
-                Self::Mems(
-                    numbered
-                        .map(|(gyro, n)| MemsState::new(gyro, seed, n, step_s, initial(gyro.node)))
-                        .collect(),
-                )
+                let state = |(gyro, index)| MemsState::new(gyro, seed, index, step_s, initial(gyro.node));
+                gyros.iter().zip(0..).map(state).map(GyroState::Mems).collect()
             }
-        }
+        };
+        Self { clockwork, gyros }
     }
 
     /// Whether the two halves of a tick have to be told apart.
     pub(crate) fn is_dithered(&self) -> bool {
-        matches!(self, Self::Zeeman { .. })
+        self.clockwork.is_some()
     }
 
     pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
-        match self {
-            Self::Zeeman { gyros, .. } => {
-                for gyro in gyros {
-                    gyro.thermal_step(from_deg_c, to_deg_c);
-                }
-            }
-            Self::FibreOptic(gyros) => {
-                for gyro in gyros {
-                    gyro.thermal_step(from_deg_c, to_deg_c);
-                }
-            }
-            Self::Mems(gyros) => {
-                for gyro in gyros {
-                    gyro.thermal_step(from_deg_c, to_deg_c);
-                }
+        for gyro in &mut self.gyros {
+            match gyro {
+                GyroState::Zeeman(gyro) => gyro.thermal_step(from_deg_c, to_deg_c),
+                GyroState::FibreOptic(gyro) => gyro.thermal_step(from_deg_c, to_deg_c),
+                GyroState::Mems(gyro) => gyro.thermal_step(from_deg_c, to_deg_c),
             }
         }
     }
 
     pub(crate) fn sensor_deg_c(&self, share: f64) -> Sensors<f64> {
-        match self {
-            Self::Zeeman { gyros, .. } => gyros.iter().map(|gyro| gyro.sensor_deg_c(share)).collect(),
-            Self::FibreOptic(gyros) => gyros.iter().map(|gyro| gyro.sensor_deg_c(share)).collect(),
-            Self::Mems(gyros) => gyros.iter().map(|gyro| gyro.sensor_deg_c(share)).collect(),
-        }
+        let deg_c = self.gyros.iter().map(|gyro| match gyro {
+            GyroState::Zeeman(gyro) => gyro.node.deg_c,
+            GyroState::FibreOptic(gyro) => gyro.sensor_deg_c,
+            GyroState::Mems(gyro) => gyro.node.deg_c,
+        });
+        deg_c.map(|deg_c| deg_c.at(share)).collect()
     }
 
     /// One tick from the input angles of its two halves (rad); gyros without dither take their sum.
     pub(crate) fn tick(&mut self, halves_rad: &Sensors<[f64; 2]>, time: TickTime) -> GyroOutput {
-        match self {
-            Self::Zeeman { clockwork, gyros } => {
-                let phase = clockwork.tick(time.start_s, time.nominal_s);
-                let mut output = GyroOutput {
-                    mode: Some(phase.mode),
-                    commanded: phase.commanded,
-                    lost: phase.lost,
-                    meander: phase.meander,
-                    ..GyroOutput::default()
-                };
-                for (gyro, &halves) in gyros.iter_mut().zip(halves_rad) {
-                    let tick = gyro.tick(halves, time.length_s, time.share, phase);
-                    output.readings.push(tick.counts);
+        let TickTime { length_s, share, .. } = time;
+        let clockwork = self.clockwork.as_mut();
+        let phase = clockwork.map_or(Phase::UNSWITCHED, |it| it.tick(time.start_s, time.nominal_s));
+        let mut output = GyroOutput {
+            mode: self.is_dithered().then_some(phase.mode),
+            commanded: phase.commanded,
+            lost: phase.lost,
+            meander: phase.meander,
+            ..GyroOutput::default()
+        };
+        for (gyro, &halves) in self.gyros.iter_mut().zip(halves_rad) {
+            let whole_rad = halves[0] + halves[1];
+            let (reading, drift, transient) = match gyro {
+                GyroState::Zeeman(gyro) => {
+                    let tick = gyro.tick(halves, length_s, share, phase);
                     output.halves.push(tick.halves);
-                    output.drift_rad_per_s.push(tick.drift_rad_per_s);
-                    output.transient_rad_per_s.push(tick.transient_rad_per_s);
+                    (tick.counts, tick.drift_rad_per_s, tick.transient_rad_per_s)
                 }
-                output
-            }
-            Self::FibreOptic(gyros) => {
-                let ticks = gyros.iter_mut().zip(halves_rad);
-                rates(ticks.map(|(gyro, halves)| gyro.tick(halves[0] + halves[1], time.length_s, time.share)))
-            }
-            Self::Mems(gyros) => {
-                let ticks = gyros.iter_mut().zip(halves_rad);
-                rates(ticks.map(|(gyro, halves)| gyro.tick(halves[0] + halves[1], time.length_s, time.share)))
-            }
+                GyroState::FibreOptic(gyro) => gyro.tick(whole_rad, length_s, share),
+                GyroState::Mems(gyro) => gyro.tick(whole_rad, length_s, share),
+            };
+            output.readings.push(reading);
+            output.drift_rad_per_s.push(drift);
+            output.transient_rad_per_s.push(transient);
         }
+        output
     }
-}
-
-fn rates(ticks: impl Iterator<Item = (f64, f64)>) -> GyroOutput {
-    let mut output = GyroOutput::default();
-    for (reading, drift) in ticks {
-        output.readings.push(reading);
-        output.drift_rad_per_s.push(drift);
-        output.transient_rad_per_s.push(0.0);
-    }
-    output
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::noise::{GyroNoise, Markov, Noise, Purpose};
 use crate::polynomial;
-use crate::thermal::{Interval, Node, NodeState};
+use crate::thermal::{Node, NodeState};
 
 /// One micromechanical gyro.
 ///
@@ -41,46 +41,33 @@ pub struct MemsGyro {
 #[derive(Debug, Clone)]
 pub(crate) struct MemsState {
     gyro: MemsGyro,
-    node: NodeState,
+    pub(crate) node: NodeState,
     markov: Markov,
     noise: Noise,
-    deg_c: Interval,
-    markov_rad_per_s: Interval,
 }
 
 impl MemsState {
     pub(crate) fn new(gyro: &MemsGyro, seed: u64, index: u32, step_s: f64, deg_c: f64) -> Self {
-        let markov = Markov::new(Noise::new(seed, Purpose::GyroDrift(index)), &gyro.noise, step_s);
         Self {
             gyro: gyro.clone(),
             node: NodeState::new(gyro.node, step_s, deg_c),
-            markov_rad_per_s: Interval::constant(markov.value()),
-            markov,
+            markov: Markov::new(Noise::new(seed, Purpose::GyroDrift(index)), &gyro.noise, step_s),
             noise: Noise::new(seed, Purpose::Gyro(index)),
-            deg_c: Interval::constant(deg_c),
         }
     }
 
     pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
-        self.deg_c.advance(self.node.step(from_deg_c, to_deg_c));
+        self.node.step(from_deg_c, to_deg_c);
         self.markov.step();
-        self.markov_rad_per_s.advance(self.markov.value());
     }
 
-    pub(crate) fn sensor_deg_c(&self, share: f64) -> f64 {
-        self.deg_c.at(share)
-    }
-
-    /// Reading and true drift (both rad/s) of a tick.
-    pub(crate) fn tick(&mut self, input_rad: f64, length_s: f64, share: f64) -> (f64, f64) {
-        let away_k = self.deg_c.at(share) - self.gyro.reference_deg_c;
-        let drift = polynomial::at(&self.gyro.bias_rad_per_s, away_k) + self.markov_rad_per_s.at(share);
-        let [first, second] = self.gyro.scale_per_k;
-        let scale = self.gyro.scale * polynomial::at(&[1.0, first, second], away_k);
-        let walk = self.gyro.noise.angle_random_walk_rad_per_sqrt_s;
-        let noise = if walk > 0.0 { walk * self.noise.normal() / libm::sqrt(length_s) } else { 0.0 };
+    /// Reading, true drift and servo transient (rad/s) of a tick.
+    pub(crate) fn tick(&mut self, input_rad: f64, length_s: f64, share: f64) -> (f64, f64, f64) {
+        let away_k = self.node.deg_c.at(share) - self.gyro.reference_deg_c;
+        let drift = polynomial::at(&self.gyro.bias_rad_per_s, away_k) + self.markov.value.at(share);
+        let scale = self.gyro.scale * polynomial::scale(self.gyro.scale_per_k, away_k);
+        let noise = self.noise.mean(self.gyro.noise.angle_random_walk_rad_per_sqrt_s, length_s);
         let reading = (input_rad / length_s + drift + noise) / scale;
-        let step = self.gyro.resolution_rad_per_s;
-        (if step > 0.0 { libm::round(reading / step) * step } else { reading }, drift)
+        (polynomial::rounded(reading, self.gyro.resolution_rad_per_s), drift, 0.0)
     }
 }

@@ -8,6 +8,8 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::thermal::Interval;
+
 /// What a stream of random numbers is for; each purpose draws from its own, so that switching one source of
 /// noise off leaves the others' values as they were.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +78,11 @@ impl Noise {
             }
         }
     }
+
+    /// White noise in the mean of a tick, by its random walk; a sensor without draws nothing.
+    pub(crate) fn mean(&mut self, random_walk: f64, length_s: f64) -> f64 {
+        if random_walk > 0.0 { random_walk * self.normal() / libm::sqrt(length_s) } else { 0.0 }
+    }
 }
 
 /// Random part of one gyro's drift; all zero makes a noise-free sensor.
@@ -98,28 +105,23 @@ pub(crate) struct Markov {
     noise: Noise,
     decay: f64,
     drive: f64,
-    value: f64,
+    /// Its value over the present step.
+    pub(crate) value: Interval,
 }
 
 impl Markov {
-    pub(crate) fn new(noise: Noise, parameters: &GyroNoise, step_s: f64) -> Self {
+    pub(crate) fn new(mut noise: Noise, parameters: &GyroNoise, step_s: f64) -> Self {
         let sigma = parameters.markov_drift_rad_per_s;
         let decay = if sigma > 0.0 { libm::exp(-step_s / parameters.markov_correlation_s) } else { 0.0 };
-        let mut markov = Self { noise, decay, drive: sigma * libm::sqrt(1.0 - decay * decay), value: 0.0 };
-        if sigma > 0.0 {
-            markov.value = sigma * markov.noise.normal();
-        }
-        markov
-    }
-
-    pub(crate) fn value(&self) -> f64 {
-        self.value
+        let value = if sigma > 0.0 { sigma * noise.normal() } else { 0.0 };
+        let drive = sigma * libm::sqrt(1.0 - decay * decay);
+        Self { noise, decay, drive, value: Interval::constant(value) }
     }
 
     pub(crate) fn step(&mut self) {
-        if self.drive > 0.0 {
-            self.value = self.decay * self.value + self.drive * self.noise.normal();
-        }
+        let last = self.value.to;
+        let driven = self.drive > 0.0;
+        self.value.advance(if driven { self.decay * last + self.drive * self.noise.normal() } else { last });
     }
 }
 
@@ -156,7 +158,7 @@ mod tests {
         let mut sum = 0.0;
         for _ in 0..100_000 {
             markov.step();
-            sum += markov.value() * markov.value();
+            sum += markov.value.to * markov.value.to;
         }
         let deviation = libm::sqrt(sum / 100_000.0);
         assert!((deviation - 2.0).abs() < 0.1, "{deviation}");

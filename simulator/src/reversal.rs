@@ -52,6 +52,12 @@ pub(crate) struct Phase {
     pub(crate) meander: Option<LasingMode>,
 }
 
+impl Phase {
+    /// Of electronics that switch nothing.
+    pub(crate) const UNSWITCHED: Self =
+        Self { mode: LasingMode::Plus, commanded: false, lost: false, servo_starts: false, meander: None };
+}
+
 /// The electronics' clockwork.
 #[derive(Debug, Clone)]
 pub(crate) struct Clockwork {

@@ -1,11 +1,13 @@
 //! The simulation: a stream of ticks from a scenario.
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, Readings, Sensors, TemperatureReading};
+use isotherm_correction::sample::{
+    AccelTick, ChannelName, GyroTick, HalfPeriodCounts, Readings, Sensors, TemperatureReading,
+};
 use isotherm_correction::units::{Span, Timestamp};
 
 use crate::accelerometer::AccelerometersState;
 use crate::chamber::Chamber;
-use crate::effects::{EffectsState, Sensed};
+use crate::effects::EffectsState;
 use crate::error::ScenarioErrors;
 use crate::failure::{FailingSensor, Failures};
 use crate::gyros::{GyroOutput, GyrosState, TickTime};
@@ -39,7 +41,9 @@ pub struct Simulation {
     thermometers: ThermometersState,
     failures: Failures,
     effects: EffectsState,
-    last_gyro: GyroOutput,
+    /// Of the tick before.
+    last_gyro: Readings,
+    last_halves: Sensors<HalfPeriodCounts>,
     last_accel: Readings,
 }
 
@@ -57,7 +61,7 @@ impl Simulation {
         let (instrument, seed) = (&scenario.instrument, scenario.seed);
         let chamber = Chamber::new(&scenario.chamber);
         let surroundings = Surroundings::new(chamber, instrument);
-        let (step_s, housing_deg_c) = (instrument.thermal_step_s, surroundings.housing_deg_c(0.0));
+        let (step_s, housing_deg_c) = (instrument.thermal_step_s, surroundings.housing.deg_c.at(0.0));
         let initial = |node| surroundings.initial_deg_c(node);
         let gyros = GyrosState::new(&instrument.gyros, seed, step_s, housing_deg_c, initial);
         let block = instrument.accelerometers.as_ref();
@@ -75,18 +79,13 @@ impl Simulation {
             gyro_orientation: instrument.gyro_orientation.clone(),
             accelerometers: block.map(|block| AccelerometersState::new(block, seed, step_s, initial)),
             thermometers: ThermometersState::new(&instrument.thermometers, seed),
-            failures: Failures::new(&scenario.failures),
+            failures: Failures(scenario.failures.clone()),
             effects: EffectsState::new(&instrument.effects),
             surroundings,
-            last_gyro: GyroOutput::default(),
+            last_gyro: Readings::default(),
+            last_halves: Sensors::new(),
             last_accel: Readings::default(),
         })
-    }
-
-    /// The motion's exact integrals and attitudes; time zero is the start of the first tick.
-    #[must_use]
-    pub fn trajectory(&self) -> &Trajectory {
-        &self.trajectory
     }
 
     /// Ticks that are still to come.
@@ -111,19 +110,18 @@ impl Simulation {
             if let Some(accelerometers) = &mut self.accelerometers {
                 accelerometers.thermal_step(from_deg_c, to_deg_c);
             }
-            let accels = self.accelerometers.as_ref().map(|block| block.deg_c(1.0)).unwrap_or_default();
-            let housing_deg_c = self.surroundings.housing_deg_c(1.0);
-            self.effects.thermal_step(&self.gyros.sensor_deg_c(1.0), &accels, housing_deg_c);
+            let (gyros, accels) = (self.gyros.sensor_deg_c(1.0), self.accel_deg_c(1.0));
+            self.effects.thermal_step(&gyros, &accels, self.surroundings.housing.deg_c.at(1.0));
         }
     }
 
+    fn accel_deg_c(&self, share: f64) -> Sensors<f64> {
+        self.accelerometers.as_ref().map(|block| block.deg_c(share)).unwrap_or_default()
+    }
+
     /// Input angles of the two halves of the tick for each gyro, and the increments of either; without dither the whole is the first.
-    fn inputs(
-        &self,
-        middle_s: f64,
-        length_s: f64,
-        axes: &Sensors<[f64; 3]>,
-    ) -> (Sensors<[f64; 2]>, [Increments; 2]) {
+    fn inputs(&self, time: TickTime, axes: &Sensors<[f64; 3]>) -> (Sensors<[f64; 2]>, [Increments; 2]) {
+        let TickTime { middle_s, length_s, .. } = time;
         let parts = |middle_s: f64| {
             if self.gyros.is_dithered() {
                 let half_s = 0.5 * length_s;
@@ -141,54 +139,19 @@ impl Simulation {
         (halves.collect(), on_time)
     }
 
-    fn fail_gyros(&mut self, output: &mut GyroOutput, time_s: f64) {
-        for (index, reading) in output.readings.iter_mut().enumerate() {
-            let sensor = FailingSensor::Gyro(index);
-            if self.failures.stuck(sensor, time_s) {
-                *reading = self.last_gyro.readings.get(index).copied().unwrap_or_default();
-                if let Some(halves) = output.halves.get_mut(index) {
-                    *halves = self.last_gyro.halves.get(index).copied().unwrap_or_default();
-                }
-            }
-            if self.failures.not_finite(sensor, time_s) {
-                *reading = f64::NAN;
-            }
-        }
-        self.last_gyro.readings.clone_from(&output.readings);
-        self.last_gyro.halves.clone_from(&output.halves);
-    }
-
-    fn fail_accelerometers(&mut self, readings: &mut Readings, time_s: f64) {
-        for (index, reading) in readings.iter_mut().enumerate() {
-            let sensor = FailingSensor::Accelerometer(index);
-            if self.failures.stuck(sensor, time_s) {
-                *reading = self.last_accel.get(index).copied().unwrap_or_default();
-            }
-            if self.failures.not_finite(sensor, time_s) {
-                *reading = f64::NAN;
-            }
-        }
-        self.last_accel.clone_from(readings);
-    }
-
-    fn read_accelerometers(&mut self, velocity: [f64; 3], length_s: f64, middle_s: f64) -> Option<Readings> {
-        let share = self.surroundings.share(middle_s);
-        let [_, axes_deg_c] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
-        let deg_c = (axes_deg_c, self.surroundings.board_deg_c(share));
+    fn read_accelerometers(&mut self, velocity: [f64; 3], time: TickTime) -> Option<Readings> {
+        let TickTime { middle_s, share, housing_deg_c, .. } = time;
+        let axes_deg_c = self.effects.accel_axes.deg_c(housing_deg_c, share);
         let failures = &self.failures;
         let block = self.accelerometers.as_mut()?;
-        let sensors_deg_c = block.deg_c(share);
-        let housing_deg_c = self.surroundings.housing_deg_c(share);
-        let sensed = Sensed { middle_s, length_s, share, sensors_deg_c: &sensors_deg_c, housing_deg_c };
-        let felt = self.effects.feel(&self.trajectory, sensed, || block.axes(deg_c.0));
+        let axes = block.orientation.axes(axes_deg_c);
+        let felt = self.effects.feel(&self.trajectory, time, &block.deg_c(share), &axes);
         let extra = |index| {
             let felt = felt.get(index).copied().unwrap_or_default();
             failures.extra(FailingSensor::Accelerometer(index), middle_s) + felt
         };
-        let mut readings = block.tick(velocity, length_s, deg_c, share, extra);
-        if !self.failures.is_empty() {
-            self.fail_accelerometers(&mut readings, middle_s);
-        }
+        let mut readings = block.tick(velocity, time, &axes, self.surroundings.board.deg_c.at(share), extra);
+        failures.change(FailingSensor::Accelerometer, middle_s, &mut readings, &mut self.last_accel);
         Some(readings)
     }
 
@@ -197,19 +160,19 @@ impl Simulation {
         while let Some(time_s) = self.thermometers.due(until_s) {
             let share = self.surroundings.share(time_s);
             let (gyros, surroundings) = (self.gyros.sensor_deg_c(share), &self.surroundings);
-            let accels = self.accelerometers.as_ref().map(|block| block.deg_c(share)).unwrap_or_default();
+            let accels = self.accel_deg_c(share);
             let time = self.start + Span::from_s(time_s);
             readings.extend(self.thermometers.read(time, |place| match place {
-                Place::Chamber => surroundings.chamber_deg_c(share),
-                Place::Housing => surroundings.housing_deg_c(share),
-                Place::Board => surroundings.board_deg_c(share),
+                Place::Chamber => surroundings.chamber_deg_c.at(share),
+                Place::Housing => surroundings.housing.deg_c.at(share),
+                Place::Board => surroundings.board.deg_c.at(share),
                 Place::Gyro(index) => gyros.get(index).copied().unwrap_or(f64::NAN),
                 Place::Accelerometer(index) => accels.get(index).copied().unwrap_or(f64::NAN),
             }));
-            readings.extend(self.effects.supply_reading(time_s).map(|(name, raw)| TemperatureReading {
-                channel: ChannelName::from(name).unwrap_or_default(),
+            readings.extend(self.effects.supply.as_ref().map(|supply| TemperatureReading {
+                channel: ChannelName::from(&supply.channel).unwrap_or_default(),
                 time,
-                raw,
+                raw: supply.nominal_v + supply.beyond_v(time_s),
             }));
         }
         readings
@@ -222,38 +185,31 @@ impl Simulation {
         let middle_s = whole_to_real(start_ns + end_ns) * 0.5e-9;
         self.advance_to(middle_s);
         let share = self.surroundings.share(middle_s);
-        let [axes_deg_c, _] = self.effects.axes_deg_c(self.surroundings.housing_deg_c(share), share);
-        let axes = self.gyro_orientation.axes(axes_deg_c);
-        let (mut halves, parts) = self.inputs(middle_s, length_s, &axes);
-        let whole = parts[0].plus(parts[1]);
-        let mut drifts = Sensors::new();
-        if self.effects.has_gyros() {
-            let deg_c = self.gyros.sensor_deg_c(share);
-            let housing_deg_c = self.surroundings.housing_deg_c(share);
-            let sensed = Sensed { middle_s, length_s, share, sensors_deg_c: &deg_c, housing_deg_c };
-            drifts = self.effects.sense(&mut halves, &parts, sensed);
-        }
-        if !self.failures.is_empty() {
-            for (index, halves) in halves.iter_mut().enumerate() {
-                let extra = self.failures.extra(FailingSensor::Gyro(index), middle_s) * 0.5 * length_s;
-                *halves = halves.map(|half| half + extra);
-            }
-        }
         let time = TickTime {
             start_s: whole_to_real(start_ns) * 1e-9,
+            middle_s,
             length_s,
             nominal_s: whole_to_real(self.tick_ns) * 1e-9,
             share,
+            housing_deg_c: self.surroundings.housing.deg_c.at(share),
         };
+        let axes = self.gyro_orientation.axes(self.effects.gyro_axes.deg_c(time.housing_deg_c, share));
+        let (mut halves, parts) = self.inputs(time, &axes);
+        let whole = parts[0].plus(parts[1]);
+        let drifts = self.effects.sense(&mut halves, &parts, time, &self.gyros.sensor_deg_c(share));
+        for (index, halves) in halves.iter_mut().enumerate() {
+            let extra = self.failures.extra(FailingSensor::Gyro(index), middle_s) * 0.5 * length_s;
+            *halves = halves.map(|half| half + extra);
+        }
         let mut output = self.gyros.tick(&halves, time);
         output.drift_rad_per_s.iter_mut().zip(drifts).for_each(|(drift, more)| *drift += more);
-        if !self.failures.is_empty() {
-            self.fail_gyros(&mut output, middle_s);
-        }
+        self.failures.repeat(FailingSensor::Gyro, middle_s, &mut output.halves, &self.last_halves);
+        self.failures.change(FailingSensor::Gyro, middle_s, &mut output.readings, &mut self.last_gyro);
+        self.last_halves.clone_from(&output.halves);
         let end_time = Timestamp::from_ns(self.start.as_ns().saturating_add(end_ns));
         let sequence = self.sequence;
-        let accel = self.read_accelerometers(whole.velocity, length_s, middle_s);
-        let truth = self.truth(whole, length_s, share, &output);
+        let accel = self.read_accelerometers(whole.velocity, time);
+        let truth = self.truth(whole, time, &output);
         let temperatures = self.read_thermometers(whole_to_real(end_ns) * 1e-9);
         self.sequence += 1;
         self.elapsed_ns = end_ns;
@@ -275,17 +231,18 @@ impl Simulation {
         }
     }
 
-    fn truth(&self, whole: Increments, length_s: f64, share: f64, output: &GyroOutput) -> Truth {
+    fn truth(&self, whole: Increments, time: TickTime, output: &GyroOutput) -> Truth {
+        let TickTime { length_s, share, housing_deg_c, .. } = time;
         Truth {
             delta_angle: whole.angle,
             delta_velocity: whole.velocity,
             mean_rate: scale(whole.angle, 1.0 / length_s),
             mean_force: scale(whole.velocity, 1.0 / length_s),
-            chamber_deg_c: self.surroundings.chamber_deg_c(share),
-            housing_deg_c: self.surroundings.housing_deg_c(share),
-            board_deg_c: self.surroundings.board_deg_c(share),
+            chamber_deg_c: self.surroundings.chamber_deg_c.at(share),
+            housing_deg_c,
+            board_deg_c: self.surroundings.board.deg_c.at(share),
             gyro_deg_c: self.gyros.sensor_deg_c(share),
-            accel_deg_c: self.accelerometers.as_ref().map(|block| block.deg_c(share)).unwrap_or_default(),
+            accel_deg_c: self.accel_deg_c(share),
             gyro_drift_rad_per_s: output.drift_rad_per_s.clone(),
             gyro_transient_rad_per_s: output.transient_rad_per_s.clone(),
             lost: output.lost,
@@ -298,11 +255,6 @@ impl Iterator for Simulation {
 
     fn next(&mut self) -> Option<Step> {
         (self.sequence < self.ticks).then(|| self.step())
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        let remaining = usize::try_from(self.remaining());
-        (remaining.unwrap_or(usize::MAX), remaining.ok())
     }
 }
 

@@ -12,11 +12,9 @@ pub(crate) struct Surroundings {
     /// Number of the step at the end of the present interval.
     steps: f64,
     cold_start: bool,
-    housing_node: NodeState,
-    board_node: NodeState,
-    chamber_deg_c: Interval,
-    housing_deg_c: Interval,
-    board_deg_c: Interval,
+    pub(crate) chamber_deg_c: Interval,
+    pub(crate) housing: NodeState,
+    pub(crate) board: NodeState,
 }
 
 impl Surroundings {
@@ -31,17 +29,15 @@ impl Surroundings {
             step_s,
             steps: 0.0,
             cold_start: instrument.cold_start,
-            housing_node: NodeState::new(instrument.housing, step_s, housing),
-            board_node: NodeState::new(instrument.board, step_s, board),
             chamber_deg_c: Interval::constant(start),
-            housing_deg_c: Interval::constant(housing),
-            board_deg_c: Interval::constant(board),
+            housing: NodeState::new(instrument.housing, step_s, housing),
+            board: NodeState::new(instrument.board, step_s, board),
         }
     }
 
     /// Temperature at the start of a part behind the housing.
     pub(crate) fn initial_deg_c(&self, node: Node) -> f64 {
-        self.housing_deg_c.from + if self.cold_start { 0.0 } else { node.heating_deg_c }
+        self.housing.deg_c.from + if self.cold_start { 0.0 } else { node.heating_deg_c }
     }
 
     /// Makes one step where `time_s` lies beyond the present interval; gives the housing's temperature at its
@@ -52,26 +48,14 @@ impl Surroundings {
         }
         self.steps += 1.0;
         self.chamber_deg_c.advance(self.chamber.deg_c(self.steps * self.step_s));
-        let housing = self.housing_node.step(self.chamber_deg_c.from, self.chamber_deg_c.to);
-        self.housing_deg_c.advance(housing);
-        self.board_deg_c.advance(self.board_node.step(self.housing_deg_c.from, self.housing_deg_c.to));
-        Some((self.housing_deg_c.from, self.housing_deg_c.to))
+        self.housing.step(self.chamber_deg_c.from, self.chamber_deg_c.to);
+        let Interval { from, to } = self.housing.deg_c;
+        self.board.step(from, to);
+        Some((from, to))
     }
 
     /// Place of a time in the present interval: 0 at its start, 1 at its end.
     pub(crate) fn share(&self, time_s: f64) -> f64 {
         time_s / self.step_s - (self.steps - 1.0)
-    }
-
-    pub(crate) fn chamber_deg_c(&self, share: f64) -> f64 {
-        self.chamber_deg_c.at(share)
-    }
-
-    pub(crate) fn housing_deg_c(&self, share: f64) -> f64 {
-        self.housing_deg_c.at(share)
-    }
-
-    pub(crate) fn board_deg_c(&self, share: f64) -> f64 {
-        self.board_deg_c.at(share)
     }
 }

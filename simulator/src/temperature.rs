@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::noise::{Noise, Purpose};
+use crate::polynomial::rounded;
 
 /// All temperature channels of a unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -109,9 +110,7 @@ impl ThermometersState {
         let read = |(channel, name, noise): &mut (Channel, ChannelName, Noise)| {
             let jitter = if channel.noise_deg_c > 0.0 { channel.noise_deg_c * noise.normal() } else { 0.0 };
             let raw = channel.raw_at_0_deg_c + channel.raw_per_deg_c * (deg_c(channel.place) + jitter);
-            let step = channel.resolution_raw;
-            let raw = if step > 0.0 { libm::round(raw / step) * step } else { raw };
-            TemperatureReading { channel: *name, time, raw }
+            TemperatureReading { channel: *name, time, raw: rounded(raw, channel.resolution_raw) }
         };
         self.channels.iter_mut().map(read).collect()
     }

@@ -32,27 +32,22 @@ pub(crate) struct NodeState {
     node: Node,
     step_s: f64,
     decay: f64,
-    deg_c: f64,
+    /// Its temperature over the present step (°C).
+    pub(crate) deg_c: Interval,
 }
 
 impl NodeState {
     pub(crate) fn new(node: Node, step_s: f64, initial_deg_c: f64) -> Self {
         let decay = if node.time_constant_s > 0.0 { libm::exp(-step_s / node.time_constant_s) } else { 0.0 };
-        Self { node, step_s, decay, deg_c: initial_deg_c }
-    }
-
-    #[cfg(test)]
-    pub(crate) fn deg_c(&self) -> f64 {
-        self.deg_c
+        Self { node, step_s, decay, deg_c: Interval::constant(initial_deg_c) }
     }
 
     /// Advances by one step over which the surroundings go from `from_deg_c` to `to_deg_c`.
-    pub(crate) fn step(&mut self, from_deg_c: f64, to_deg_c: f64) -> f64 {
+    pub(crate) fn step(&mut self, from_deg_c: f64, to_deg_c: f64) {
         let lag_deg_c = (to_deg_c - from_deg_c) / self.step_s * self.node.time_constant_s;
         let heating = self.node.heating_deg_c;
-        self.deg_c =
-            to_deg_c + heating - lag_deg_c + (self.deg_c - from_deg_c - heating + lag_deg_c) * self.decay;
-        self.deg_c
+        let left_deg_c = (self.deg_c.to - from_deg_c - heating + lag_deg_c) * self.decay;
+        self.deg_c.advance(to_deg_c + heating - lag_deg_c + left_deg_c);
     }
 }
 
@@ -92,7 +87,7 @@ mod tests {
             node.step(around, around + rate * 0.5);
             around += rate * 0.5;
         }
-        assert!((node.deg_c() - (around + 5.0 - rate * tau)).abs() < 1e-7);
+        assert!((node.deg_c.to - (around + 5.0 - rate * tau)).abs() < 1e-7);
     }
 
     #[test]
@@ -104,13 +99,14 @@ mod tests {
                 node.step(1.0, 1.0);
                 time_s += step_s;
             }
-            assert!((node.deg_c() - (1.0 - libm::exp(-2.0))).abs() < 1e-9, "{step_s}");
+            assert!((node.deg_c.to - (1.0 - libm::exp(-2.0))).abs() < 1e-9, "{step_s}");
         }
     }
 
     #[test]
     fn a_node_without_inertia_follows_at_once() {
         let mut node = NodeState::new(Node::passive(0.0), 1.0, 0.0);
-        assert!((node.step(3.0, 4.0) - 4.0).abs() < 1e-15);
+        node.step(3.0, 4.0);
+        assert!((node.deg_c.to - 4.0).abs() < 1e-15);
     }
 }

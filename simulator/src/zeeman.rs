@@ -13,7 +13,7 @@ use crate::counter::Counter;
 use crate::noise::{GyroNoise, Markov, Noise, Purpose};
 use crate::polynomial;
 use crate::reversal::{Phase, Reversal};
-use crate::thermal::{Interval, Node, NodeState};
+use crate::thermal::{Node, NodeState};
 
 /// Temperature to which the slow meander's coefficients refer (°C).
 pub const MEANDER_REFERENCE_DEG_C: f64 = 25.0;
@@ -86,13 +86,11 @@ pub(crate) struct ZeemanState {
     gyro: ZeemanGyro,
     quantised: bool,
     reversal: Reversal,
-    node: NodeState,
+    pub(crate) node: NodeState,
     markov: Markov,
     noise: Noise,
     switches: Noise,
     counter: Counter,
-    deg_c: Interval,
-    markov_rad_per_s: Interval,
     /// Relative loss of dither frequency when the servo came on, and the time since.
     dither_loss: f64,
     servo_age_s: f64,
@@ -108,31 +106,23 @@ impl ZeemanState {
         deg_c: f64,
     ) -> Self {
         let mut noise = Noise::new(seed, Purpose::Gyro(index));
-        let markov = Markov::new(Noise::new(seed, Purpose::GyroDrift(index)), &gyro.noise, step_s);
         Self {
             gyro: *gyro,
             quantised: unit.quantised,
             reversal: unit.reversal,
             node: NodeState::new(gyro.node, step_s, deg_c),
-            markov_rad_per_s: Interval::constant(markov.value()),
-            markov,
+            markov: Markov::new(Noise::new(seed, Purpose::GyroDrift(index)), &gyro.noise, step_s),
             counter: Counter::starting_at(noise.uniform()),
             noise,
             switches: Noise::new(seed, Purpose::Perimeter(index)),
-            deg_c: Interval::constant(deg_c),
             dither_loss: 0.0,
             servo_age_s: 0.0,
         }
     }
 
     pub(crate) fn thermal_step(&mut self, from_deg_c: f64, to_deg_c: f64) {
-        self.deg_c.advance(self.node.step(from_deg_c, to_deg_c));
+        self.node.step(from_deg_c, to_deg_c);
         self.markov.step();
-        self.markov_rad_per_s.advance(self.markov.value());
-    }
-
-    pub(crate) fn sensor_deg_c(&self, share: f64) -> f64 {
-        self.deg_c.at(share)
     }
 
     fn drift_rad_per_s(&self, deg_c: f64, share: f64, phase: Phase) -> f64 {
@@ -141,7 +131,7 @@ impl ZeemanState {
         polynomial::at(&self.gyro.bias_nonmagnetic_rad_per_s, away_k)
             + phase.mode.sign() * polynomial::at(&self.gyro.bias_magnetic_rad_per_s, away_k)
             + meander_sign * polynomial::at(&self.gyro.meander_rad_per_s, deg_c - MEANDER_REFERENCE_DEG_C)
-            + self.markov_rad_per_s.at(share)
+            + self.markov.value.at(share)
     }
 
     /// Counts of a tick from the input angle of its two halves.
@@ -152,10 +142,9 @@ impl ZeemanState {
         share: f64,
         phase: Phase,
     ) -> ZeemanTick {
-        let deg_c = self.deg_c.at(share);
+        let deg_c = self.node.deg_c.at(share);
         let away_k = deg_c - self.gyro.reference_deg_c;
-        let [first, second] = self.gyro.scale_per_k;
-        let scale_rad = self.gyro.scale_rad_per_count * polynomial::at(&[1.0, first, second], away_k);
+        let scale_rad = self.gyro.scale_rad_per_count * polynomial::scale(self.gyro.scale_per_k, away_k);
         let dither_hz = polynomial::at(&self.gyro.dither_hz, away_k);
         let drift_rad_per_s = self.drift_rad_per_s(deg_c, share, phase);
         let walk = self.gyro.noise.angle_random_walk_rad_per_sqrt_s;

@@ -2,13 +2,10 @@
 
 use std::path::PathBuf;
 
-use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind};
-use isotherm_protocol::corrected::{AppliedTemperature, CorrectedTick, Revision};
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::reference::Reference;
 
 use super::rows::{self, Sensors};
-use super::table::{Row, Table, columns};
+use super::table::{Row, Table};
 use crate::Written;
 use isotherm_log::error::Error;
 use isotherm_log::streams::contents::{CorrectedShape, Shapes, UnitContents};
@@ -43,43 +40,22 @@ impl UnitTables {
         let shape = contents.corrected;
         // At most: where every message has one tick.
         let applied = contents.corrected_ticks.saturating_mul(contents.applied_channels.len() as u64);
-        let (counts, gyro, accel) = (OutputKind::Counts, GyroTick::default(), AccelTick::default());
-        let (revision, corrected) = (Revision { counter: 0, digest: [0; 8] }, CorrectedTick::default());
-        let reference =
-            Reference { start_ns: 0, end_ns: 0, angular_rate_rad_per_s: [0.0; 3], sigma_rad_per_s: 0.0 };
-        let temperature = AppliedTemperature {
-            channel: ChannelName::default(),
-            temperature_deg_c: 0.0,
-            rate_deg_c_per_s: 0.0,
-        };
         let streams = [
-            ("raw_gyro", ticks(&contents.gyro), columns(|row| rows::gyro(row, gyros, 0, counts, &gyro))),
-            ("raw_accel", ticks(&contents.accel), columns(|row| rows::accel(row, accels, 0, counts, &accel))),
-            (
-                "raw_temperature",
-                contents.temperature_readings,
-                columns(|row| rows::reading(row, 0, 0, ("channel", ""), ("raw", 0.0))),
-            ),
-            (
-                "raw_health",
-                contents.health_readings,
-                columns(|row| rows::reading(row, 0, 0, ("name", ""), ("value", 0.0))),
-            ),
-            ("reference", contents.references, columns(|row| rows::reference(row, 0, &reference))),
-            (
-                "corrected",
-                contents.corrected_ticks,
-                columns(|row| rows::corrected(row, shape, 0, revision, &corrected)),
-            ),
-            ("applied_temperature", applied, columns(|row| rows::applied(row, 0, 0, &temperature))),
-            ("status", contents.status, columns(|row| rows::status(row, 0, &serde_json::Value::Null))),
+            ("raw_gyro", ticks(&contents.gyro)),
+            ("raw_accel", ticks(&contents.accel)),
+            ("raw_temperature", contents.temperature_readings),
+            ("raw_health", contents.health_readings),
+            ("reference", contents.references),
+            ("corrected", contents.corrected_ticks),
+            ("applied_temperature", applied),
+            ("status", contents.status),
         ];
         let mut tables = Vec::new();
-        for (stream, expected, columns) in streams.into_iter().filter(|(_, expected, _)| *expected > 0) {
+        for (stream, expected) in streams.into_iter().filter(|(_, expected)| *expected > 0) {
             let mut words = provenance.to_vec();
             words.push(("unit".to_owned(), unit.to_string()));
             words.push(("stream".to_owned(), stream.to_owned()));
-            tables.push((stream, Table::create(&path(stream)?, &columns, expected, &words)?));
+            tables.push((stream, Table::create(&path(stream)?, expected, words)?));
         }
         Ok(Self { unit: unit.clone(), tables, gyros, accels, shape })
     }

@@ -1,7 +1,7 @@
 //! A Parquet file that is written row by row, in constant memory.
 
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, IntoInnerError};
 use std::mem;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,25 +43,43 @@ pub(super) const U64: Kind = Kind::Integer(64, false);
 /// Signed 32 bits.
 pub(super) const I32: Kind = Kind::Integer(32, true);
 
-/// A column.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A column, and the values of it that wait for their group.
+#[derive(Debug)]
 pub(super) struct Column {
     /// Its name, with the unit of measure.
-    pub(super) name: String,
-    /// What it holds.
-    pub(super) kind: Kind,
+    name: String,
+    kind: Kind,
     /// Cells may be empty.
-    pub(super) optional: bool,
+    optional: bool,
+    values: Values,
+    /// 1 where there is a value, 0 where there is none; for optional columns.
+    present: Vec<i16>,
+}
+
+#[derive(Debug)]
+enum Values {
+    Int32(Vec<i32>),
+    Int64(Vec<i64>),
+    Double(Vec<f64>),
+    Boolean(Vec<bool>),
+    Text(Vec<ByteArray>),
 }
 
 /// A column that has a value in every row.
 pub(super) fn full(name: impl Into<String>, kind: Kind) -> Column {
-    Column { name: name.into(), kind, optional: false }
+    let values = match kind {
+        Kind::Integer(64, _) => Values::Int64(Vec::new()),
+        Kind::Integer(..) => Values::Int32(Vec::new()),
+        Kind::Double => Values::Double(Vec::new()),
+        Kind::Boolean => Values::Boolean(Vec::new()),
+        Kind::Text | Kind::Json => Values::Text(Vec::new()),
+    };
+    Column { name: name.into(), kind, optional: false, values, present: Vec::new() }
 }
 
 /// A column that may be empty.
 pub(super) fn sparse(name: impl Into<String>, kind: Kind) -> Column {
-    Column { name: name.into(), kind, optional: true }
+    Column { optional: true, ..full(name, kind) }
 }
 
 /// One cell of a row.
@@ -115,30 +133,13 @@ impl<'a, T: Into<Cell<'a>>> From<Option<T>> for Cell<'a> {
     }
 }
 
-/// A row that is being given cell by cell: what gives it is asked for its columns first, so that each stands in one place with
-/// what it holds.
+/// A row that is being given cell by cell; each cell names its column, so that the first row gives a table its columns.
 pub(super) struct Row<'t> {
-    columns: Columns<'t>,
+    columns: &'t mut Vec<Column>,
+    /// Place of the next cell's column.
+    next: usize,
     /// The first cell that did not fit.
     misfit: Option<String>,
-}
-
-/// The columns of a row's table.
-enum Columns<'t> {
-    /// Asked for: what is given names them.
-    Asked(Vec<Column>),
-    /// There, from the next one on.
-    There(std::slice::IterMut<'t, Pending>),
-}
-
-/// The columns of what gives rows.
-pub(super) fn columns(row: impl FnOnce(&mut Row<'_>)) -> Vec<Column> {
-    let mut asked = Row { columns: Columns::Asked(Vec::new()), misfit: None };
-    row(&mut asked);
-    match asked.columns {
-        Columns::Asked(columns) => columns,
-        Columns::There(_) => Vec::new(),
-    }
 }
 
 impl Row<'_> {
@@ -160,45 +161,30 @@ impl Row<'_> {
         cells: impl IntoIterator<Item = T>,
     ) {
         let mut cells = cells.into_iter().map(Into::into);
-        match &mut self.columns {
-            Columns::Asked(columns) => columns.extend((0..count).map(column)),
-            Columns::There(columns) => {
-                for column in columns.take(count) {
-                    let cell = cells.next().unwrap_or(Cell::Empty);
-                    if !column.push(cell) && self.misfit.is_none() {
-                        self.misfit = Some(format!("{cell:?} does not fit the column {:?}", column.name));
-                    }
-                }
+        for n in 0..count {
+            if self.next == self.columns.len() {
+                self.columns.push(column(n));
             }
+            let cell = cells.next().unwrap_or(Cell::Empty);
+            if let Some(column) = self.columns.get_mut(self.next)
+                && !column.push(cell)
+            {
+                let misfit = || format!("{cell:?} does not fit the column {:?}", column.name);
+                self.misfit.get_or_insert_with(misfit);
+            }
+            self.next += 1;
         }
     }
 }
 
-/// Values of a column that wait for their group.
-#[derive(Debug)]
-enum Values {
-    Int32(Vec<i32>),
-    Int64(Vec<i64>),
-    Double(Vec<f64>),
-    Boolean(Vec<bool>),
-    Text(Vec<ByteArray>),
-}
-
-/// A column and what waits of it.
-#[derive(Debug)]
-struct Pending {
-    name: String,
-    optional: bool,
-    values: Values,
-    /// 1 where there is a value, 0 where there is none; for optional columns.
-    present: Vec<i16>,
-}
-
 /// A Parquet file that is being written.
 pub(super) struct Table {
-    writer: SerializedFileWriter<BufWriter<File>>,
+    file: File,
+    /// From the first group on: the first row gives the columns.
+    writer: Option<SerializedFileWriter<BufWriter<File>>>,
     path: PathBuf,
-    columns: Vec<Pending>,
+    columns: Vec<Column>,
+    provenance: Vec<KeyValue>,
     group_rows: u64,
     /// Rows that wait.
     waiting: u64,
@@ -215,16 +201,15 @@ impl Table {
     /// Creates the file for about so many rows. `provenance`: names and values for the file's metadata.
     pub(super) fn create(
         path: &Path,
-        columns: &[Column],
         expected_rows: u64,
-        provenance: &[(String, String)],
+        provenance: Vec<(String, String)>,
     ) -> Result<Self, Error> {
-        let file = File::create(path).map_err(|source| Error::file(path, "create", source))?;
-        let writer = open(BufWriter::new(file), columns, provenance).map_err(|error| failed(path, error))?;
         Ok(Self {
-            writer,
+            file: File::create(path).map_err(|source| Error::file(path, "create", source))?,
+            writer: None,
             path: path.to_owned(),
-            columns: columns.iter().map(Pending::of).collect(),
+            columns: Vec::new(),
+            provenance: provenance.into_iter().map(|(name, value)| KeyValue::new(name, value)).collect(),
             group_rows: GROUP_ROWS.max(expected_rows / MOST_GROUPS + 1),
             waiting: 0,
             rows: 0,
@@ -233,14 +218,17 @@ impl Table {
 
     /// Writes one row, which gives a cell for each column.
     pub(super) fn push(&mut self, row: impl FnOnce(&mut Row<'_>)) -> Result<(), Error> {
-        let mut cells = Row { columns: Columns::There(self.columns.iter_mut()), misfit: None };
+        let mut cells = Row { columns: &mut self.columns, next: 0, misfit: None };
         row(&mut cells);
         if let Some(words) = cells.misfit {
             return Err(Error::file(&self.path, "write", io::Error::other(words)));
         }
         self.rows += 1;
         self.waiting += 1;
-        if self.waiting >= self.group_rows { self.write_group() } else { Ok(()) }
+        if self.waiting < self.group_rows {
+            return Ok(());
+        }
+        self.write_group().map_err(|error| failed(&self.path, error))
     }
 
     /// Where it is written to.
@@ -250,41 +238,28 @@ impl Table {
 
     /// Ends the file, on the disk.
     pub(super) fn finish(mut self) -> Result<u64, Error> {
-        if self.waiting > 0 {
-            self.write_group()?;
-        }
-        let path = self.path;
-        let buffered = self.writer.into_inner().map_err(|error| failed(&path, error))?;
-        let file = buffered.into_inner().map_err(|error| Error::file(&path, "write", error.into_error()))?;
-        file.sync_all().map_err(|source| Error::file(&path, "write", source))?;
+        let written = self.write_group().and_then(|()| self.writer.map_or(Ok(()), on_disk));
+        written.map_err(|error| failed(&self.path, error))?;
         Ok(self.rows)
     }
 
-    fn write_group(&mut self) -> Result<(), Error> {
-        let columns = &mut self.columns;
-        let mut write = || {
-            let mut group = self.writer.next_row_group()?;
-            columns.iter_mut().try_for_each(|column| column.write(&mut group))?;
-            group.close().map(|_| ())
+    /// Writes the rows that wait.
+    fn write_group(&mut self) -> Result<(), ParquetError> {
+        let mut writer = match self.writer.take() {
+            Some(writer) => writer,
+            None => open(BufWriter::new(self.file.try_clone()?), &self.columns, &self.provenance)?,
         };
-        write().map_err(|error| failed(&self.path, error))?;
-        self.waiting = 0;
+        if self.waiting > 0 {
+            let mut group = writer.next_row_group()?;
+            self.columns.iter_mut().try_for_each(|column| column.write(&mut group))?;
+            group.close()?;
+        }
+        (self.writer, self.waiting) = (Some(writer), 0);
         Ok(())
     }
 }
 
-impl Pending {
-    fn of(column: &Column) -> Self {
-        let values = match column.kind {
-            Kind::Integer(64, _) => Values::Int64(Vec::new()),
-            Kind::Integer(..) => Values::Int32(Vec::new()),
-            Kind::Double => Values::Double(Vec::new()),
-            Kind::Boolean => Values::Boolean(Vec::new()),
-            Kind::Text | Kind::Json => Values::Text(Vec::new()),
-        };
-        Self { name: column.name.clone(), optional: column.optional, values, present: Vec::new() }
-    }
-
+impl Column {
     /// Takes a cell; false where it does not fit.
     fn push(&mut self, cell: Cell<'_>) -> bool {
         if cell == Cell::Empty && self.optional {
@@ -347,15 +322,14 @@ fn write<D: DataType>(
 fn open(
     file: BufWriter<File>,
     columns: &[Column],
-    provenance: &[(String, String)],
+    provenance: &[KeyValue],
 ) -> Result<SerializedFileWriter<BufWriter<File>>, ParquetError> {
     let fields = columns.iter().map(field).collect::<Result<Vec<TypePtr>, _>>()?;
     let schema = Type::group_type_builder("schema").with_fields(fields).build()?;
-    let pairs = provenance.iter().map(|(name, value)| KeyValue::new(name.clone(), value.clone()));
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(concat!("isotherm ", env!("CARGO_PKG_VERSION")).to_owned())
-        .set_key_value_metadata(Some(pairs.collect()));
+        .set_key_value_metadata(Some(provenance.to_vec()));
     for column in columns {
         let path = ColumnPath::new(vec![column.name.clone()]);
         match column.kind {
@@ -372,6 +346,12 @@ fn open(
         }
     }
     SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))
+}
+
+/// Ends a file.
+fn on_disk(writer: SerializedFileWriter<BufWriter<File>>) -> Result<(), ParquetError> {
+    let file = writer.into_inner()?.into_inner().map_err(IntoInnerError::into_error)?;
+    Ok(file.sync_all()?)
 }
 
 /// A column as the format has it.

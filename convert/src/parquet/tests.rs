@@ -15,7 +15,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 
 use super::UnitTables;
-use super::table::{Cell, I64, Kind, Row, Table, columns, full};
+use super::table::{Cell, I64, Kind, Row, Table};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::streams::contents::Contents;
 use isotherm_log::streams::decoded::Decoded;
@@ -39,7 +39,7 @@ fn rows_of_many_groups_are_read_back() {
         row.full("name", Kind::Text, ["a", "b"][usize::from(n % 2 == 0)]);
     };
     let words = [("unit".to_owned(), "A-1".to_owned())];
-    let mut table = Table::create(&path, &columns(|row| give(row, 0)), 40_000, &words).unwrap();
+    let mut table = Table::create(&path, 40_000, words.to_vec()).unwrap();
     for n in 0..40_000 {
         table.push(|row| give(row, n)).unwrap();
     }
@@ -60,9 +60,8 @@ fn rows_of_many_groups_are_read_back() {
 #[test]
 fn a_cell_that_does_not_fit_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
-    let columns = || vec![full("value", Kind::Double)];
     let refused = [Cell::Empty, Cell::Integer(1)].map(|cell| {
-        let mut table = Table::create(&folder.path().join("x.parquet"), &columns(), 1, &[]).unwrap();
+        let mut table = Table::create(&folder.path().join("x.parquet"), 1, Vec::new()).unwrap();
         table.push(|row| row.full("value", Kind::Double, cell)).unwrap_err().to_string()
     });
     insta::assert_snapshot!(refused.join("\n").replace(folder.path().to_str().unwrap(), "FOLDER"));

@@ -72,7 +72,7 @@ pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
 
 /// A reader that has gone away, as `head` does, has what it wanted.
 fn ended(source: io::Error) -> Result<Exit, Error> {
-    if source.kind() == ErrorKind::BrokenPipe { Ok(Exit::Ok) } else { Err(Error::Stdout { source }) }
+    if source.kind() == ErrorKind::BrokenPipe { Ok(Exit::Ok) } else { Err(Error::Stdout(source)) }
 }
 
 /// What a message says; of a key that is none of the protocol's, its length.

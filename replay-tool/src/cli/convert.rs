@@ -171,7 +171,7 @@ fn names(paths: &[PathBuf]) -> String {
 pub(super) fn run(args: &ConvertArgs) -> Result<Exit, Error> {
     let conversion = args.conversion()?;
     let outcome = conversion.run()?;
-    for note in &outcome.notes {
+    for note in &outcome.converted.notes {
         show::warn(note);
     }
     let report = Report { target: conversion.target, outcome: &outcome };
@@ -188,7 +188,7 @@ fn human(outcome: &convert::Outcome) -> String {
         .map(|file| (format!("{}  {}", file.path.display(), file.what), file.rows.to_string()))
         .collect();
     let topics: Vec<_> =
-        outcome.topics.iter().map(|topic| (topic.name.clone(), topic.messages.to_string())).collect();
+        converted.topics.iter().map(|topic| (topic.name.clone(), topic.messages.to_string())).collect();
     let mut counts: Vec<_> = Vec::new();
     if converted.duplicates > 0 {
         counts.push(("duplicates, written once".to_owned(), converted.duplicates.to_string()));

@@ -246,7 +246,7 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     let options = args.options()?;
     // A log that cannot be read is said before a session is opened.
     check_names(&options)?;
-    let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
+    let runtime = tokio::runtime::Runtime::new().map_err(Error::Runtime)?;
     let (sender, commands) = tokio::sync::mpsc::unbounded_channel();
     let keyboard = Keyboard::listen(sender);
     let screen = Screen::new(keyboard.is_some());

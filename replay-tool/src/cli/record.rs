@@ -1,5 +1,6 @@
 //! `isotherm-replay record`.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -123,23 +124,11 @@ fn bytes(text: &str) -> Result<u64, String> {
 impl RecordArgs {
     /// What they ask for.
     fn options(&self) -> Result<RecordOptions, Error> {
-        let limit = |name: &str, value: Option<u64>, least: u64| match value {
-            Some(value) if value < least => {
-                Err(Error::Usage(format!("{name} is {value}, must be at least {least} bytes")))
-            }
-            _ => Ok(()),
-        };
-        limit("--max-size", self.max_size, SMALLEST_FILE)?;
-        limit("--queue", Some(self.queue), SMALLEST_QUEUE)?;
-        let at_least = |name: &str, value: Option<Span>, least: f64| match value {
-            Some(value) if value.as_s() < least => {
-                Err(Error::Usage(format!("{name} is {}, must be at least {least} s", value.as_s())))
-            }
-            _ => Ok(()),
-        };
-        at_least("--max-duration", self.max_duration, 0.1)?;
-        at_least("--chunk-seconds", Some(self.chunk_seconds), 0.01)?;
-        at_least("--timeout", Some(self.timeout), 0.01)?;
+        at_least("--max-size", self.max_size, SMALLEST_FILE, "bytes")?;
+        at_least("--queue", Some(self.queue), SMALLEST_QUEUE, "bytes")?;
+        at_least("--max-duration", self.max_duration.map(Span::as_s), 0.1, "s")?;
+        at_least("--chunk-seconds", Some(self.chunk_seconds.as_s()), 0.01, "s")?;
+        at_least("--timeout", Some(self.timeout.as_s()), 0.01, "s")?;
         if self.keep.is_some() && self.max_size.is_none() && self.max_duration.is_none() {
             return Err(Error::Usage("--keep needs --max-size or --max-duration".to_owned()));
         }
@@ -176,6 +165,21 @@ impl RecordArgs {
     }
 }
 
+/// Refuses an option's value below the least.
+fn at_least<T: PartialOrd + Display + Copy>(
+    name: &str,
+    value: Option<T>,
+    least: T,
+    unit: &str,
+) -> Result<(), Error> {
+    match value {
+        Some(value) if value < least => {
+            Err(Error::Usage(format!("{name} is {value}, must be at least {least} {unit}")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A span that is not negative as a duration.
 fn time(span: Span) -> Duration {
     Duration::from_nanos(u64::try_from(span.as_ns()).unwrap_or(0))
@@ -184,7 +188,7 @@ fn time(span: Span) -> Duration {
 /// Runs the command.
 pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
     let options = args.options()?;
-    let runtime = tokio::runtime::Runtime::new().map_err(|source| Error::Runtime { source })?;
+    let runtime = tokio::runtime::Runtime::new().map_err(Error::Runtime)?;
     let mut live = Live::new();
     let recorded = runtime.block_on(record(&options, |report| live.show(report)));
     live.finish();

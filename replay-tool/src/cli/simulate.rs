@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{print, seconds, show};
 use crate::error::Error;
-use crate::simulated::{Columns, LogWriter, write_truth, write_truth_header};
+use crate::simulated::{LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{Sink, read_small_text, refuse_overwriting, refuse_replacing, write_whole};
 use isotherm_log::mapping::Mapping;
 
@@ -171,7 +171,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
     let scenario = args.scenario()?;
-    let columns = Columns::of(&scenario)?;
+    let mut rows = LogWriter::of(&scenario)?;
     let name = args.scenario.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()));
     let simulation = Simulation::new(&scenario)
         .map_err(|errors| Error::Scenario(errors.0.iter().map(|error| format!("{name}{error}")).collect()))?;
@@ -179,8 +179,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     let mapping = Mapping::path_beside(out);
     args.refuse_overwriting(out, &mapping)?;
     let mut log = Sink::create(out)?;
-    let mapping_text = columns.mapping();
-    let mut rows = log.write(|writer| LogWriter::new(columns, writer))?;
+    log.write(|writer| rows.write_header(writer))?;
     let mut truth = args.truth.as_deref().map(Sink::create).transpose()?;
     if let Some(truth) = &mut truth {
         truth.write(|writer| write_truth_header(scenario.instrument.gyros.count(), writer))?;
@@ -209,7 +208,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     if let Some(truth) = truth {
         truth.finish()?.keep()?;
     }
-    write_whole(&mapping, mapping_text.as_bytes(), true)
+    write_whole(&mapping, rows.mapping().as_bytes(), true)
         .map_err(|source| Error::file(&mapping, "write", source))?;
     log.keep()?;
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;

@@ -4,8 +4,7 @@ mod next;
 mod obey;
 mod told;
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
@@ -22,10 +21,14 @@ use super::units::{PlayedUnit, Units};
 use super::{Acknowledge, Command, PlayOptions, Watch};
 use crate::error::Error;
 use crate::pace::Pacer;
-use next::Waiting;
 
 /// How often the position is shown.
 const SHOW: Duration = Duration::from_millis(50);
+
+/// The turn of a message that is to go out: by time (ns), then by order.
+type Turn = (i64, u64);
+/// A message that is to go out: the place of its unit, and what it is.
+type Leaving = (usize, Departure<Arc<Frame>>);
 
 /// How far it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,11 +48,10 @@ pub(super) struct Player<'a, W> {
     watch: &'a W,
     /// Whoever is at the keyboard; `None` once nobody is.
     commands: Option<UnboundedReceiver<Command>>,
-    playlist: Playlist<'a>,
+    pub(super) playlist: Playlist<'a>,
     units: Units<'a>,
     under_way: Shared,
-    /// What is to go out, by time and then by order.
-    waiting: BinaryHeap<Reverse<Waiting>>,
+    waiting: BTreeMap<Turn, Leaving>,
     order: u64,
     /// What is due up to here has been read (ns).
     read_to: i64,
@@ -94,7 +96,7 @@ impl<'a, W: Watch> Player<'a, W> {
             playlist: Playlist::new(options)?,
             units: Units::new(options),
             under_way: Shared::default(),
-            waiting: BinaryHeap::new(),
+            waiting: BTreeMap::new(),
             order: 0,
             read_to: i64::MIN,
             read_all: false,
@@ -172,16 +174,16 @@ impl<'a, W: Watch> Player<'a, W> {
     /// Forgets what is waiting, and by which time.
     fn forget(&mut self) {
         self.waiting.clear();
-        self.units.iter_mut().for_each(PlayedUnit::begin_anew);
+        self.units.all.iter_mut().for_each(PlayedUnit::begin_anew);
         (self.read_to, self.read_all) = (i64::MIN, false);
         (self.from, self.last_at) = (None, None);
         self.pacer.restart();
     }
 
     /// Waits until a message is due and sends it, unless somebody would rather be elsewhere by then.
-    async fn play(&mut self, next: Waiting) -> Result<(), Error> {
+    async fn play(&mut self, next: (Turn, Leaving)) -> Result<(), Error> {
         // A step does not wait for its time.
-        let mut due = if self.steps > 0 { None } else { self.pacer.due(next.at_ns) };
+        let mut due = if self.steps > 0 { None } else { self.pacer.due(next.0.0) };
         while let Some(at) = due.filter(|at| *at > Instant::now()) {
             let command = tokio::select! {
                 biased;
@@ -195,7 +197,7 @@ impl<'a, W: Watch> Player<'a, W> {
                 return Ok(());
             }
             if self.stage != Stage::Playing || self.paused.is_some() || self.steps > 0 {
-                self.waiting.push(Reverse(next));
+                self.waiting.extend([next]);
                 return Ok(());
             }
             if self.pacer.speed() != speed {
@@ -203,23 +205,23 @@ impl<'a, W: Watch> Player<'a, W> {
                 if let Some(last) = self.last_at {
                     self.pacer.due(last);
                 }
-                due = self.pacer.due(next.at_ns);
+                due = self.pacer.due(next.0.0);
             }
         }
         self.send(next, due).await
     }
 
     /// Sends a message.
-    async fn send(&mut self, next: Waiting, due: Option<Instant>) -> Result<(), Error> {
-        let Waiting { at_ns, place, departure, .. } = next;
+    async fn send(&mut self, next: (Turn, Leaving), due: Option<Instant>) -> Result<(), Error> {
+        let ((at_ns, _), (place, departure)) = next;
         let input = departure.item.input;
-        let declared = self.units.get_mut(place).and_then(|unit| unit.outlet.as_ref());
+        let declared = self.units.all.get_mut(place).and_then(|unit| unit.outlet.as_ref());
         if declared.is_none_or(|outlet| !outlet.is_open(input)) {
             let begun = Instant::now();
             if declared.is_none() {
                 self.declare(place).await?;
             }
-            if let Some(outlet) = self.units.get_mut(place).and_then(|unit| unit.outlet.as_mut()) {
+            if let Some(outlet) = self.units.all.get_mut(place).and_then(|unit| unit.outlet.as_mut()) {
                 outlet.open(input).await?;
             }
             // The log's time does not go on while topics are declared.
@@ -227,7 +229,7 @@ impl<'a, W: Watch> Player<'a, W> {
         } else {
             self.pacer.note(due);
         }
-        let Some(unit) = self.units.get_mut(place) else { return Ok(()) };
+        let Some(unit) = self.units.all.get_mut(place) else { return Ok(()) };
         let Some(outlet) = &mut unit.outlet else { return Ok(()) };
         let bytes = departure.item.bytes.clone();
         if let Load::Gyro(ticks) = departure.item.load {
@@ -250,7 +252,7 @@ impl<'a, W: Watch> Player<'a, W> {
     /// Subscribes to what comes back of a unit; behind the service's answer no first tick can come back unseen.
     async fn declare(&mut self, place: usize) -> Result<(), Error> {
         let max_in_flight = self.units.max_in_flight();
-        let Some(unit) = self.units.get_mut(place) else { return Ok(()) };
+        let Some(unit) = self.units.all.get_mut(place) else { return Ok(()) };
         let wait = self.options.wait;
         let options = OutletOptions { max_in_flight, match_timeout: wait, acknowledge_timeout: wait };
         let outlet = Outlet::declare(self.session, &unit.unit, options).await?;
@@ -267,7 +269,7 @@ impl<'a, W: Watch> Player<'a, W> {
         if self.options.acknowledge == Acknowledge::No {
             receipt::all_taken(self.session, self.options.wait).await?;
         }
-        for unit in self.units.iter() {
+        for unit in &self.units.all {
             let Some(outlet) = &unit.outlet else { continue };
             match outlet.drain().await {
                 // What came back shows that something does: the rest is lost, and counted.

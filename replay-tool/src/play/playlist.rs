@@ -9,7 +9,6 @@ use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::part::{LogFiles, Messages};
 use isotherm_log::schedule::Schedule;
-use isotherm_log::source::LogReport;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, HealthTick, TemperatureBatch};
@@ -70,7 +69,7 @@ pub(super) enum Load {
 #[derive(Debug)]
 pub(super) struct Playlist<'a> {
     options: &'a PlayOptions,
-    messages: Messages,
+    pub(super) messages: Messages,
     /// How far the log was read when its first message came: to the part that is played (bytes).
     first_bytes: Option<u64>,
     schedule: Schedule,
@@ -110,11 +109,6 @@ impl<'a> Playlist<'a> {
         let first = self.first_bytes.unwrap_or_else(|| progress.read());
         let all = progress.total().saturating_sub(first).max(1);
         progress.read().saturating_sub(first) as f64 / all as f64
-    }
-
-    /// What reading it came to.
-    pub(super) fn report(&self) -> LogReport {
-        self.messages.report()
     }
 
     /// The next message to be played; `None` behind the last.
@@ -157,26 +151,20 @@ impl<'a> Playlist<'a> {
         let (load, times) = match input {
             Input::Raw(RawStream::Gyro) => return self.gyro(unit, frame),
             Input::Raw(RawStream::Accel) => codec::decode::<AccelBatch>(&frame).map_or(unreadable, |batch| {
-                let ends = (batch.ticks.first().zip(batch.ticks.last()))
-                    .map(|(first, last)| (first.end_time, last.end_time));
-                (Load::Accel(batch.ticks.len() as u64), ends)
+                (Load::Accel(batch.ticks.len() as u64), ends(&batch.ticks, |tick| tick.end_time))
             }),
             Input::Raw(RawStream::Temperature) => {
                 codec::decode::<TemperatureBatch>(&frame).map_or(unreadable, |batch| {
-                    let ends = (batch.readings.first().zip(batch.readings.last()))
-                        .map(|(first, last)| (first.time, last.time));
                     let channels = self.channels.entry(unit.clone()).or_default();
                     channels.extend(batch.readings.iter().map(|reading| reading.channel));
-                    (Load::Temperature(batch.readings.len() as u64), ends)
+                    let readings = batch.readings;
+                    (Load::Temperature(readings.len() as u64), ends(&readings, |reading| reading.time))
                 })
             }
-            Input::Raw(RawStream::Health) => {
-                codec::decode::<HealthBatch>(&frame).map_or(unreadable, |batch| {
-                    let ends = (batch.ticks.first().zip(batch.ticks.last()))
-                        .map(|(first, last)| (at(first.time_ns), at(last.time_ns)));
-                    (Load::Health(batch.ticks.len() as u64), ends)
-                })
-            }
+            Input::Raw(RawStream::Health) => codec::decode::<HealthBatch>(&frame)
+                .map_or(unreadable, |batch| {
+                    (Load::Health(batch.ticks.len() as u64), ends(&batch.ticks, |tick| at(tick.time_ns)))
+                }),
             Input::Reference => codec::decode::<Reference>(&frame).map_or(unreadable, |reference| {
                 (Load::Reference, Some((at(reference.start_ns), at(reference.end_ns))))
             }),
@@ -215,6 +203,11 @@ impl<'a> Playlist<'a> {
             self.ready.push_back(Cue { unit: unit.clone(), at_ns, frame, begins_series: false });
         }
     }
+}
+
+/// Times of the first and the last.
+fn ends<T>(items: &[T], time: impl Fn(&T) -> Timestamp) -> Option<(Timestamp, Timestamp)> {
+    items.first().zip(items.last()).map(|(first, last)| (time(first), time(last)))
 }
 
 /// Load, bytes, times of the first and the last tick, whether it begins a series.

@@ -1,6 +1,6 @@
 //! The units that a log is played as.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -36,16 +36,15 @@ pub(super) struct PlayedUnit {
 #[derive(Debug)]
 pub(super) struct Units<'a> {
     options: &'a PlayOptions,
-    all: Vec<PlayedUnit>,
+    pub(super) all: Vec<PlayedUnit>,
     /// Places of the units that one of the log is played as.
     of: BTreeMap<UnitId, Range<usize>>,
-    serials: BTreeSet<UnitId>,
 }
 
 impl<'a> Units<'a> {
     /// None yet.
     pub(super) fn new(options: &'a PlayOptions) -> Self {
-        Self { options, all: Vec::new(), of: BTreeMap::new(), serials: BTreeSet::new() }
+        Self { options, all: Vec::new(), of: BTreeMap::new() }
     }
 
     /// The places of the units that a unit of the log is played as.
@@ -66,7 +65,7 @@ impl<'a> Units<'a> {
         };
         let begin = self.all.len();
         for unit in serials {
-            if !self.serials.insert(unit.clone()) {
+            if self.all.iter().any(|other| other.unit == unit) {
                 return Err(Error::Usage(format!(
                     "{of} and another unit of the log would both be played as {unit}: give one of them another \
                      serial with --remap"
@@ -98,22 +97,6 @@ impl<'a> Units<'a> {
             Acknowledge::Bounded(Some(given)) => Some(given),
             Acknowledge::Bounded(None) => Some((ALL_IN_FLIGHT / self.all.len().max(1) as u64).min(IN_FLIGHT)),
         }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.all.len()
-    }
-
-    pub(super) fn get_mut(&mut self, place: usize) -> Option<&mut PlayedUnit> {
-        self.all.get_mut(place)
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = &PlayedUnit> {
-        self.all.iter()
-    }
-
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut PlayedUnit> {
-        self.all.iter_mut()
     }
 }
 

@@ -19,10 +19,12 @@ pub(super) struct Files {
     /// How many of them are kept.
     keep: Option<usize>,
     overwrite: bool,
-    number: u32,
+    /// Of the file that was given last, from 1.
+    pub(super) number: u32,
     /// Those that are there, oldest first.
-    kept: VecDeque<PathBuf>,
-    deleted: u64,
+    pub(super) kept: VecDeque<PathBuf>,
+    /// How many were deleted to keep only the newest.
+    pub(super) deleted: u64,
 }
 
 impl Files {
@@ -89,21 +91,6 @@ impl Files {
         None
     }
 
-    /// Number of the file that was given last, from 1.
-    pub(super) fn number(&self) -> u32 {
-        self.number
-    }
-
-    /// Those that are there, oldest first.
-    pub(super) fn kept(&self) -> impl Iterator<Item = &PathBuf> {
-        self.kept.iter()
-    }
-
-    /// How many were deleted to keep only the newest.
-    pub(super) fn deleted(&self) -> u64 {
-        self.deleted
-    }
-
     fn stem(&self) -> String {
         self.out.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
     }
@@ -150,9 +137,9 @@ mod tests {
             fs::write(&path, "").unwrap();
             assert_eq!(row.prune(), None);
         }
-        let names = |files: &Files| files.kept().cloned().collect::<Vec<_>>();
+        let names = |files: &Files| files.kept.iter().cloned().collect::<Vec<_>>();
         assert_eq!(names(&row), [folder.path().join("run-0003.mcap"), folder.path().join("run-0004.mcap")]);
-        assert_eq!((row.deleted(), row.number()), (2, 4));
+        assert_eq!((row.deleted, row.number), (2, 4));
         fs::write(folder.path().join("run-old.mcap"), "").unwrap();
         assert!(Files::new(&out, true, None, false).is_err());
         let mut again = Files::new(&out, true, None, true).unwrap();

@@ -63,26 +63,20 @@ pub(super) async fn await_service(
     }
 }
 
-/// A service has come or gone.
-#[derive(Debug)]
-pub(super) struct Life {
-    instance: String,
-    is_alive: bool,
-}
+/// A service, and whether it has come or gone.
+pub(super) type Life = (String, bool);
 
-impl Life {
-    /// Enters it; whether it is one that has come.
-    pub(super) fn note(self, alive: &mut BTreeSet<String>, report: &mut RecordReport) -> bool {
-        let Self { instance, is_alive } = self;
-        if is_alive {
-            report.services.insert(instance.clone());
-            return alive.insert(instance);
-        }
-        if alive.remove(&instance) {
-            report.warnings.push(format!("service {instance} is gone"));
-        }
-        false
+/// Enters a service; whether it is one that has come.
+pub(super) fn note(life: Life, alive: &mut BTreeSet<String>, report: &mut RecordReport) -> bool {
+    let (instance, is_alive) = life;
+    if is_alive {
+        report.services.insert(instance.clone());
+        return alive.insert(instance);
     }
+    if alive.remove(&instance) {
+        report.warnings.push(format!("service {instance} is gone"));
+    }
+    false
 }
 
 /// Follows which services are there.
@@ -96,8 +90,7 @@ pub(super) async fn follow_services(
         .history(true)
         .callback(move |sample| {
             if let Some(instance) = key::parse_service_alive(sample.key_expr()) {
-                let is_alive = sample.kind() == SampleKind::Put;
-                let _ = lives.send(Life { instance: instance.to_owned(), is_alive });
+                let _ = lives.send((instance.to_owned(), sample.kind() == SampleKind::Put));
             }
         })
         .await

@@ -137,8 +137,8 @@ impl FileWriter {
         raw.retain(|unit| !journal.knows(unit));
         Done {
             // The last may not have come into being.
-            files: files.kept().filter(|path| path.exists()).cloned().collect(),
-            files_deleted: files.deleted(),
+            files: files.kept.iter().filter(|path| path.exists()).cloned().collect(),
+            files_deleted: files.deleted,
             attachments,
             journal: journal.account().clone(),
             units_without_memory: raw.into_iter().collect(),
@@ -299,7 +299,7 @@ impl Current {
         let mut writer = RecordingWriter::create(&path, writing)?;
         writer.metadata(&Metadata {
             name: METADATA.to_owned(),
-            values: beginning(described, files.number(), now_ns()),
+            values: beginning(described, files.number, now_ns()),
         })?;
         Ok(Self {
             writer,

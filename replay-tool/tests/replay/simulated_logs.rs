@@ -5,7 +5,7 @@ use std::io::Write;
 use isotherm_correction::sample::{GyroTick, LasingMode};
 use isotherm_log::mapping::Mapping;
 use isotherm_log::text::{LogEvent, LogReader};
-use isotherm_replay_tool::simulated::{Columns, LogWriter};
+use isotherm_replay_tool::simulated::LogWriter;
 use isotherm_simulator::{Scenario, Simulation, presets};
 
 /// Events of the simulation itself, in the order of the log.
@@ -24,11 +24,11 @@ fn simulated(scenario: &Scenario) -> Vec<LogEvent> {
 
 /// Events of the log that is written of it.
 fn read_back(scenario: &Scenario) -> Vec<LogEvent> {
-    let columns = Columns::of(scenario).unwrap();
+    let mut writer = LogWriter::of(scenario).unwrap();
     let mapping =
-        Mapping::parse(&columns.mapping(), "mapping.toml").unwrap_or_else(|problems| panic!("{problems:?}"));
+        Mapping::parse(&writer.mapping(), "mapping.toml").unwrap_or_else(|problems| panic!("{problems:?}"));
     let mut file = tempfile::NamedTempFile::new().unwrap();
-    let mut writer = LogWriter::new(columns, &mut file).unwrap();
+    writer.write_header(&mut file).unwrap();
     for step in Simulation::new(scenario).unwrap() {
         writer.write(&step, &mut file).unwrap();
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use isotherm_log::ros2::{Header, Time, time};
 use isotherm_protocol::digest::Digits;
-use isotherm_protocol::status::{Output, State};
+use isotherm_protocol::status::{Output, State, Status};
 use tokio::time::MissedTickBehavior;
 use zenoh::Session;
 
@@ -110,15 +110,14 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
         let words = format!("stamps jitter by {:.0} us, stated are {:.0} us", jitter * 1e6, stated * 1e6);
         found.push((Level::Warn, words));
     }
-    let running = status.map_or_else(
-        || "running".to_owned(),
-        |status| isotherm_correction::operation::State::from(status.state).name().to_owned(),
-    );
-    let worst = found.iter().map(|(level, _)| *level).max();
-    match worst {
-        None => (Level::Ok, running),
+    match found.iter().map(|(level, _)| *level).max() {
+        None => (Level::Ok, status.map_or("running", state).to_owned()),
         Some(level) => (level, found.into_iter().map(|(_, words)| words).collect::<Vec<_>>().join("; ")),
     }
+}
+
+fn state(status: &Status) -> &'static str {
+    isotherm_correction::operation::State::from(status.state).name()
 }
 
 fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
@@ -126,7 +125,7 @@ fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
     let mut say = |key: &str, value: String| values.push(KeyValue { key: key.to_owned(), value });
     let Look { totals, status, jitter_s, .. } = look;
     if let Some((status, _)) = status {
-        say("state", isotherm_correction::operation::State::from(status.state).name().to_owned());
+        say("state", state(status).to_owned());
         if let Some(calibration) = &status.calibration {
             say("calibration revision", calibration.revision.counter.to_string());
             say("calibration digest", Digits(&calibration.revision.digest).to_string());

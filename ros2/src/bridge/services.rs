@@ -23,33 +23,12 @@ use crate::qos::Qos;
 /// How long a service of the project may take to answer: a rollback waits for a disk.
 const ANSWER: Duration = Duration::from_secs(5);
 
-/// What a service does.
-#[derive(Debug, Clone, Copy)]
-enum Does {
-    Standby,
-    Run,
-    Rollback,
-}
-
-impl Does {
-    const ALL: [Self; 3] = [Self::Standby, Self::Run, Self::Rollback];
-
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Standby => "standby",
-            Self::Run => "run",
-            Self::Rollback => "rollback",
-        }
-    }
-
-    fn order(self) -> Order {
-        match self {
-            Self::Standby => Order::Standby,
-            Self::Run => Order::Run { reversal: None },
-            Self::Rollback => Order::Rollback { revision: None, dry_run: false },
-        }
-    }
-}
+/// The services of a unit by their names, and what each orders.
+const SERVICES: [(&str, Order); 3] = [
+    ("standby", Order::Standby),
+    ("run", Order::Run { reversal: None }),
+    ("rollback", Order::Rollback { revision: None, dry_run: false }),
+];
 
 /// Declares the services of a unit: `/isotherm/<unit>/standby` and so on.
 pub(super) async fn declare(
@@ -59,23 +38,23 @@ pub(super) async fn declare(
     name: &str,
 ) -> Result<Vec<Queryable<()>>, BusError> {
     let mut services = Vec::new();
-    for does in Does::ALL {
-        let topic = declarer.node.private(&format!("{name}/{}", does.name()));
+    for (service, order) in SERVICES {
+        let topic = declarer.node.private(&format!("{name}/{service}"));
         declarer.endpoint(Kind::Service, &topic, TRIGGER, Qos::SERVICES).await?;
         let key = declarer.key(&topic, TRIGGER);
         let (bus, unit, runtime) = (bus.clone(), mapping.unit.clone(), Handle::current());
         let answer = move |query: Query| {
             // The service may take its time, the receive thread may not.
-            runtime.spawn(answer(query, does, bus.clone(), unit.clone()));
+            runtime.spawn(answer(query, service, order.clone(), bus.clone(), unit.clone()));
         };
         // Clients ask all that are complete.
-        let service = declarer.session.declare_queryable(&key).complete(true).callback(answer);
-        services.push(service.await.map_err(|source| BusError::Declare { key, source })?);
+        let queryable = declarer.session.declare_queryable(&key).complete(true).callback(answer);
+        services.push(queryable.await.map_err(|source| BusError::Declare { key, source })?);
     }
     Ok(services)
 }
 
-async fn answer(query: Query, does: Does, bus: Session, unit: UnitId) {
+async fn answer(query: Query, service: &str, order: Order, bus: Session, unit: UnitId) {
     let request = Attachment::parse(query.attachment().map(ZBytes::to_bytes).as_deref());
     let payload = query.payload().map(ZBytes::to_bytes).unwrap_or_default();
     let asked = request.map_err(|error| error.to_string()).and_then(|request| {
@@ -86,30 +65,24 @@ async fn answer(query: Query, does: Does, bus: Session, unit: UnitId) {
     let request = match asked {
         Ok(request) => request,
         Err(reason) => {
-            tracing::warn!(unit = unit.as_str(), service = does.name(), "a request {reason}");
+            tracing::warn!(unit = unit.as_str(), service, "a request {reason}");
             let _ = query.reply_err(format!("the request {reason}")).await;
             return;
         }
     };
-    let response = command(&bus, &unit, does, &request).await;
+    let response = command(&bus, &unit, order, &request).await;
     let Ok(payload) = to_cdr(&response) else { return };
     // By number and client a client knows what is answered.
     let attachment = Attachment { time_ns: publishing::now_ns(), ..request };
     let key = query.key_expr().clone();
     if let Err(error) = query.reply(key, payload).attachment(attachment.to_bytes()).await {
-        tracing::warn!(
-            unit = unit.as_str(),
-            service = does.name(),
-            "no answer: {}",
-            isotherm_bus::words(&error)
-        );
+        tracing::warn!(unit = unit.as_str(), service, "no answer: {}", isotherm_bus::words(&error));
     }
 }
 
 /// Gives the command; what came of it.
-async fn command(bus: &Session, unit: &UnitId, does: Does, request: &Attachment) -> TriggerResponse {
-    let by = format!("ros2 {}", Digits(&request.gid));
-    let order = CommandOrder { by, order: does.order() };
+async fn command(bus: &Session, unit: &UnitId, order: Order, request: &Attachment) -> TriggerResponse {
+    let order = CommandOrder { by: format!("ros2 {}", Digits(&request.gid)), order };
     let order = serde_json::to_vec(&order).unwrap_or_default();
     let failed = |message: String| TriggerResponse { success: false, message };
     let key = key::command(unit);

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{m_per_s2, rad_per_s};
 use crate::name::{MUST_BE, PATTERN};
-use crate::qos::{History, Qos, Reliability};
+use crate::qos::Qos;
 
 /// Which topics are which unit.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -83,7 +83,7 @@ pub(super) struct UnitKeys {
     pub(super) temperature: Vec<TemperatureKeys>,
     /// Quality of service of the corrected messages.
     #[serde(default)]
-    pub(super) output: OutputKeys,
+    pub(super) output: Qos,
 }
 
 /// What stamps mean.
@@ -174,31 +174,4 @@ pub(super) struct TemperatureKeys {
 
 fn deg_c() -> TemperatureUnit {
     TemperatureUnit::DegC
-}
-
-/// Quality of service of the corrected messages.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub(super) struct OutputKeys {
-    /// Whether what is lost would be sent again.
-    reliability: Reliability,
-    /// How much is kept for a slow subscriber.
-    history: History,
-    /// Messages that are kept.
-    #[schemars(range(min = 1, max = 1_000_000))]
-    depth: u32,
-}
-
-impl Default for OutputKeys {
-    fn default() -> Self {
-        Self { reliability: Reliability::default(), history: History::default(), depth: 10 }
-    }
-}
-
-impl From<OutputKeys> for Qos {
-    fn from(keys: OutputKeys) -> Self {
-        let OutputKeys { reliability, history, depth } = keys;
-        Self { reliability, history, depth }
-    }
 }

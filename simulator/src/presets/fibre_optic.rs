@@ -2,14 +2,11 @@
 
 use crate::chamber::Profile;
 use crate::coil::Slab;
-use crate::effects::Effects;
 use crate::fibre_optic::{FibreOpticGyro, OpticsBias};
-use crate::instrument::{Gyros, Instrument};
-use crate::motion::Motion;
+use crate::instrument::Gyros;
 use crate::orientation::Orientation;
-use crate::presets::shared::{DEG_PER_H, quartz, thermometers, tilted, walk};
+use crate::presets::shared::{DEG_PER_H, at_rest, instrument, quartz, walk};
 use crate::scenario::Scenario;
-use crate::thermal::Node;
 use crate::winding::{Fibre, Winding};
 
 fn gyro(
@@ -97,26 +94,11 @@ pub fn fibre_optic_chamber(seed: u64, chamber: Profile) -> Scenario {
         gyro(-0.55, 0.0, -0.08, 0.07, 1.9),
         gyro(0.40, 12.0, 0.05, 0.13, -0.8),
     ];
-    Scenario {
-        unit: "FOG-0001".into(),
-        seed,
-        start_ns: 0,
-        duration_s: chamber.duration_s(),
-        tick_ns: 10_000_000,
-        tick_jitter_ns: 0,
-        chamber,
-        motion: Motion { heading_deg: 30.0, ..Motion::rest(55.75) },
-        instrument: Instrument {
-            thermal_step_s: 0.25,
-            cold_start: false,
-            housing: Node { time_constant_s: 60.0, heating_deg_c: 4.0 },
-            board: Node { time_constant_s: 120.0, heating_deg_c: 7.0 },
-            gyros: Gyros::FibreOptic(gyros),
-            gyro_orientation: tilted(Orientation::orthogonal(), 1.0),
-            accelerometers: Some(quartz()),
-            thermometers: thermometers(3, 3),
-            effects: Effects::default(),
-        },
-        failures: Vec::new(),
-    }
+    let unit = instrument(
+        [(60.0, 4.0), (120.0, 7.0)],
+        Gyros::FibreOptic(gyros),
+        Orientation::orthogonal(),
+        quartz(),
+    );
+    at_rest("FOG-0001", seed, 10_000_000, chamber, unit)
 }

@@ -1,8 +1,13 @@
 //! What the ready-made units have in common.
 
 use crate::accelerometer::{Accelerometer, AccelerometerOutput, Accelerometers};
+use crate::chamber::Profile;
+use crate::effects::Effects;
+use crate::instrument::{Gyros, Instrument};
+use crate::motion::Motion;
 use crate::noise::GyroNoise;
 use crate::orientation::Orientation;
+use crate::scenario::Scenario;
 use crate::temperature::{Channel, Place, Thermometers};
 use crate::thermal::Node;
 
@@ -13,13 +18,57 @@ pub(super) const DEG_PER_SQRT_H: f64 = core::f64::consts::PI / 180.0 / 60.0;
 /// m/s² in one thousandth of a standard gravity.
 const MILLI_G: f64 = 9.806_65e-3;
 
+/// A unit, with time constant (s) and heating (°C) of its housing and its board, and axes along `orientation` but for misalignments.
+pub(super) fn instrument(
+    parts: [(f64, f64); 2],
+    gyros: Gyros,
+    orientation: Orientation,
+    accelerometers: Accelerometers,
+) -> Instrument {
+    let [housing, board] =
+        parts.map(|(time_constant_s, heating_deg_c)| Node { time_constant_s, heating_deg_c });
+    Instrument {
+        thermal_step_s: 0.25,
+        cold_start: false,
+        housing,
+        board,
+        thermometers: thermometers(gyros.count()),
+        gyros,
+        gyro_orientation: tilted(orientation, 1.0),
+        accelerometers: Some(accelerometers),
+        effects: Effects::default(),
+    }
+}
+
+/// The unit at rest through a chamber programme, from its start to its end.
+pub(super) fn at_rest(
+    unit: &str,
+    seed: u64,
+    tick_ns: i64,
+    chamber: Profile,
+    instrument: Instrument,
+) -> Scenario {
+    Scenario {
+        unit: unit.into(),
+        seed,
+        start_ns: 0,
+        duration_s: chamber.duration_s(),
+        tick_ns,
+        tick_jitter_ns: 0,
+        chamber,
+        motion: Motion { heading_deg: 30.0, ..Motion::rest(55.75) },
+        instrument,
+        failures: Vec::new(),
+    }
+}
+
 /// White noise only.
 pub(super) fn walk(deg_per_sqrt_h: f64) -> GyroNoise {
     GyroNoise { angle_random_walk_rad_per_sqrt_s: deg_per_sqrt_h * DEG_PER_SQRT_H, ..GyroNoise::default() }
 }
 
 /// Misalignments of some 10″…60″ and 0.1″/K at most, so that a row's length changes by less than 1e-9.
-pub(super) fn tilted(orientation: Orientation, sense: f64) -> Orientation {
+fn tilted(orientation: Orientation, sense: f64) -> Orientation {
     let by_rad = [
         [1.2e-4, -2.1e-4, 0.8e-4],
         [-0.9e-4, 1.4e-4, 2.4e-4],
@@ -79,7 +128,7 @@ pub(super) fn micromechanical(orientation: Orientation) -> Accelerometers {
 }
 
 /// Analogue channels of 10 mV/K through a 16-bit converter: `gyro0`…, `accel0`…, `board`, `housing`.
-pub(super) fn thermometers(gyros: usize, accelerometers: usize) -> Thermometers {
+fn thermometers(sensors: usize) -> Thermometers {
     let channel = |name: String, place| Channel {
         name,
         place,
@@ -88,12 +137,8 @@ pub(super) fn thermometers(gyros: usize, accelerometers: usize) -> Thermometers 
         noise_deg_c: 0.004,
         resolution_raw: 5.0 / 65_536.0,
     };
-    let mut channels: Vec<Channel> = Vec::new();
-    channels.extend((0..gyros).map(|index| channel(format!("gyro{index}"), Place::Gyro(index))));
-    channels.extend(
-        (0..accelerometers).map(|index| channel(format!("accel{index}"), Place::Accelerometer(index))),
-    );
-    channels.push(channel("board".into(), Place::Board));
-    channels.push(channel("housing".into(), Place::Housing));
-    Thermometers { period_s: 1.0, channels }
+    let gyros = (0..sensors).map(|index| channel(format!("gyro{index}"), Place::Gyro(index)));
+    let accels = (0..sensors).map(|index| channel(format!("accel{index}"), Place::Accelerometer(index)));
+    let others = [channel("board".into(), Place::Board), channel("housing".into(), Place::Housing)];
+    Thermometers { period_s: 1.0, channels: gyros.chain(accels).chain(others).collect() }
 }

@@ -1,11 +1,10 @@
 //! Zeeman laser unit: three dithered gyros at 200 Hz and three quartz accelerometers.
 
 use crate::chamber::Profile;
-use crate::effects::Effects;
 use crate::instrument::{Gyros, Instrument};
-use crate::motion::{Motion, Path};
+use crate::motion::Path;
 use crate::orientation::Orientation;
-use crate::presets::shared::{DEG_PER_H, quartz, thermometers, tilted, walk};
+use crate::presets::shared::{DEG_PER_H, at_rest, instrument, quartz, walk};
 use crate::reversal::Reversal;
 use crate::scenario::Scenario;
 use crate::thermal::Node;
@@ -45,47 +44,23 @@ fn unit(period_s: f64) -> Instrument {
         gyro(1.97, [-0.28, 5.0e-3, 9.0e-5], [-1.7, 1.4e-2, 2.2e-4], 58_900.0),
         gyro(1.92, [0.15, -1.1e-2, 7.0e-5], [3.1, -2.6e-2, 1.2e-4], 63_700.0),
     ];
-    Instrument {
-        thermal_step_s: 0.25,
-        cold_start: false,
-        housing: Node { time_constant_s: 300.0, heating_deg_c: 6.0 },
-        board: Node { time_constant_s: 120.0, heating_deg_c: 8.0 },
-        gyros: Gyros::Zeeman(Zeeman { quantised: true, reversal, gyros }),
-        gyro_orientation: tilted(Orientation::orthogonal(), 1.0),
-        accelerometers: Some(quartz()),
-        thermometers: thermometers(3, 3),
-        effects: Effects::default(),
-    }
+    let gyros = Gyros::Zeeman(Zeeman { quantised: true, reversal, gyros });
+    instrument([(300.0, 6.0), (120.0, 8.0)], gyros, Orientation::orthogonal(), quartz())
 }
 
 /// Zeeman unit at rest in a chamber that goes from +20 to +50 °C, with mode reversal every two minutes (1 h).
 #[must_use]
 pub fn zeeman_rest(seed: u64) -> Scenario {
-    Scenario {
-        unit: "ZLG-0001".into(),
-        seed,
-        start_ns: 0,
-        duration_s: 3600.0,
-        tick_ns: 5_000_000,
-        tick_jitter_ns: 0,
-        chamber: Profile::constant(20.0).hold(10.0).ramp(50.0, 1.0).hold(20.0),
-        motion: Motion { heading_deg: 30.0, ..Motion::rest(55.75) },
-        instrument: unit(120.0),
-        failures: Vec::new(),
-    }
+    let chamber = Profile::constant(20.0).hold(10.0).ramp(50.0, 1.0).hold(20.0);
+    at_rest("ZLG-0001", seed, 5_000_000, chamber, unit(120.0))
 }
 
 /// Zeeman unit on a stand that swings by 1° at 1 Hz about an axis across the case, in a chamber that goes from
 /// +20 to +50 °C at 2 °C/min, with mode reversal every 12 s (20 min).
 #[must_use]
 pub fn zeeman_sine(seed: u64) -> Scenario {
-    let rest = zeeman_rest(seed);
     let swing = Path::Sine { axis: [1.0, 1.0, 1.0], amplitude_deg: 1.0, frequency_hz: 1.0, phase_deg: 0.0 };
-    Scenario {
-        duration_s: 1200.0,
-        chamber: Profile::constant(20.0).hold(2.0).ramp(50.0, 2.0).hold(3.0),
-        motion: rest.motion.clone().along(swing),
-        instrument: unit(12.0),
-        ..rest
-    }
+    let chamber = Profile::constant(20.0).hold(2.0).ramp(50.0, 2.0).hold(3.0);
+    let rest = at_rest("ZLG-0001", seed, 5_000_000, chamber, unit(12.0));
+    Scenario { motion: rest.motion.clone().along(swing), ..rest }
 }

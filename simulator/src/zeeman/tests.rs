@@ -14,7 +14,7 @@ fn state(unit: &Zeeman) -> ZeemanState {
 }
 
 fn phase(mode: LasingMode) -> Phase {
-    Phase { mode, commanded: false, lost: false, servo_starts: false, meander: None }
+    Phase { mode, ..Phase::UNSWITCHED }
 }
 
 #[test]

@@ -5,9 +5,7 @@ use std::fmt::Write;
 use indicatif::DecimalBytes;
 use isotherm_correction::units::{Angle, Span, Timestamp};
 use isotherm_log::date::date;
-use isotherm_log::info::{
-    FileInfo, JournalInfo, LogInfo, SigmaInfo, Spread, StateInfo, StatusInfo, TopicInfo, UnitInfo,
-};
+use isotherm_log::info::{FileInfo, JournalInfo, LogInfo, SigmaInfo, Spread, StateInfo, TopicInfo, UnitInfo};
 use isotherm_log::source::LogReport;
 
 use super::readings::readings;
@@ -76,11 +74,10 @@ fn files(text: &mut String, info: &LogInfo) {
             let _ = writeln!(text, "  {name} = {value}");
         }
     }
-    for attachment in info.attachments.iter().take(LISTED) {
+    list(text, &info.attachments, |attachment| {
         let (name, kind) = (&attachment.name, &attachment.media_type);
-        let _ = writeln!(text, "attachment {name:?} ({kind}, {})", DecimalBytes(attachment.bytes));
-    }
-    more(text, info.attachments.len());
+        format!("attachment {name:?} ({kind}, {})", DecimalBytes(attachment.bytes))
+    });
 }
 
 fn topics(topics: &[TopicInfo]) -> String {
@@ -217,11 +214,10 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
             corrected.missed_ticks,
             corrected.longest_gap_ticks
         );
-        let flags: Vec<_> = corrected.flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
-        let sensors: Vec<_> =
-            corrected.sensor_flags.iter().map(|(name, count)| format!("{name} {count}")).collect();
-        if !flags.is_empty() || !sensors.is_empty() {
-            let _ = writeln!(text, "flags: {}", [flags, sensors].concat().join(", "));
+        let flags = corrected.flags.iter().chain(&corrected.sensor_flags);
+        let flags: Vec<_> = flags.map(|(name, count)| format!("{name} {count}")).collect();
+        if !flags.is_empty() {
+            let _ = writeln!(text, "flags: {}", flags.join(", "));
         }
         let angle = corrected.angle_sigma_rad.map(|sigma| {
             let rms = sigma.rms.map(|rms| Angle::from_rad(rms).as_arcsec());
@@ -246,23 +242,21 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
                 range.min_deg_c, range.max_deg_c, range.max_rate_deg_c_per_s
             );
         }
-        for first in corrected.revisions.iter().take(LISTED) {
-            let _ = writeln!(
-                text,
-                "calibration {} ({}): first tick {}, {}",
-                first.revision.counter,
-                hexadecimal(first.revision.digest),
-                first.first_sequence,
-                after(first.first_end_ns, begin_ns)
-            );
-        }
-        more(text, corrected.revisions.len());
+        list(text, &corrected.revisions, |first| {
+            let (counter, digest) = (first.revision.counter, hexadecimal(first.revision.digest));
+            let when = after(first.first_end_ns, begin_ns);
+            format!("calibration {counter} ({digest}): first tick {}, {when}", first.first_sequence)
+        });
     }
     if let Some(journal) = &unit.journal {
         journal_details(text, journal);
     }
     if let Some(status) = &unit.status {
-        states(text, status, begin_ns);
+        list(text, &status.states, |StateInfo { last_tick_ns, state, .. }| {
+            let state = isotherm_correction::operation::State::from(*state);
+            let first = || "before the first tick".to_owned();
+            format!("state {state}: {}", last_tick_ns.map_or_else(first, |ns| after(ns, begin_ns)))
+        });
     }
 }
 
@@ -273,31 +267,21 @@ fn journal_details(text: &mut String, journal: &JournalInfo) {
         let (missing, broken) = (journal.missing_entries, journal.broken_parts);
         let _ = writeln!(text, "journal: {missing} entries are missing, {broken} parts are incomplete");
     }
-    for swap in journal.swaps.iter().take(LISTED) {
+    list(text, &journal.swaps, |swap| {
         let (counter, digest) = (swap.revision.counter, hexadecimal(swap.revision.digest));
-        let _ = writeln!(text, "given: calibration {counter} ({digest}), {}", swap.source);
-    }
-    more(text, journal.swaps.len());
-    for command in journal.commands.iter().take(LISTED) {
+        format!("given: calibration {counter} ({digest}), {}", swap.source)
+    });
+    list(text, &journal.commands, |command| {
         let verdict = if command.accepted { "" } else { "refused: " };
-        let _ = writeln!(text, "command {}: {verdict}{}", command.command, command.words);
-    }
-    more(text, journal.commands.len());
+        format!("command {}: {verdict}{}", command.command, command.words)
+    });
 }
 
-fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
-    for StateInfo { last_tick_ns, state, .. } in status.states.iter().take(LISTED) {
-        let state = isotherm_correction::operation::State::from(*state);
-        let when = last_tick_ns.map_or_else(|| "before the first tick".to_owned(), |ns| after(ns, begin_ns));
-        let _ = writeln!(text, "state {state}: {when}");
-    }
-    more(text, status.states.len());
-}
-
-/// Says that a list is longer than what was printed.
-fn more(text: &mut String, length: usize) {
-    if length > LISTED {
-        let _ = writeln!(text, "  and {} more: --json lists them", length - LISTED);
+/// A line for each of the first, and how many more there are.
+fn list<T>(text: &mut String, items: &[T], line: impl Fn(&T) -> String) {
+    text.extend(items.iter().take(LISTED).map(|item| line(item) + "\n"));
+    if items.len() > LISTED {
+        let _ = writeln!(text, "  and {} more: --json lists them", items.len() - LISTED);
     }
 }
 

@@ -146,9 +146,10 @@ fn float(number: u64) -> f64 {
 pub(super) fn advise(error: Error, options: &RecordOptions) -> Error {
     let waits = matches!(options.service, ServiceWait::Within(_));
     match error {
-        Error::Bus(BusError::NoService { .. } | BusError::Unreachable { .. }) if waits => Error::NoService {
-            words: format!("{error}; wait for it with --wait, or record without one with --no-service"),
-        },
+        Error::Bus(BusError::NoService { .. } | BusError::Unreachable { .. }) if waits => {
+            let words = format!("{error}; wait for it with --wait, or record without one with --no-service");
+            Error::Service(words)
+        }
         error => error,
     }
 }

@@ -1,11 +1,7 @@
 //! Where playing is, and what it came to.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use isotherm_correction::sample::ChannelName;
-use isotherm_log::source::LogReport;
-use isotherm_protocol::key::UnitId;
 use tokio::time::Instant;
 
 use super::{Player, Stage};
@@ -62,20 +58,10 @@ impl<W: Watch> Player<'_, W> {
         }
     }
 
-    /// What reading the log came to.
-    pub(in crate::play) fn log_report(&self) -> LogReport {
-        self.playlist.report()
-    }
-
-    /// Temperature channels that the units have in the log.
-    pub(in crate::play) fn channels(&self) -> &BTreeMap<UnitId, BTreeSet<ChannelName>> {
-        &self.playlist.channels
-    }
-
     /// What playing came to.
     pub(in crate::play) fn report(&self, stopped: bool) -> PlayReport {
         let (elapsed, paused) = self.times();
-        let mut units: Vec<_> = self.units.iter().map(PlayedUnit::report).collect();
+        let mut units: Vec<_> = self.units.all.iter().map(PlayedUnit::report).collect();
         if self.stage == Stage::Waited {
             units.iter_mut().for_each(UnitReport::give_up);
         }
@@ -86,7 +72,7 @@ impl<W: Watch> Player<'_, W> {
             elapsed_s: elapsed.as_secs_f64(),
             paused_s: paused.as_secs_f64(),
             actual_speed: self.actual_speed(elapsed, paused),
-            lateness: self.pacer.lateness(),
+            lateness: self.pacer.late.lateness(),
             stopped,
             ..PlayReport::of(units)
         }
