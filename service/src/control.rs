@@ -41,7 +41,7 @@ pub mod revision;
 mod start;
 pub mod store;
 mod unlikely;
-pub mod watch;
+pub(crate) mod watch;
 
 pub(crate) use carry::Carried;
 pub(crate) use control_status::{ControlStatus, Posted, STATE_FOLDER, UNWRITTEN};

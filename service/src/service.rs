@@ -17,7 +17,7 @@ use crate::ServiceError;
 use crate::config::Settings;
 use crate::control::revision::Calibrations;
 use crate::control::store::{Opened, Store};
-use crate::control::watch::{WatchSettings, Watcher};
+use crate::control::watch::Watcher;
 use crate::control::{Found, Inbox, SwapManager, Worker};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
@@ -134,8 +134,8 @@ pub(crate) async fn start_on(
         .map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
-            let (watch, inbox) = (watch_settings(&settings), inbox.clone());
-            let watcher = Watcher::start(folder, watch, found, move |event| inbox.folder(event));
+            let inbox = inbox.clone();
+            let watcher = Watcher::start(folder, settings.folder, found, move |event| inbox.folder(event));
             Some(watcher.map_err(ServiceError::Thread)?)
         }
         None => None,
@@ -224,10 +224,6 @@ fn read_folder(work: &mut Worker, settings: &Settings) -> Result<Found, ServiceE
             Ok(Found::new())
         }
     }
-}
-
-fn watch_settings(settings: &Settings) -> WatchSettings {
-    WatchSettings { settle: settings.folder.settle, poll: settings.folder.poll, ..WatchSettings::default() }
 }
 
 impl RunningService {

@@ -167,7 +167,7 @@ impl Worker {
     /// Takes what the watcher tells.
     pub(super) fn folder_event(&mut self, event: FolderEvent) {
         match event {
-            FolderEvent::Changed { file, bytes, .. } => {
+            FolderEvent::Changed { file, bytes } => {
                 let read = Read::of(&file, &bytes);
                 let before = self.folder.enter(&file, &read);
                 self.take_file(&file, &read, false);

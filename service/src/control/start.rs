@@ -88,7 +88,7 @@ impl Worker {
         for (file, read) in read_all(&files_in(&folder, "toml")?) {
             match read {
                 Ok(read) => {
-                    found.insert(file.clone(), Known::Content(read.digest.0));
+                    found.insert(file.clone(), Known::Content(read.digest));
                     self.folder.enter(&file, &read);
                     contents.push((file, read));
                 }
