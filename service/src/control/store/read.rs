@@ -29,8 +29,7 @@ impl Store {
     }
 
     /// The file that a document is kept in; `None` where there is no state folder.
-    #[must_use]
-    pub fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
+    pub(crate) fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
         self.documents.file(digest)
     }
 
