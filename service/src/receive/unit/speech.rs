@@ -110,20 +110,17 @@ impl UnitActor {
     }
 
     /// Highest revision counter that the unit was given.
-    #[must_use]
     pub(crate) fn highest_revision(&self) -> u64 {
         self.stream.next_counter().saturating_sub(1)
     }
 
     /// Whether it is being found out if another instance speaks.
-    #[must_use]
     pub(crate) fn doubts(&self) -> bool {
         self.speech.following.as_ref().is_some_and(|following| following.doubt)
     }
 
     /// Whether this instance publishes the unit's ticks, and swaps and commands are its own.
-    #[must_use]
-    pub fn speaks(&self) -> bool {
+    pub(crate) fn speaks(&self) -> bool {
         self.speech.following.as_ref().is_none_or(|following| following.isolated)
     }
 
@@ -200,7 +197,10 @@ impl UnitActor {
                 return wants;
             }
             wants.alarm = self.two_speak(now);
-            self.tell_memory();
+            // Another instance's journal went before.
+            if std::mem::take(&mut self.speech.memory_due) {
+                self.journal_memory();
+            }
             return wants;
         }
         self.catch_up(now);
@@ -303,15 +303,7 @@ impl UnitActor {
         self.plan = plan;
     }
 
-    /// Says in the journal what the stream knows, where another instance's journal went before.
-    fn tell_memory(&mut self) {
-        if std::mem::take(&mut self.speech.memory_due) {
-            self.journal_memory();
-        }
-    }
-
     /// What the instance does for the unit.
-    #[must_use]
     pub(crate) fn role(&self) -> UnitRole {
         let Speech { following, compared, differing, takeovers, last_difference, .. } = &self.speech;
         let role = match following {
