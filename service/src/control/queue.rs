@@ -24,6 +24,7 @@ use zenoh::query::Query;
 use zenoh::sample::Sample;
 
 use super::carry::Carried;
+use super::request::one_unit;
 use crate::control::watch::FolderEvent;
 
 /// What the swap manager is asked for, or told.
@@ -119,14 +120,14 @@ impl Inbox {
 
     /// Hands a query over.
     pub(crate) fn ask(&self, asked: Asked, query: Query, origin: Origin) {
-        let unit = unit_of(asked, query.key_expr().as_str());
+        let unit = one_unit(query.key_expr().as_str(), asked).ok();
         let bytes = query.payload().map_or(0, zenoh::bytes::ZBytes::len);
         self.hand_over(unit, Message::Query(asked, query, origin), bytes);
     }
 
     /// Hands a put on `imu/*/calibration` over.
     pub(crate) fn put(&self, sample: Sample) {
-        let unit = unit_of(Asked::Calibration, sample.key_expr().as_str());
+        let unit = one_unit(sample.key_expr().as_str(), Asked::Calibration).ok();
         let bytes = sample.payload().len();
         self.hand_over(unit, Message::Put(sample), bytes);
     }
@@ -179,11 +180,6 @@ impl Inbox {
             let _ = query.reply_err(words).wait();
         }
     }
-}
-
-/// The unit that a key names.
-fn unit_of(asked: Asked, key: &str) -> Option<UnitId> {
-    asked.serial(key::asker(key).0).and_then(|serial| UnitId::new(serial).ok())
 }
 
 /// Most requests of a lane.

@@ -20,6 +20,7 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::{AbortHandle, JoinSet};
 
+use super::health::{Kind, Reason};
 use super::page::{pack, page};
 use super::source::{Look, Source, Verdict};
 use super::{Exporter, NoLook};
@@ -184,13 +185,7 @@ async fn metrics(request: &Request<Incoming>, exporter: &Arc<Exporter>) -> Answe
         Ok(made) => made,
     };
     match made {
-        Ok(page) => {
-            let mut answer = text(StatusCode::OK, if open { OPEN_METRICS } else { PROMETHEUS }, page);
-            if packed {
-                answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-            }
-            answer
-        }
+        Ok(page) => good(packed, if open { OPEN_METRICS } else { PROMETHEUS }, page),
         Err(error) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
     }
 }
@@ -216,8 +211,20 @@ async fn healthz(exporter: &Arc<Exporter>) -> Answer {
     let uptime = exporter.started.elapsed();
     let verdict = match exporter.look(move |source, watch| source.judge(watch, stopping)).await {
         Ok(verdict) => verdict,
-        Err(NoLook::TooSlow) => Verdict::too_busy(uptime, exporter.limits.look),
-        Err(NoLook::Starting) => Verdict::starting(uptime, exporter.not_ready().unwrap_or_default()),
+        Err(why) => {
+            let limit_s = exporter.limits.look.as_secs_f64();
+            let (kind, words) = match why {
+                NoLook::Starting => (Kind::Starting, exporter.not_ready().unwrap_or_default()),
+                NoLook::TooSlow => (
+                    Kind::Busy,
+                    format!(
+                        "units or state folder could not be read within {limit_s} s: a slow subscriber or disk \
+                         blocks them"
+                    ),
+                ),
+            };
+            Verdict::new(uptime, vec![Reason { kind, unit: None, words }])
+        }
     };
     let status = if verdict.is_healthy() { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };
     match serde_json::to_string(&verdict) {
@@ -243,13 +250,18 @@ fn takes(headers: &HeaderMap, header: &HeaderName, what: &str) -> bool {
 /// Text in a tenth of its bytes, for those who take it so.
 pub(crate) fn packed(headers: &HeaderMap, kind: &'static str, body: &str) -> Answer {
     match takes(headers, &ACCEPT_ENCODING, "gzip").then(|| pack(body)) {
-        Some(Ok(body)) => {
-            let mut answer = text(StatusCode::OK, kind, body);
-            answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-            answer
-        }
-        _ => text(StatusCode::OK, kind, body.to_owned()),
+        Some(Ok(body)) => good(true, kind, body),
+        _ => good(false, kind, body.to_owned()),
     }
+}
+
+/// What was asked for, packed or not.
+fn good(packed: bool, kind: &'static str, body: impl Into<Bytes>) -> Answer {
+    let mut answer = text(StatusCode::OK, kind, body);
+    if packed {
+        answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    answer
 }
 
 /// Text as it is.

@@ -103,7 +103,8 @@ impl Look {
 }
 
 impl Verdict {
-    fn new(uptime: Duration, reasons: Vec<Reason>) -> Self {
+    /// That of a service of which no unit was looked at.
+    pub(super) fn new(uptime: Duration, reasons: Vec<Reason>) -> Self {
         Self {
             status: if reasons.is_empty() { "ok" } else { "unhealthy" },
             reasons,
@@ -112,20 +113,6 @@ impl Verdict {
             uptime_s: uptime.as_secs_f64(),
             units: Vec::new(),
         }
-    }
-
-    /// That of a service which is not at work yet.
-    pub(super) fn starting(uptime: Duration, words: String) -> Self {
-        Self::new(uptime, vec![Reason { kind: Kind::Starting, unit: None, words }])
-    }
-
-    /// Where the units could not be looked at in time.
-    pub(super) fn too_busy(uptime: Duration, limit: Duration) -> Self {
-        let limit_s = limit.as_secs_f64();
-        let words = format!(
-            "units or state folder could not be read within {limit_s} s: a slow subscriber or disk blocks them"
-        );
-        Self::new(uptime, vec![Reason { kind: Kind::Busy, unit: None, words }])
     }
 
     /// Whether nothing speaks against the service's health.
