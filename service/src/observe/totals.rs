@@ -60,7 +60,7 @@ impl Totals {
     /// The exit code that these totals stand for.
     #[must_use]
     pub fn exit(&self) -> Exit {
-        if self.lost() { Exit::DataLoss } else { Exit::Ok }
+        Exit::of_loss(self.lost())
     }
 
     /// A table for people.

@@ -35,7 +35,7 @@ pub use arrivals::StreamTimeoutSettings;
 pub use journal_writer::{Journal, JournalOutlet};
 pub(crate) use present::Present;
 pub(crate) use seen::TickSeen;
-pub(crate) use speech::{Alarm, Footing, Standing, Wants};
+pub(crate) use speech::{Footing, Standing, Wants};
 use unknown_channels::UnknownChannels;
 
 /// Where corrected frames go; `Err` is an output that could not be published.

@@ -33,7 +33,7 @@ pub(crate) struct Source {
 }
 
 /// One look at everything.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Look {
     /// The service's name for itself.
     pub(super) instance: String,
@@ -91,13 +91,9 @@ impl Look {
         Self {
             instance: "starting".to_owned(),
             uptime_s: uptime.as_secs_f64(),
-            healthy: false,
             instances: 1,
-            faults: Vec::new(),
             log_lines_dropped: dropped_lines(),
-            late_receipts: 0,
-            posted: Arc::default(),
-            units: Vec::new(),
+            ..Self::default()
         }
     }
 }

@@ -49,7 +49,11 @@ impl Intake {
             return Some(Arc::clone(unit));
         }
         if !self.has_place(&units, calibrated) {
-            return self.refuse(&id);
+            let limit = self.settings.max_units;
+            self.fault(FaultKind::TooManyUnits, || {
+                format!("unit {id} is refused: all {limit} places (max_units) are taken")
+            });
+            return None;
         }
         let outlet = match self.outlets.take(&id) {
             Ok(outlet) => outlet,
@@ -153,14 +157,6 @@ impl Intake {
             tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());
             self.forget(&id);
         }
-    }
-
-    fn refuse<T>(&self, id: &UnitId) -> Option<T> {
-        let limit = self.settings.max_units;
-        self.fault(FaultKind::TooManyUnits, || {
-            format!("unit {id} is refused: all {limit} places (max_units) are taken")
-        });
-        None
     }
 }
 

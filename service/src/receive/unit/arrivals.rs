@@ -139,33 +139,34 @@ impl Arrivals {
 
     /// Goes on from other counters: what they had before did not come since.
     pub(super) fn go_on_from(&mut self, now: Instant, counters: &[Counter]) {
+        self.looked = (now, self.counts(counters));
+        self.contradicting = contradicting(counters);
+    }
+
+    fn counts(&self, counters: &[Counter]) -> [u64; 4] {
         let [gyro, accel, temperature] = COUNTERS.map(|name| value_of(counters, name));
-        self.looked = (now, [gyro, accel, temperature, self.messages]);
-        self.contradicting = CONTRADICTING.iter().map(|name| value_of(counters, name)).sum();
+        [gyro, accel, temperature, self.messages]
     }
 
     /// Looks at what has come since the last look: measures the rates; in words where two producers are at work, which looks like an
     /// input of twice the rate and is none.
     #[expect(clippy::cast_precision_loss, reason = "fewer than 2⁵³ messages")]
     pub(super) fn look(&mut self, now: Instant, counters: &[Counter]) -> Option<String> {
-        let value = |name| value_of(counters, name);
-        let [gyro, accel, temperature] = COUNTERS.map(value);
-        let counts = [gyro, accel, temperature, self.messages];
+        let counts = self.counts(counters);
         let (then, before) = std::mem::replace(&mut self.looked, (now, counts));
-        let [ticks, ..] = before;
+        let came: [u64; 4] = std::array::from_fn(|i| counts[i].saturating_sub(before[i]));
         let elapsed_s = now.saturating_duration_since(then).as_secs_f64();
         if elapsed_s > 0.0 {
-            let mut per_s =
-                counts.iter().zip(before).map(|(now, then)| now.saturating_sub(then) as f64 / elapsed_s);
-            let mut next = || per_s.next().unwrap_or_default();
+            let [gyro_ticks_per_s, accel_ticks_per_s, temperature_readings_per_s, messages_per_s] =
+                came.map(|count| count as f64 / elapsed_s);
             self.rates = InputRates {
-                gyro_ticks_per_s: next(),
-                accel_ticks_per_s: next(),
-                temperature_readings_per_s: next(),
-                messages_per_s: next(),
+                gyro_ticks_per_s,
+                accel_ticks_per_s,
+                temperature_readings_per_s,
+                messages_per_s,
             };
         }
-        self.two_producers(gyro.saturating_sub(ticks), CONTRADICTING.iter().map(|name| value(name)).sum())
+        self.two_producers(came[0], contradicting(counters))
     }
 
     /// Whether two producers are at work, in words; `ticks` came since the last look, and so many contradicted others so far.
@@ -191,6 +192,11 @@ impl Arrivals {
     pub(super) fn rates(&self) -> InputRates {
         self.rates
     }
+}
+
+/// Ticks that contradict others.
+fn contradicting(counters: &[Counter]) -> u64 {
+    CONTRADICTING.iter().map(|name| value_of(counters, name)).sum()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use isotherm_protocol::pair::{Role, UnitRole};
 
 use super::{Plan, UnitActor};
 use crate::control::Notice;
+use crate::receive::fault::FaultKind;
 use following::Following;
 
 /// How often the memory is asked for while none comes.
@@ -63,19 +64,10 @@ pub(crate) struct Wants {
     pub(crate) memory: bool,
     /// It has begun to speak.
     pub(crate) spoke: bool,
-    /// What is wrong, in words.
-    pub(crate) alarm: Option<Alarm>,
+    /// What was to be impossible, in words.
+    pub(crate) alarm: Option<(FaultKind, String)>,
     /// When the other instance's output is late, if nothing is heard until then: the next look is due by that time.
     pub(crate) late_at: Option<Instant>,
-}
-
-/// What was to be impossible.
-#[derive(Debug)]
-pub(crate) enum Alarm {
-    /// Another instance computed other bits.
-    OtherBits(String),
-    /// Two instances publish the unit that are not configured to.
-    TwoSpeak(String),
 }
 
 /// Where the output of a unit goes, and what is known of the other instance's.
@@ -214,7 +206,7 @@ impl UnitActor {
             let series = self.stream.incoming_series();
             let words = format!("unit {}, series {series}, sequence {tick}: {words}", self.stream.id());
             self.speech.last_difference = Some(words.clone());
-            wants.alarm = Some(Alarm::OtherBits(words));
+            wants.alarm = Some((FaultKind::OtherBits, words));
             following.lose();
         } else if settled.missed {
             following.lose();
