@@ -31,7 +31,6 @@ use notices::NoticeCollector;
 use speech::Speech;
 
 pub(crate) use account::SwapAccount;
-pub use arrivals::StreamTimeoutSettings;
 pub use journal_writer::{Journal, JournalOutlet};
 pub(crate) use present::Present;
 pub(crate) use seen::TickSeen;
@@ -84,19 +83,14 @@ impl std::fmt::Debug for UnitActor {
 impl UnitActor {
     /// A unit that has seen nothing and has no calibration.
     #[must_use]
-    pub fn new(
-        id: UnitId,
-        settings: UnitSettings,
-        stream_timeout: StreamTimeoutSettings,
-        outlet: Outlet,
-    ) -> Self {
+    pub fn new(id: UnitId, settings: UnitSettings, tail_flush: Duration, outlet: Outlet) -> Self {
         Self {
             stream: UnitStream::new(id, settings),
             plan: Plan::default(),
             outlet,
             faults: FaultLog::default(),
             latency: Histogram::default(),
-            arrivals: Arrivals::new(stream_timeout, Instant::now()),
+            arrivals: Arrivals::new(tail_flush, pairing_window(&settings), Instant::now()),
             unknown_channels: UnknownChannels::default(),
             notices: NoticeCollector::default(),
             journal_writer: JournalWriter::default(),
@@ -356,6 +350,11 @@ impl UnitActor {
     pub(crate) fn id(&self) -> &UnitId {
         self.stream.id()
     }
+}
+
+/// How long a unit's gyro tick waits for its accelerometer tick.
+pub(crate) fn pairing_window(settings: &UnitSettings) -> Duration {
+    Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs())
 }
 
 #[cfg(test)]

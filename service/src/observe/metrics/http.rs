@@ -149,8 +149,16 @@ async fn answer(
     let answer = match request.uri().path() {
         "/metrics" if reads => metrics(&request, exporter).await,
         "/healthz" if reads => healthz(exporter).await,
-        "/livez" if reads => livez(exporter),
-        "/readyz" if reads => readyz(exporter),
+        // Nothing is looked at here: whether the process is worth keeping, and whether the service receives.
+        "/livez" if reads => match exporter.source.get().map_or(Ok(()), Source::receives) {
+            Ok(()) => text(StatusCode::OK, PLAIN, "alive\n"),
+            Err(stuck) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, format!("{stuck}\n")),
+        },
+        // A unit that is held up takes nothing of it.
+        "/readyz" if reads => match exporter.not_ready() {
+            None => text(StatusCode::OK, PLAIN, "ready\n"),
+            Some(words) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, words + "\n"),
+        },
         "/metrics" | "/healthz" | "/livez" | "/readyz" => {
             let mut answer = text(StatusCode::METHOD_NOT_ALLOWED, PLAIN, "only GET and HEAD\n");
             answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
@@ -187,22 +195,6 @@ async fn metrics(request: &Request<Incoming>, exporter: &Arc<Exporter>) -> Answe
     match made {
         Ok(page) => good(packed, if open { OPEN_METRICS } else { PROMETHEUS }, page),
         Err(error) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
-    }
-}
-
-/// Whether the process is worth keeping. Nothing is looked at here, either.
-fn livez(exporter: &Exporter) -> Answer {
-    match exporter.source.get().map_or(Ok(()), Source::receives) {
-        Ok(()) => text(StatusCode::OK, PLAIN, "alive\n"),
-        Err(stuck) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, format!("{stuck}\n")),
-    }
-}
-
-/// Whether the service receives. Nothing is looked at: a unit that is held up takes nothing of it.
-fn readyz(exporter: &Exporter) -> Answer {
-    match exporter.not_ready() {
-        None => text(StatusCode::OK, PLAIN, "ready\n"),
-        Some(words) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, words + "\n"),
     }
 }
 

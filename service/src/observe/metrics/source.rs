@@ -16,7 +16,7 @@ use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
-use crate::receive::unit::UnitActor;
+use crate::receive::unit::{UnitActor, pairing_window};
 use isotherm_cli::stderr::dropped_lines;
 
 /// Where a look is taken from.
@@ -125,7 +125,6 @@ impl Source {
         control_status: Arc<ControlStatus>,
     ) -> Self {
         let instance = pair.me().instance.clone();
-        let window = settings.unit.pairing_window.as_ns().unsigned_abs();
         Self {
             intake,
             pair,
@@ -134,7 +133,7 @@ impl Source {
             started: Instant::now(),
             held_back: HeldBack {
                 ticks: settings.unit.navigation.ticks().into(),
-                window: Duration::from_nanos(window),
+                window: pairing_window(&settings.unit),
             },
             pulse: None,
             subscribers: Arc::default(),

@@ -32,15 +32,6 @@ const CONTRADICTING: [&str; 3] = ["gyro_late", "gyro_implausible", "gyro_duplica
 /// Gyro frames of which a repeat is the network's doing.
 const REPEATED: usize = 8;
 
-/// Limits of a stream that may have stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StreamTimeoutSettings {
-    /// Shortest silence that counts as a stop.
-    pub tail_flush: Duration,
-    /// Pairing window of the unit; twice as long must pass.
-    pub pairing_window: Duration,
-}
-
 /// Follows the messages of one unit.
 ///
 /// A producer that sends a batch of 64 ticks every 640 ms has not stopped 500 ms after the last one. The silence that
@@ -48,7 +39,8 @@ pub struct StreamTimeoutSettings {
 /// stream that goes on.
 #[derive(Debug)]
 pub(super) struct Arrivals {
-    timeout: StreamTimeoutSettings,
+    /// Shortest silence that counts as a stop.
+    shortest: Duration,
     /// When the last gyro message came, and the distance of such messages.
     last: Option<Instant>,
     interval: Duration,
@@ -68,9 +60,10 @@ pub(super) struct Arrivals {
 }
 
 impl Arrivals {
-    pub(super) fn new(timeout: StreamTimeoutSettings, now: Instant) -> Self {
+    /// A stream has stopped after `tail_flush`, and not before twice the unit's pairing window has passed.
+    pub(super) fn new(tail_flush: Duration, pairing_window: Duration, now: Instant) -> Self {
         Self {
-            timeout,
+            shortest: tail_flush.max(pairing_window * 2),
             last: None,
             interval: ASSUMED_INTERVAL,
             messages: 0,
@@ -132,8 +125,7 @@ impl Arrivals {
 
     /// Whether the gyro stream has been silent for long enough to be called stopped.
     pub(super) fn is_over(&self, now: Instant) -> bool {
-        let StreamTimeoutSettings { tail_flush, pairing_window } = self.timeout;
-        let shortest = tail_flush.max(pairing_window * 2).max(self.interval * INTERVALS);
+        let shortest = self.shortest.max(self.interval * INTERVALS);
         self.last.is_none_or(|last| now.saturating_duration_since(last) >= shortest)
     }
 
@@ -208,7 +200,7 @@ mod tests {
 
     fn arrivals(tail_flush: u32, pairing_window: u32, now: Instant) -> Arrivals {
         let [tail_flush, pairing_window] = [tail_flush, pairing_window].map(|ms| MS * ms);
-        Arrivals::new(StreamTimeoutSettings { tail_flush, pairing_window }, now)
+        Arrivals::new(tail_flush, pairing_window, now)
     }
 
     fn counters(ticks: u64, late: u64) -> [Counter; 2] {

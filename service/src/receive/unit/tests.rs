@@ -52,11 +52,8 @@ impl Sink {
 }
 
 fn actor(outlet: Outlet) -> UnitActor {
-    let stream_timeout = StreamTimeoutSettings {
-        tail_flush: Duration::from_millis(100),
-        pairing_window: Duration::from_millis(50),
-    };
-    UnitActor::new(UnitId::new("U-1").unwrap(), UnitSettings::default(), stream_timeout, outlet)
+    let tail_flush = Duration::from_millis(100);
+    UnitActor::new(UnitId::new("U-1").unwrap(), UnitSettings::default(), tail_flush, outlet)
 }
 
 fn example() -> (Arc<Calibration>, [u8; 8]) {
