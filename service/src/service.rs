@@ -18,7 +18,7 @@ use crate::config::Settings;
 use crate::control::revision::Calibrations;
 use crate::control::store::{Opened, Store};
 use crate::control::watch::Watcher;
-use crate::control::{Found, Inbox, SwapManager, Worker};
+use crate::control::{Found, Inbox, Message, SwapManager, Worker};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
 use crate::observe::subscribers::Subscribers;
@@ -292,7 +292,8 @@ impl RunningService {
     pub fn reload(&self) {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
-        self.inbox.judge_again();
+        // Where there is no room the documents are judged with what is there.
+        self.inbox.tell(Message::JudgeAgain);
     }
 
     /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.

@@ -29,7 +29,7 @@ use crate::control::watch::FolderEvent;
 
 /// What the swap manager is asked for, or told.
 #[derive(Debug)]
-pub(super) enum Message {
+pub(crate) enum Message {
     /// A query.
     Query(Asked, Query, Origin),
     /// A put on `imu/*/calibration`: a swap.
@@ -132,26 +132,14 @@ impl Inbox {
         self.hand_over(unit, Message::Put(sample), bytes);
     }
 
-    /// Asks which documents are lacking here; where there is no room, no answer comes.
-    pub(crate) fn lacks(&self, carried: Carried, answer: oneshot::Sender<Vec<Digest>>) {
-        let _ = self.0.tell(Message::Lacks(carried, answer));
-    }
-
-    /// Hands over what another instance has written down; it is answered when it is written down here, and not at all where there is
-    /// no room.
-    pub(crate) fn carry(&self, carried: Carried, done: oneshot::Sender<()>) {
-        let _ = self.0.tell(Message::Carry(carried, done));
+    /// Hands over what nobody insists on: where there is no room it is dropped, and no answer comes.
+    pub(crate) fn tell(&self, message: Message) {
+        let _ = self.0.tell(message);
     }
 
     /// Hands an event of the folder over; waits for its turn, on the watcher's own thread.
     pub(crate) fn folder(&self, event: FolderEvent) {
         self.0.tell_in_turn(Message::Folder(event));
-    }
-
-    /// Has every document of the folder that is not taken judged again.
-    pub(crate) fn judge_again(&self) {
-        // Where there is no room the documents are judged with what is there.
-        let _ = self.0.tell(Message::JudgeAgain);
     }
 
     /// Hands a unit's notice over; gives it back where too much is waiting.
