@@ -122,13 +122,14 @@ pub fn run(args: &CheckArgs) -> Exit {
     };
     let mut findings: Vec<_> = args.files.iter().flat_map(check_all).collect();
     rivals::refuse(&mut findings);
+    let good = findings.iter().all(|finding| finding.good);
     let text = if args.json {
-        let good = findings.iter().all(|finding| finding.good);
         isotherm_cli::json(&serde_json::json!({ "good": good, "files": findings }))
     } else {
         findings.iter().map(in_words).collect()
     };
-    print(&text, verdict(&findings))
+    let is_bad = findings.iter().any(|finding| !finding.problems.is_empty());
+    print(&text, if good { Exit::Ok } else { Exit::blaming(false, is_bad) })
 }
 
 /// The documents of a folder; a file by itself.
@@ -156,14 +157,4 @@ fn in_words(finding: &Finding) -> String {
 pub(crate) fn say_problems(problems: &[Problem], warnings: &[Problem]) {
     problems.iter().for_each(say);
     warnings.iter().for_each(say_warning);
-}
-
-fn verdict(findings: &[Finding]) -> Exit {
-    if findings.iter().any(|finding| !finding.problems.is_empty()) {
-        Exit::BadConfiguration
-    } else if findings.iter().any(|finding| finding.unreadable.is_some()) {
-        Exit::Failed
-    } else {
-        Exit::Ok
-    }
 }

@@ -41,11 +41,11 @@ pub mod revision;
 mod start;
 pub mod store;
 mod unlikely;
-pub mod watch;
+pub(crate) mod watch;
 
 pub(crate) use carry::Carried;
 pub(crate) use control_status::{ControlStatus, Posted, STATE_FOLDER, UNWRITTEN};
 pub(crate) use manager::{SwapManager, Worker};
-pub(crate) use queue::{Asked, Inbox, Notice, Origin, PreLaunchEnd};
+pub(crate) use queue::{Asked, Inbox, Message, Notice, Origin, PreLaunchEnd};
 pub(crate) use request::is_asked;
 pub(crate) use start::Found;

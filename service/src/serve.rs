@@ -2,7 +2,7 @@
 
 use std::io::{IsTerminal, Write};
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -16,6 +16,7 @@ use crate::control::revision::Calibrations;
 use crate::logging::LogArgs;
 use crate::observe::metrics::Endpoint;
 use crate::service::{open_store, start_on, tell_state};
+use crate::signing::replace;
 use crate::supervisor;
 use crate::{ServiceError, Totals};
 
@@ -225,14 +226,6 @@ fn announce(args: &ServeArgs, locators: &[String], metrics: Option<SocketAddr>) 
         // Nobody reading is nobody waiting.
         let _ = writeln!(stdout, "{line}").and_then(|()| stdout.flush());
     }
-    args.ready_file.as_deref().map_or(Ok(()), |path| write_whole(path, &line))
-}
-
-/// Writes a file that is never seen half written.
-fn write_whole(path: &Path, line: &str) -> Result<(), ServiceError> {
-    let write = |source| ServiceError::Write { path: path.to_owned(), source };
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".part");
-    std::fs::write(&partial, format!("{line}\n")).map_err(write)?;
-    std::fs::rename(&partial, path).map_err(write)
+    let Some(path) = &args.ready_file else { return Ok(()) };
+    replace(path, &(line + "\n")).map_err(|source| ServiceError::Write { path: path.clone(), source })
 }

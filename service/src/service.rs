@@ -17,8 +17,8 @@ use crate::ServiceError;
 use crate::config::Settings;
 use crate::control::revision::Calibrations;
 use crate::control::store::{Opened, Store};
-use crate::control::watch::{WatchSettings, Watcher};
-use crate::control::{Found, Inbox, SwapManager, Worker};
+use crate::control::watch::Watcher;
+use crate::control::{Found, Inbox, Message, SwapManager, Worker};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
 use crate::observe::subscribers::Subscribers;
@@ -134,8 +134,8 @@ pub(crate) async fn start_on(
         .map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
-            let (watch, inbox) = (watch_settings(&settings), inbox.clone());
-            let watcher = Watcher::start(folder, watch, found, move |event| inbox.folder(event));
+            let inbox = inbox.clone();
+            let watcher = Watcher::start(folder, settings.folder, found, move |event| inbox.folder(event));
             Some(watcher.map_err(ServiceError::Thread)?)
         }
         None => None,
@@ -226,10 +226,6 @@ fn read_folder(work: &mut Worker, settings: &Settings) -> Result<Found, ServiceE
     }
 }
 
-fn watch_settings(settings: &Settings) -> WatchSettings {
-    WatchSettings { settle: settings.folder.settle, poll: settings.folder.poll, ..WatchSettings::default() }
-}
-
 impl RunningService {
     /// Stops receiving, corrects and publishes what was received, waits for the subscribers that give receipts, closes the session; at
     /// most the configured time.
@@ -296,7 +292,8 @@ impl RunningService {
     pub fn reload(&self) {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
-        self.inbox.judge_again();
+        // Where there is no room the documents are judged with what is there.
+        self.inbox.tell(Message::JudgeAgain);
     }
 
     /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.

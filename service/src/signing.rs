@@ -13,7 +13,7 @@ pub use keygen::KeygenArgs;
 pub use sign::SignArgs;
 pub use trusted::read_trusted_keys;
 
-pub(crate) use files::create;
+pub(crate) use files::{create, replace};
 pub use keygen::run as keygen;
 pub use sign::run as sign;
 pub(crate) use trusted::check_signature;

@@ -1,40 +1,30 @@
 //! Who signed a calibration document.
 
-use std::fmt;
-
 use isotherm_protocol::signature::{KeyId, SignatureError, TrustedKeys, Verdict, find, verify};
 use serde::Serialize;
+use thiserror::Error;
 
 /// What is known of who signed a document.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Error, Serialize)]
 #[serde(tag = "state", rename_all = "lowercase")]
 pub enum Signer {
     /// Nobody did.
+    #[error("unsigned")]
     Unsigned,
     /// It has a signature, and no trusted keys were given to verify it with.
+    #[error("signed by key {key_id}, not verified (needs --trusted-keys)")]
     Unverified {
         /// The key that the signature names.
         key_id: KeyId,
     },
     /// A trusted key did, and the document is unchanged.
+    #[error("signed by {name} ({key_id})")]
     Signed {
         /// The key.
         key_id: KeyId,
         /// The name under which it is trusted.
         name: String,
     },
-}
-
-impl fmt::Display for Signer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unsigned => f.write_str("unsigned"),
-            Self::Unverified { key_id } => {
-                write!(f, "signed by key {key_id}, not verified (needs --trusted-keys)")
-            }
-            Self::Signed { key_id, name } => write!(f, "signed by {name} ({key_id})"),
-        }
-    }
 }
 
 /// Who signed a document; nothing is said of one without a signature where no keys were given.

@@ -10,15 +10,14 @@ use flate2::write::DeflateEncoder;
 /// Bytes in little room: deflated, and shared by whoever keeps them. A calibration document of a few kilobytes takes a
 /// quarter of them, which counts where there are thousands.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CompressedBytes {
+pub(crate) struct CompressedBytes {
     deflated: Arc<[u8]>,
     length: usize,
 }
 
 impl CompressedBytes {
     /// Keeps them.
-    #[must_use]
-    pub fn new(bytes: &[u8]) -> Self {
+    pub(crate) fn new(bytes: &[u8]) -> Self {
         let mut encoder = DeflateEncoder::new(Vec::new(), Compression::fast());
         // Writing to a vector does not fail.
         let _ = encoder.write_all(bytes);
@@ -26,8 +25,7 @@ impl CompressedBytes {
     }
 
     /// The bytes.
-    #[must_use]
-    pub fn read(&self) -> Vec<u8> {
+    pub(crate) fn read(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.length);
         // Its own, in memory: there is nothing that could be wrong with them.
         let _ = DeflateDecoder::new(&*self.deflated).read_to_end(&mut bytes);
@@ -35,15 +33,8 @@ impl CompressedBytes {
     }
 
     /// How many there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.length
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.length == 0
     }
 }
 
@@ -59,15 +50,13 @@ impl CompressedText {
     }
 
     /// The text.
-    #[must_use]
-    pub fn read(&self) -> String {
+    pub(crate) fn read(&self) -> String {
         // It was one when it was kept.
         String::from_utf8(self.0.read()).unwrap_or_default()
     }
 
     /// Its bytes, kept once for both.
-    #[must_use]
-    pub fn bytes(&self) -> &CompressedBytes {
+    pub(crate) fn bytes(&self) -> &CompressedBytes {
         &self.0
     }
 }
@@ -82,10 +71,7 @@ mod tests {
         for text in ["", "°", document] {
             let kept = CompressedText::new(text);
             let bytes = kept.bytes();
-            assert_eq!(
-                (kept.read().as_str(), bytes.len(), bytes.is_empty()),
-                (text, text.len(), text.is_empty())
-            );
+            assert_eq!((kept.read().as_str(), bytes.len()), (text, text.len()));
         }
         assert!(CompressedText::new(document).bytes().deflated.len() * 3 < document.len());
     }

@@ -64,13 +64,13 @@ impl ControlStatus {
 impl Worker {
     /// Posts the present state.
     pub(super) fn show(&self) {
-        let (state, reason) = match (self.folder.gone(), self.folder.deaf()) {
-            (Some(reason), _) => (FolderState::Gone, Some(reason.to_owned())),
-            (None, Some(reason)) => (FolderState::Polling, Some(reason.to_owned())),
+        let (state, reason) = match (&self.folder.gone, &self.folder.deaf) {
+            (Some(reason), _) => (FolderState::Gone, Some(reason.clone())),
+            (None, Some(reason)) => (FolderState::Polling, Some(reason.clone())),
             (None, None) => (FolderState::Watching, None),
         };
-        let folder =
-            self.folder.path().map(|path| FolderStatus { path: shown(&path.display()), state, reason });
+        let path = self.folder.path.as_ref();
+        let folder = path.map(|path| FolderStatus { path: shown(&path.display()), state, reason });
         let bad = self.folder.bad().take(MAX_BAD_DOCUMENTS).map(|(file, problems)| BadDocument {
             file: shown(&file.display()),
             problem: problems.first().map(ToString::to_string).unwrap_or_default(),
@@ -85,7 +85,7 @@ impl Worker {
                 .map(|path| StoreStatus { path: shown(&path.display()), audit_entries: self.entries }),
             problems: self.problems(),
             accepted: self.accepted,
-            refused: self.refusals.count(),
+            refused: self.refusals.count,
         };
         let mut control_status = self.control_status.0.lock().unwrap_or_else(PoisonError::into_inner);
         if **control_status != posted {
@@ -95,41 +95,35 @@ impl Worker {
 
     /// What is wrong until somebody does something about it.
     fn problems(&self) -> Vec<Standing> {
-        let lost = self.lost.iter().map(|words| Standing {
-            kind: STATE_FOLDER,
-            count: 1,
-            words: format!("swaps are refused, the state folder cannot be written: {words}"),
-        });
-        let losses = self.losses.first().map(|(_, words)| Standing {
-            kind: "audit_file",
-            count: self.losses.len() as u64,
-            words: words.clone(),
-        });
-        let untrusted: Vec<_> = self
-            .records
-            .iter()
-            .filter(|(_, record)| record.untrusted.is_some())
-            .map(|(unit, _)| unit.as_str())
-            .collect();
-        let count = untrusted.len() as u64;
-        let untrusted = (count > 0).then(|| Standing {
-            kind: "untrusted_calibration",
-            count,
-            words: format!(
+        let mut problems = Vec::new();
+        let mut add = |kind, count: usize, words| {
+            problems.push(Standing { kind, count: count as u64, words });
+        };
+        if let Some(words) = &self.lost {
+            let words = format!("swaps are refused, the state folder cannot be written: {words}");
+            add(STATE_FOLDER, 1, words);
+        }
+        if let Some((_, words)) = self.losses.first() {
+            add("audit_file", self.losses.len(), words.clone());
+        }
+        let untrusted = self.records.iter().filter(|(_, record)| record.untrusted.is_some());
+        let untrusted: Vec<_> = untrusted.map(|(unit, _)| unit.as_str()).collect();
+        if !untrusted.is_empty() {
+            let words = format!(
                 "restored without a signature that is now trusted: {}; `isotherm status UNIT` says what to do",
-                few(untrusted)
-            ),
-        });
+                few(&untrusted)
+            );
+            add("untrusted_calibration", untrusted.len(), words);
+        }
         let unwritten = self.folder.unwritten();
-        let unwritten = unwritten.first().map(|first| Standing {
-            kind: UNWRITTEN,
-            count: unwritten.len() as u64,
-            words: format!(
+        if let Some(first) = unwritten.first() {
+            let words = format!(
                 "{} could not be written to the state folder and is not in force; it is tried again: make room on \
                  the disk",
                 first.display()
-            ),
-        });
-        lost.chain(losses).chain(untrusted).chain(unwritten).collect()
+            );
+            add(UNWRITTEN, unwritten.len(), words);
+        }
+        problems
     }
 }

@@ -201,19 +201,16 @@ impl Doubt {
 
     /// What is wrong, and what to do where it refuses.
     fn message(&self, forced: bool) -> String {
-        match (self.refuses, forced) {
-            (true, false) if self.policy.is_empty() => {
-                format!("{}: force the swap (--force) if this is intended", self.words)
-            }
-            (true, true) if self.policy.is_empty() => format!("{} (forced)", self.words),
+        let Self { policy, words, .. } = self;
+        let what_to_do = if forced { "" } else { ": force the swap (--force) if this is intended" };
+        match (self.refuses, policy.is_empty()) {
+            (false, _) => words.clone(),
+            (true, true) if forced => format!("{words} (forced)"),
+            (true, true) => format!("{words}{what_to_do}"),
             (true, false) => {
-                format!(
-                    "{} ([swap] {} = \"refuse\"): force the swap (--force) if this is intended",
-                    self.words, self.policy
-                )
+                let forced = if forced { ", forced" } else { "" };
+                format!("{words} ([swap] {policy} = \"refuse\"{forced}){what_to_do}")
             }
-            (true, true) => format!("{} ([swap] {} = \"refuse\", forced)", self.words, self.policy),
-            (false, _) => self.words.clone(),
         }
     }
 }

@@ -49,8 +49,7 @@ pub(super) struct Layers {
 
 impl Document {
     /// A calibration that never was a document.
-    #[must_use]
-    pub fn plain(calibration: Arc<Calibration>) -> Self {
+    pub(crate) fn plain(calibration: Arc<Calibration>) -> Self {
         Self {
             calibration,
             label: Label::default(),
@@ -108,8 +107,7 @@ impl Document {
     }
 
     /// SHA-256 of the text; `None` for a calibration that never was a document.
-    #[must_use]
-    pub fn digest(&self) -> Option<Digest> {
+    pub(crate) fn digest(&self) -> Option<Digest> {
         self.label.digest
     }
 

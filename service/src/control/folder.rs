@@ -34,12 +34,14 @@ const RETRY_INTERVAL: Duration = Duration::from_secs(2);
 /// What is known of the folder.
 #[derive(Debug, Default)]
 pub(super) struct Folder {
-    path: Option<PathBuf>,
+    pub(super) path: Option<PathBuf>,
     files: BTreeMap<PathBuf, File>,
     /// Files whose documents name a unit.
     naming: BTreeMap<UnitId, BTreeSet<PathBuf>>,
-    gone: Option<String>,
-    deaf: Option<String>,
+    /// Why it cannot be read.
+    pub(super) gone: Option<String>,
+    /// Why changes are found by the poll alone.
+    pub(super) deaf: Option<String>,
 }
 
 /// What is known of a file.
@@ -60,22 +62,8 @@ struct File {
 }
 
 impl Folder {
-    pub(super) fn new(path: Option<&Path>) -> Self {
-        Self { path: path.map(Path::to_owned), ..Self::default() }
-    }
-
-    pub(super) fn path(&self) -> Option<&Path> {
-        self.path.as_deref()
-    }
-
-    /// Why the folder cannot be read.
-    pub(super) fn gone(&self) -> Option<&str> {
-        self.gone.as_deref()
-    }
-
-    /// Why changes are found by the poll alone.
-    pub(super) fn deaf(&self) -> Option<&str> {
-        self.deaf.as_deref()
+    pub(super) fn new(path: Option<PathBuf>) -> Self {
+        Self { path, ..Self::default() }
     }
 
     /// Whether a file has this content.
@@ -120,11 +108,6 @@ impl Folder {
         problem
     }
 
-    /// The folder cannot be read.
-    pub(super) fn miss(&mut self, reason: String) {
-        self.gone = Some(reason);
-    }
-
     /// Enters a file's content; the unit that it named before.
     pub(super) fn enter(&mut self, path: &Path, read: &Read) -> Option<UnitId> {
         let file = self.files.entry(path.to_owned()).or_default();
@@ -167,7 +150,7 @@ impl Worker {
     /// Takes what the watcher tells.
     pub(super) fn folder_event(&mut self, event: FolderEvent) {
         match event {
-            FolderEvent::Changed { file, bytes, .. } => {
+            FolderEvent::Changed { file, bytes } => {
                 let read = Read::of(&file, &bytes);
                 let before = self.folder.enter(&file, &read);
                 self.take_file(&file, &read, false);
@@ -189,7 +172,7 @@ impl Worker {
             FolderEvent::FolderGone { reason } => {
                 let path = self.folder.path.as_deref().unwrap_or(Path::new("")).display();
                 tracing::error!("{path} cannot be read: {reason}; the calibration in force stays");
-                self.folder.miss(reason);
+                self.folder.gone = Some(reason);
             }
             FolderEvent::FolderBack => {
                 tracing::info!("the folder of calibrations can be read again");

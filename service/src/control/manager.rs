@@ -124,7 +124,7 @@ impl Worker {
             intake,
             store,
             records: BTreeMap::new(),
-            folder: Folder::new(settings.calibrations.as_deref()),
+            folder: Folder::new(settings.calibrations.clone()),
             accepted: 0,
             refusals: Refusals::default(),
             control_status: Arc::default(),

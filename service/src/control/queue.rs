@@ -24,11 +24,12 @@ use zenoh::query::Query;
 use zenoh::sample::Sample;
 
 use super::carry::Carried;
+use super::request::one_unit;
 use crate::control::watch::FolderEvent;
 
 /// What the swap manager is asked for, or told.
 #[derive(Debug)]
-pub(super) enum Message {
+pub(crate) enum Message {
     /// A query.
     Query(Asked, Query, Origin),
     /// A put on `imu/*/calibration`: a swap.
@@ -119,38 +120,26 @@ impl Inbox {
 
     /// Hands a query over.
     pub(crate) fn ask(&self, asked: Asked, query: Query, origin: Origin) {
-        let unit = unit_of(asked, query.key_expr().as_str());
+        let unit = one_unit(query.key_expr().as_str(), asked).ok();
         let bytes = query.payload().map_or(0, zenoh::bytes::ZBytes::len);
         self.hand_over(unit, Message::Query(asked, query, origin), bytes);
     }
 
     /// Hands a put on `imu/*/calibration` over.
     pub(crate) fn put(&self, sample: Sample) {
-        let unit = unit_of(Asked::Calibration, sample.key_expr().as_str());
+        let unit = one_unit(sample.key_expr().as_str(), Asked::Calibration).ok();
         let bytes = sample.payload().len();
         self.hand_over(unit, Message::Put(sample), bytes);
     }
 
-    /// Asks which documents are lacking here; where there is no room, no answer comes.
-    pub(crate) fn lacks(&self, carried: Carried, answer: oneshot::Sender<Vec<Digest>>) {
-        let _ = self.0.tell(Message::Lacks(carried, answer));
-    }
-
-    /// Hands over what another instance has written down; it is answered when it is written down here, and not at all where there is
-    /// no room.
-    pub(crate) fn carry(&self, carried: Carried, done: oneshot::Sender<()>) {
-        let _ = self.0.tell(Message::Carry(carried, done));
+    /// Hands over what nobody insists on: where there is no room it is dropped, and no answer comes.
+    pub(crate) fn tell(&self, message: Message) {
+        let _ = self.0.tell(message);
     }
 
     /// Hands an event of the folder over; waits for its turn, on the watcher's own thread.
     pub(crate) fn folder(&self, event: FolderEvent) {
         self.0.tell_in_turn(Message::Folder(event));
-    }
-
-    /// Has every document of the folder that is not taken judged again.
-    pub(crate) fn judge_again(&self) {
-        // Where there is no room the documents are judged with what is there.
-        let _ = self.0.tell(Message::JudgeAgain);
     }
 
     /// Hands a unit's notice over; gives it back where too much is waiting.
@@ -179,11 +168,6 @@ impl Inbox {
             let _ = query.reply_err(words).wait();
         }
     }
-}
-
-/// The unit that a key names.
-fn unit_of(asked: Asked, key: &str) -> Option<UnitId> {
-    asked.serial(key::asker(key).0).and_then(|serial| UnitId::new(serial).ok())
 }
 
 /// Most requests of a lane.

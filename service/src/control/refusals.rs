@@ -25,17 +25,13 @@ type Same = (Option<UnitId>, Source, Digest);
 /// Refusals so far.
 #[derive(Debug, Default)]
 pub(super) struct Refusals {
-    count: u64,
+    /// How many documents were refused.
+    pub(super) count: u64,
     last: VecDeque<Same>,
     minute: Option<(Instant, u32)>,
 }
 
 impl Refusals {
-    /// How many documents were refused.
-    pub(super) fn count(&self) -> u64 {
-        self.count
-    }
-
     /// Counts one; whether it is to be written down.
     fn is_news(&mut self, now: Instant, same: Same) -> bool {
         if self.last.contains(&same) {

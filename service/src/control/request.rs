@@ -201,7 +201,7 @@ impl Worker {
 }
 
 /// The unit that a key is for.
-fn one_unit(key: &str, asked: Asked) -> Result<UnitId, String> {
+pub(super) fn one_unit(key: &str, asked: Asked) -> Result<UnitId, String> {
     let (key, _) = key::asker(key);
     let serial = asked.serial(key).ok_or_else(|| format!("{key} is not the key of a unit"))?;
     UnitId::new(serial).map_err(|error| format!("serial {serial:?} {error}: name one unit"))

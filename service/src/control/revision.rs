@@ -34,8 +34,7 @@ pub struct Revision {
 
 impl Revision {
     /// A calibration that never was a document.
-    #[must_use]
-    pub fn plain(number: corrected::Revision, calibration: Arc<Calibration>) -> Self {
+    pub(crate) fn plain(number: corrected::Revision, calibration: Arc<Calibration>) -> Self {
         Self { number, document: Arc::new(Document::plain(calibration)), source: String::new() }
     }
 
@@ -47,26 +46,25 @@ impl Revision {
     }
 
     /// What the status says of it.
-    #[must_use]
-    pub fn label(&self) -> Label {
+    pub(crate) fn label(&self) -> Label {
         Label { source: self.source.clone(), ..self.document.label.clone() }
     }
 }
 
 /// What one unit corrects with, and what is to follow.
 #[derive(Debug, Clone, Default)]
-pub struct Plan {
+pub(crate) struct Plan {
     /// In force from the next tick on, or already.
-    pub current: Option<Arc<Revision>>,
+    pub(crate) current: Option<Arc<Revision>>,
     /// To follow at its tick.
-    pub pending: Option<Change>,
+    pub(crate) pending: Option<Change>,
     /// Commands that a unit which appears is given: what an operator wanted of it before the service was restarted.
-    pub intent: Vec<Command>,
+    pub(crate) intent: Vec<Command>,
 }
 
 impl Plan {
     /// Takes a change in; what it replaces before it came in force.
-    pub fn change(&mut self, change: Change) -> Option<Change> {
+    pub(crate) fn change(&mut self, change: Change) -> Option<Change> {
         let replaced = self.pending.take();
         if change.at == Schedule::NextTick {
             self.current = Some(change.next);
@@ -77,33 +75,31 @@ impl Plan {
     }
 
     /// What was to follow has come in force.
-    pub fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         if let Some(change) = self.pending.take() {
             self.current = Some(change.next);
         }
     }
 
     /// Revision counter of what is to follow, and when.
-    #[must_use]
-    pub fn waiting(&self) -> Option<(u64, Schedule)> {
+    pub(crate) fn waiting(&self) -> Option<(u64, Schedule)> {
         self.pending.as_ref().map(|change| (change.next.number.counter, change.at))
     }
 
     /// What a unit that knows nothing yet is to be given, in this order.
-    pub fn changes(&self) -> impl Iterator<Item = Change> {
+    pub(crate) fn changes(&self) -> impl Iterator<Item = Change> {
         let current = self.current.clone();
         let current = current.map(|next| Change { next, at: Schedule::NextTick, slew: Span::ZERO });
         current.into_iter().chain(self.pending.clone())
     }
 
     /// What is in force and what is to follow.
-    pub fn revisions(&self) -> impl Iterator<Item = &Arc<Revision>> + Clone {
+    pub(crate) fn revisions(&self) -> impl Iterator<Item = &Arc<Revision>> + Clone {
         self.current.iter().chain(self.pending.iter().map(|change| &change.next))
     }
 
     /// What was accepted last, in force or to follow.
-    #[must_use]
-    pub fn last(&self) -> Option<&Arc<Revision>> {
+    pub(crate) fn last(&self) -> Option<&Arc<Revision>> {
         self.revisions().last()
     }
 }
@@ -122,34 +118,32 @@ impl Calibrations {
     }
 
     /// The plan of one unit, to be changed; an empty one is made where there is none.
-    pub fn plan_mut(&mut self, unit: &UnitId) -> &mut Plan {
+    pub(crate) fn plan_mut(&mut self, unit: &UnitId) -> &mut Plan {
         self.by_unit.entry(unit.clone()).or_default()
     }
 
     /// Forgets what one unit was to be given.
-    pub fn remove(&mut self, unit: &UnitId) {
+    pub(crate) fn remove(&mut self, unit: &UnitId) {
         self.by_unit.remove(unit);
     }
 
     /// The plan of one unit.
-    #[must_use]
-    pub fn get(&self, unit: &UnitId) -> Option<&Plan> {
+    pub(crate) fn get(&self, unit: &UnitId) -> Option<&Plan> {
         self.by_unit.get(unit)
     }
 
     /// The units that have a calibration, or are to be given one at its tick.
-    pub fn units(&self) -> impl Iterator<Item = &UnitId> {
+    pub(crate) fn units(&self) -> impl Iterator<Item = &UnitId> {
         self.by_unit.keys().filter(|unit| self.has(unit))
     }
 
     /// Whether a unit has a calibration, or is to be given one at its tick.
-    #[must_use]
-    pub fn has(&self, unit: &UnitId) -> bool {
+    pub(crate) fn has(&self, unit: &UnitId) -> bool {
         self.get(unit).is_some_and(|plan| plan.last().is_some())
     }
 
     /// Units and their plans.
-    pub fn iter(&self) -> impl Iterator<Item = (&UnitId, &Plan)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (&UnitId, &Plan)> {
         self.by_unit.iter()
     }
 }

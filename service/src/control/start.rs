@@ -82,13 +82,13 @@ impl Worker {
     /// Where the folder itself cannot be read.
     pub(crate) fn read_folder(&mut self) -> std::io::Result<(Found, usize)> {
         let mut found = Found::new();
-        let Some(folder) = self.folder.path().map(Path::to_owned) else { return Ok((found, 0)) };
+        let Some(folder) = self.folder.path.clone() else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
         for (file, read) in read_all(&files_in(&folder, "toml")?) {
             match read {
                 Ok(read) => {
-                    found.insert(file.clone(), Known::Content(read.digest.0));
+                    found.insert(file.clone(), Known::Content(read.digest));
                     self.folder.enter(&file, &read);
                     contents.push((file, read));
                 }
@@ -122,7 +122,7 @@ impl Worker {
         tracing::error!(
             "the folder of calibrations cannot be read: {error}; the last good sets are in force until it is back"
         );
-        self.folder.miss(error.to_string());
+        self.folder.gone = Some(error.to_string());
     }
 
     /// Why a calibration that is put in force again would be refused today for want of a signature, where signatures are

@@ -93,7 +93,8 @@ impl Store {
         folder::make_folder(folder).map_err(unusable)?;
         // Taken before anything else is touched: the files may be another instance's.
         let lock = Lock::take(folder)?;
-        let being_begun_anew = log::was_being_begun_anew(folder);
+        // A crash came between putting a full file aside and beginning a new one: nothing is lost, though there is none.
+        let being_begun_anew = folder::is_half_written(folder, log::NAME);
         folder::sweep(folder).map_err(unusable)?;
         let documents = BlobStore::open(folder.join("documents"))?;
         let overlays = BlobStore::open(folder.join("overlays"))?;
@@ -108,16 +109,16 @@ impl Store {
         if has_older || (opened.entries == 0 && kept > 0) {
             mark.lose(folder).map_err(unmarked)?;
             // The numbers of what is lost are missed.
-            index.next_number =
-                index.next_number.max(Mark::last_entry(folder).unwrap_or(0).saturating_add(1));
+            index.last_number = index.last_number.max(Mark::last_entry(folder).unwrap_or(0));
             let (folder, floor) = (folder.to_owned(), mark.floor);
             opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
         // The last line alone may be missing after a crash in mid-write.
-        } else if let Some(written) = Mark::last_entry(folder).filter(|written| *written > index.next_number)
+        } else if let Some(written) =
+            Mark::last_entry(folder).filter(|written| *written > index.next_number())
         {
             mark.lose(folder).map_err(unmarked)?;
-            opened.cut = Some(Cut { last: index.next_number - 1, written, floor: mark.floor });
-            index.next_number = written.saturating_add(1);
+            opened.cut = Some(Cut { last: index.last_number, written, floor: mark.floor });
+            index.last_number = written;
         } else if index.highest() > 0 {
             mark.reserve(folder, index.highest()).map_err(unmarked)?;
         }
@@ -178,7 +179,10 @@ impl Store {
     ///
     /// # Errors
     /// As [`Self::put_document`]; some may be kept then.
-    pub fn put_documents(&mut self, documents: &[(Digest, CompressedBytes)]) -> Result<(), StoreError> {
+    pub(crate) fn put_documents(
+        &mut self,
+        documents: &[(Digest, CompressedBytes)],
+    ) -> Result<(), StoreError> {
         self.write(|store| store.documents.put_all(documents))
     }
 
@@ -236,7 +240,7 @@ impl Store {
         {
             mark.reserve(path, highest).map_err(StoreError::write(path))?;
         }
-        let numbered = (self.index.next_number..).zip(entries);
+        let numbered = (self.index.next_number()..).zip(entries);
         let entries: Vec<_> =
             numbered.map(|(number, (unit, by, event))| entry(number, time, unit, by, event)).collect();
         match &mut self.journal {
@@ -259,9 +263,9 @@ impl Store {
             }
         }
         if let Journal::Folder { path, .. } = &self.journal {
-            Mark::note_entry(path, self.index.next_number.saturating_sub(1));
+            Mark::note_entry(path, self.index.last_number);
         }
-        Ok(self.index.next_number.saturating_sub(1))
+        Ok(self.index.last_number)
     }
 
     /// Refuses what would not survive a restart.
@@ -319,18 +323,18 @@ impl Store {
         overlays.into_iter().try_for_each(|bytes| of_overlays.put(bytes.as_ref()).map(drop))?;
         mark.write(&path).map_err(StoreError::write(&path))?;
         let mut log = Log::open(&path, &mut Opened::default(), &mut Index::default())?;
-        let (lines, next_number, chain) = self.carried_lines(time)?;
-        log.begin_anew(self.index.next_number.saturating_sub(1), &lines, chain)?;
-        self.index.next_number = next_number;
+        let (lines, last_number, chain) = self.carried_lines(time)?;
+        log.begin_anew(self.index.last_number, &lines, chain)?;
+        self.index.last_number = last_number;
         [self.documents, self.overlays] = shelves;
         self.journal = Journal::Folder { path, log, lock, mark };
         self.write_failure = None;
         Ok(true)
     }
 
-    /// What a new audit file begins with, the number behind it, and the chain there.
+    /// What a new audit file begins with, the number of its last entry, and the chain there.
     fn carried_lines(&self, time: SystemTime) -> Result<(String, u64, Chain), StoreError> {
-        let mut number = self.index.next_number;
+        let mut number = self.index.last_number;
         let mut lines = String::new();
         let mut chain = match &self.journal {
             Journal::Folder { log, .. } => log.chain,
@@ -338,8 +342,8 @@ impl Store {
         };
         chain.begin_file();
         for (unit, event) in self.index.carried() {
-            lines.push_str(&chain.line(&entry(number, time, unit, "", event))?);
             number = number.saturating_add(1);
+            lines.push_str(&chain.line(&entry(number, time, unit, "", event))?);
         }
         Ok((lines, number, chain))
     }
@@ -361,9 +365,9 @@ impl Store {
         }
         let (lines, number, chain) = self.carried_lines(time)?;
         let Journal::Folder { log, .. } = &mut self.journal else { return Ok(()) };
-        match log.begin_anew(self.index.next_number.saturating_sub(1), &lines, chain) {
+        match log.begin_anew(self.index.last_number, &lines, chain) {
             Ok(()) => {
-                self.index.next_number = number;
+                self.index.last_number = number;
                 (self.stuck, self.prune_due) = (false, true);
                 Ok(())
             }

@@ -22,10 +22,14 @@ mod states;
 mod worker;
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use isotherm_protocol::digest::Digest;
+
+use crate::config::FolderSettings;
 
 use self::events::FsEvents;
 use self::signals::Signals;
@@ -36,10 +40,12 @@ pub(crate) use self::folder::{files_in, read_document};
 
 /// How long an ending waits for the thread, which a dead network share may hold.
 const STOP_LIMIT: Duration = Duration::from_secs(1);
+/// How often it looks whether the thread has ended.
+const STOP_INTERVAL: Duration = Duration::from_millis(1);
 
 /// What has become of a document, or of the folder. Names of files are the folder's joined with the file's own.
-#[derive(Clone, PartialEq, Eq)]
-pub enum FolderEvent {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum FolderEvent {
     /// A file has a content that is not the one told last, or is back with any content after it was unreadable or
     /// removed. A renamed file is changed under its new name first, and removed under its old one after the grace time.
     Changed {
@@ -48,8 +54,6 @@ pub enum FolderEvent {
         /// Its content; of a longer file, one byte more than a document may have
         /// ([`MAX_DOCUMENT_BYTES`](isotherm_protocol::document::MAX_DOCUMENT_BYTES)).
         bytes: Vec<u8>,
-        /// SHA-256 of `bytes`.
-        digest: [u8; 32],
     },
     /// A file cannot be read: no permission, a loop of links, a pipe, a folder in its place. Told once per reason.
     Unreadable {
@@ -80,69 +84,26 @@ pub enum FolderEvent {
     Hearing,
 }
 
-impl fmt::Debug for FolderEvent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            // A megabyte of numbers helps nobody.
-            Self::Changed { file, bytes, .. } => {
-                write!(f, "Changed({}, {} bytes)", file.display(), bytes.len())
-            }
-            Self::Unreadable { file, reason } => write!(f, "Unreadable({}, {reason})", file.display()),
-            Self::Removed { file } => write!(f, "Removed({})", file.display()),
-            Self::FolderGone { reason } => write!(f, "FolderGone({reason})"),
-            Self::FolderBack => f.write_str("FolderBack"),
-            Self::Deaf { reason } => write!(f, "Deaf({reason})"),
-            Self::Hearing => f.write_str("Hearing"),
-        }
-    }
-}
-
 /// What the owner knows of a file before the watcher starts, so that nothing is told twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Known {
+pub(crate) enum Known {
     /// It was read: SHA-256 of its bytes, cut as those of [`FolderEvent::Changed`]. Whether it was a good document does
     /// not matter.
-    Content([u8; 32]),
+    Content(Digest),
     /// It was found and could not be read.
     Unreadable,
 }
 
-/// How the folder is watched. Durations outside 1 ms to 1 day are taken as the nearer end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WatchSettings {
-    /// How long a file must stay the same before it is read. One that never does is read after twenty times as long,
-    /// as it is at that moment.
-    pub settle: Duration,
-    /// Distance of the looks that no event asked for. At each of them up to 64 files whose state has not changed are
-    /// read and compared, in turn.
-    pub poll: Duration,
-    /// Whether events of the file system are listened to. Without them everything is found by the poll.
-    pub events: bool,
-}
-
-impl Default for WatchSettings {
-    fn default() -> Self {
-        Self { settle: Duration::from_millis(150), poll: Duration::from_secs(5), events: true }
-    }
-}
-
-impl WatchSettings {
-    /// With every duration in its range.
-    fn bounded(self) -> Self {
-        let bounded = |time: Duration| time.clamp(Duration::from_millis(1), Duration::from_secs(86_400));
-        Self { settle: bounded(self.settle), poll: bounded(self.poll), events: self.events }
-    }
-
-    /// How long a file, or the folder, may be gone without being called so.
-    fn grace(&self) -> Duration {
-        self.settle * 2
-    }
+/// How long a file, or the folder, may be gone without being called so.
+fn grace(settings: &FolderSettings) -> Duration {
+    settings.settle * 2
 }
 
 /// A watched folder. Ends with its thread when it is dropped.
 #[derive(Debug)]
-pub struct Watcher {
+pub(crate) struct Watcher {
     signals: Arc<Signals>,
+    thread: JoinHandle<()>,
 }
 
 impl Watcher {
@@ -156,9 +117,9 @@ impl Watcher {
     /// Where the system gives no thread. A folder that cannot be read is none: it is told as
     /// [`FolderEvent::FolderGone`], and watched when it appears. Where the system grants no events, a warning is logged
     /// and the poll does all of the work.
-    pub fn start(
+    pub(crate) fn start(
         folder: &Path,
-        settings: WatchSettings,
+        settings: FolderSettings,
         known: BTreeMap<PathBuf, Known>,
         sink: impl Fn(FolderEvent) + Send + 'static,
     ) -> std::io::Result<Self> {
@@ -168,48 +129,43 @@ impl Watcher {
     /// The same with another source of events.
     fn start_with(
         folder: &Path,
-        settings: WatchSettings,
+        settings: FolderSettings,
         known: BTreeMap<PathBuf, Known>,
         sink: impl Fn(FolderEvent) + Send + 'static,
         listener: events::MakeListener,
     ) -> std::io::Result<Self> {
-        let settings = settings.bounded();
         let signals = Arc::new(Signals::default());
-        let events =
-            settings.events.then(|| FsEvents::new(folder, settings.poll, Arc::clone(&signals), listener));
-        let (states, folder) = (FileStates::new(settings, known), folder.to_owned());
-        let work = Worker::new(folder, settings, Arc::clone(&signals), events, states, sink);
-        std::thread::Builder::new().name("isotherm-watcher".to_owned()).spawn(move || work.run())?;
-        Ok(Self { signals })
+        let events = FsEvents::new(folder, settings.poll, Arc::clone(&signals), listener);
+        let states = FileStates::new(settings, known);
+        let work = Worker::new(folder, settings, (Arc::clone(&signals), events), states, sink);
+        let thread = std::thread::Builder::new().name("isotherm-watcher".to_owned());
+        Ok(Self { signals, thread: thread.spawn(move || work.run())? })
     }
 
     /// Has every file read and compared with what was told of it, soon.
-    pub fn reread(&self) {
-        self.signals.reread();
-    }
-
-    /// Whether the thread is at work. It ends before [`Watcher::stop`] only where the sink panics.
-    #[must_use]
-    pub fn is_running(&self) -> bool {
-        !self.signals.has_ended()
+    pub(crate) fn reread(&self) {
+        self.signals.give(|heard| heard.reread = true);
     }
 
     /// Ends the watching; whether the thread ended within a second. One that a dead network share or the sink holds is
     /// left behind, and ends when it is let go.
-    #[must_use]
-    pub fn stop(self) -> bool {
-        self.signals.stop();
-        self.signals.wait_for_end(STOP_LIMIT)
+    pub(crate) fn stop(self) -> bool {
+        self.end()
+    }
+
+    fn end(&self) -> bool {
+        self.signals.give(|heard| heard.stop = true);
+        let limit = Instant::now() + STOP_LIMIT;
+        while !self.thread.is_finished() && Instant::now() < limit {
+            std::thread::sleep(STOP_INTERVAL);
+        }
+        self.thread.is_finished()
     }
 }
 
 impl Drop for Watcher {
     fn drop(&mut self) {
-        if self.signals.stopping() {
-            return;
-        }
-        self.signals.stop();
-        if !self.signals.wait_for_end(STOP_LIMIT) {
+        if !self.signals.stopping() && !self.end() {
             tracing::warn!(
                 "the watcher of the calibration folder did not end within {STOP_LIMIT:?} and is abandoned"
             );

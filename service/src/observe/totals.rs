@@ -60,41 +60,31 @@ impl Totals {
     /// The exit code that these totals stand for.
     #[must_use]
     pub fn exit(&self) -> Exit {
-        if self.lost() { Exit::DataLoss } else { Exit::Ok }
+        Exit::of_loss(self.lost())
     }
 
     /// A table for people.
     #[must_use]
     pub fn table(&self) -> String {
-        let head = [
-            "unit",
-            "ticks in",
-            "ticks out",
-            "gaps",
-            "missed",
-            "refused",
-            "bad",
-            "unpublished",
-            "alarms",
-            "added p50 µs",
-            "added p99 µs",
-        ];
-        let row = |(unit, totals): (&String, &UnitTotals)| {
-            let counts = [
-                totals.ticks_in,
-                totals.ticks_out,
-                totals.gaps,
-                totals.ticks_missed,
-                totals.ticks_refused,
-                totals.bad,
-                totals.unpublished,
-                totals.alarms,
-            ];
-            let latencies = [totals.added_latency_p50_ns, totals.added_latency_p99_ns];
-            let mut row = vec![unit.clone()];
-            row.extend(counts.iter().map(u64::to_string));
-            row.extend(latencies.iter().map(|ns| format!("{}.{}", ns / 1000, ns % 1000 / 100)));
-            row
+        let us = |ns: u64| format!("{}.{}", ns / 1000, ns % 1000 / 100);
+        let counts = |of: &UnitTotals| {
+            [
+                ("ticks in", of.ticks_in),
+                ("ticks out", of.ticks_out),
+                ("gaps", of.gaps),
+                ("missed", of.ticks_missed),
+                ("refused", of.ticks_refused),
+                ("bad", of.bad),
+                ("unpublished", of.unpublished),
+                ("alarms", of.alarms),
+            ]
+        };
+        let names = counts(&UnitTotals::default()).map(|(name, _)| name);
+        let head = ["unit"].into_iter().chain(names).chain(["added p50 µs", "added p99 µs"]);
+        let row = |(unit, of): (&String, &UnitTotals)| {
+            let counts = counts(of).map(|(_, count)| count.to_string());
+            let latencies = [us(of.added_latency_p50_ns), us(of.added_latency_p99_ns)];
+            std::iter::once(unit.clone()).chain(counts).chain(latencies).collect::<Vec<_>>()
         };
         let mut table = isotherm_cli::table(head, self.units.iter().map(row), 1..);
         let mut text = table.load_preset(presets::UTF8_HORIZONTAL_ONLY).to_string();

@@ -22,7 +22,7 @@ mod live;
 mod token;
 mod view;
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use isotherm_bus::DEFAULT_ENDPOINT;
@@ -32,7 +32,7 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::receive::intake::Intake;
+use crate::receive::intake::{Intake, lock};
 use guard::Guard;
 use isotherm_operator::client::Client;
 use isotherm_operator::status::unix_ms;
@@ -127,10 +127,6 @@ async fn feed(client: Arc<Client>, fleet: Arc<Mutex<Fleet>>) {
         }
         tokio::time::sleep(PAUSE).await;
     }
-}
-
-fn lock(fleet: &Mutex<Fleet>) -> MutexGuard<'_, Fleet> {
-    fleet.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What a command has to be told to reach a service that listens there.

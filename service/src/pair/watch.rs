@@ -15,9 +15,8 @@ use zenoh::{Session, Wait};
 
 use super::{Pair, Questions};
 use crate::ServiceError;
-use crate::receive::fault::FaultKind;
 use crate::receive::intake::Intake;
-use crate::receive::unit::{Alarm, Wants};
+use crate::receive::unit::Wants;
 use crate::service::declare::subscribe;
 
 /// How often the units are looked at where no other instance is there.
@@ -209,10 +208,8 @@ impl Work {
             if memory {
                 self.questions.memory(unit.clone());
             }
-            match alarm {
-                Some(Alarm::OtherBits(words)) => self.intake.alarm(FaultKind::OtherBits, words),
-                Some(Alarm::TwoSpeak(words)) => self.intake.alarm(FaultKind::TwoSpeak, words),
-                None => {}
+            if let Some((kind, words)) = alarm {
+                self.intake.alarm(kind, words);
             }
             if spoke {
                 spoken.push(unit.to_string());

@@ -1,11 +1,11 @@
 //! Faults of the input and of the service itself: counted by kind; the first of a kind is logged, and then their number.
 
-use std::fmt;
 use std::time::{Duration, Instant, SystemTime};
 
 use isotherm_protocol::codec::CodecError;
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::status::{Counter, Fault};
+use thiserror::Error;
 
 /// Declares the kinds once, so that kind, counter name and documentation cannot drift apart.
 macro_rules! kinds {
@@ -66,8 +66,7 @@ kinds! {
 
 impl FaultKind {
     /// Whether a message was refused.
-    #[must_use]
-    pub fn is_refusal(self) -> bool {
+    pub(crate) fn is_refusal(self) -> bool {
         use FaultKind as K;
 
         !matches!(self, K::Unpublished | K::Alarm | K::OtherBits | K::TwoSpeak | K::TwoProducers | K::Unfit)
@@ -103,34 +102,19 @@ impl From<&CodecError> for FaultKind {
 const SILENCE: Duration = Duration::from_secs(60);
 
 /// What is to be logged of a fault.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Telling {
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(crate) enum Telling {
     /// The first of its kind, in words.
+    #[error("{0}; further ones are only counted")]
     First(String),
     /// It goes on.
+    #[error("{count} more in the last {} s", since.as_secs())]
     Again {
         /// How many since it was last told of.
         count: u64,
         /// How long ago that was.
         since: Duration,
     },
-}
-
-impl Telling {
-    /// Whether it is the first of its kind.
-    #[must_use]
-    pub fn is_first(&self) -> bool {
-        matches!(self, Self::First(_))
-    }
-}
-
-impl fmt::Display for Telling {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::First(words) => write!(f, "{words}; further ones are only counted"),
-            Self::Again { count, since } => write!(f, "{count} more in the last {} s", since.as_secs()),
-        }
-    }
 }
 
 /// One kind of fault so far.
@@ -146,7 +130,7 @@ struct Kind {
 
 /// Counts faults and remembers the first of each kind in words.
 #[derive(Debug, Clone, Default)]
-pub struct FaultLog {
+pub(crate) struct FaultLog {
     /// None before the first fault, for most units have none; then every kind.
     kinds: Vec<Kind>,
     last: Option<FaultKind>,
@@ -155,7 +139,12 @@ pub struct FaultLog {
 impl FaultLog {
     /// Counts `count` faults of a kind; what is to be logged of it: the first one, and while it goes on the number of
     /// further ones once a minute.
-    pub fn note(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) -> Option<Telling> {
+    pub(crate) fn note(
+        &mut self,
+        kind: FaultKind,
+        count: u64,
+        words: impl FnOnce() -> String,
+    ) -> Option<Telling> {
         self.note_at(Instant::now(), kind, count, words)
     }
 
@@ -188,27 +177,23 @@ impl FaultLog {
     }
 
     /// How many of a kind.
-    #[must_use]
-    pub fn count(&self, kind: FaultKind) -> u64 {
+    pub(crate) fn count(&self, kind: FaultKind) -> u64 {
         self.kinds.get(kind as usize).map_or(0, |kind| kind.count)
     }
 
     /// Messages that were refused, of whatever kind.
-    #[must_use]
-    pub fn refused(&self) -> u64 {
+    pub(crate) fn refused(&self) -> u64 {
         FaultKind::ALL.iter().filter(|kind| kind.is_refusal()).map(|kind| self.count(*kind)).sum()
     }
 
     /// The last fault of a kind not seen before, in words.
-    #[must_use]
-    pub fn last(&self) -> Option<&str> {
+    pub(crate) fn last(&self) -> Option<&str> {
         let kind = self.kinds.get(self.last? as usize)?;
         Some(&kind.first)
     }
 
     /// The kinds that occurred, each with the first of its kind in words.
-    #[must_use]
-    pub fn faults(&self) -> Vec<Fault> {
+    pub(crate) fn faults(&self) -> Vec<Fault> {
         let occurred = FaultKind::ALL.iter().zip(&self.kinds).filter(|(_, entry)| entry.count > 0);
         let fault = |(kind, entry): (&FaultKind, &Kind)| {
             let since = entry.last.and_then(|last| last.duration_since(SystemTime::UNIX_EPOCH).ok());
@@ -223,7 +208,7 @@ impl FaultLog {
     }
 
     /// The kinds that occurred, as counters.
-    pub fn counters(&self) -> impl Iterator<Item = Counter> + '_ {
+    pub(crate) fn counters(&self) -> impl Iterator<Item = Counter> + '_ {
         let occurred = FaultKind::ALL.iter().filter(|kind| self.count(**kind) > 0);
         occurred.map(|kind| Counter { name: kind.name().to_owned(), value: self.count(*kind) })
     }
@@ -243,9 +228,8 @@ mod tests {
     #[test]
     fn a_repeated_fault_is_counted_and_not_repeated() {
         let mut log = FaultLog::default();
-        assert!(
-            log.note(FaultKind::Checksum, 1, || "first".to_owned()).is_some_and(|telling| telling.is_first())
-        );
+        let first = log.note(FaultKind::Checksum, 1, || "first".to_owned());
+        assert_eq!(first, Some(Telling::First("first".to_owned())));
         assert_eq!(log.note(FaultKind::Checksum, 1, || unreachable!()), None);
         assert!(log.note(FaultKind::Unpublished, 5, || "second".to_owned()).is_some());
         assert_eq!((log.count(FaultKind::Checksum), log.refused()), (2, 2));

@@ -160,8 +160,7 @@ impl Intake {
     }
 
     /// Faults that belong to no unit.
-    #[must_use]
-    pub fn faults(&self) -> Vec<Fault> {
+    pub(crate) fn faults(&self) -> Vec<Fault> {
         lock(&self.faults).faults()
     }
 
@@ -205,8 +204,7 @@ impl Intake {
     }
 
     /// What a unit is like at this moment; `None` where it has not appeared.
-    #[must_use]
-    pub fn present(&self, unit: &UnitId) -> Option<Present> {
+    pub(crate) fn present(&self, unit: &UnitId) -> Option<Present> {
         self.with(unit, |actor| actor.present())
     }
 
@@ -234,8 +232,7 @@ impl Intake {
     }
 
     /// Status of one unit; `instance` is the service's name for itself.
-    #[must_use]
-    pub fn status(&self, unit: &UnitId, instance: &str) -> Option<Status> {
+    pub(crate) fn status(&self, unit: &UnitId, instance: &str) -> Option<Status> {
         self.with(unit, |actor| actor.status(instance))
     }
 

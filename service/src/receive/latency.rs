@@ -37,8 +37,7 @@ impl Histogram {
     }
 
     /// Sum of all that were counted (ns).
-    #[must_use]
-    pub fn sum_ns(&self) -> u64 {
+    pub(crate) fn sum_ns(&self) -> u64 {
         self.sum
     }
 

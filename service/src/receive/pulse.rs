@@ -4,12 +4,12 @@
 //! although the others go on. And where no message is in hand, one of the threads is asked for a sign, so that a service to which
 //! nobody sends counts as alive, and one whose threads hang before they have taken a message does not.
 
-use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use isotherm_bus::threads::on_receive_thread;
+use thiserror::Error;
 use zenoh::qos::CongestionControl;
 
 /// Messages that can be seen in hand at a time; Zenoh has two receive threads unless it is told otherwise.
@@ -20,29 +20,14 @@ const LIMIT: Duration = Duration::from_secs(2);
 const LIMIT_BLOCKING: Duration = Duration::from_secs(30);
 
 /// Why the receive path does not count as alive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Stuck {
     /// A message has been in hand for so long.
+    #[error("the receive path hangs: one message has taken {:.1} s", .0.as_secs_f64())]
     Message(Duration),
     /// The receive threads have given no sign for so long.
+    #[error("the receive path hangs: its threads have not answered for {:.1} s", .0.as_secs_f64())]
     Threads(Duration),
-}
-
-impl fmt::Display for Stuck {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Message(since) => {
-                write!(f, "the receive path hangs: one message has taken {:.1} s", since.as_secs_f64())
-            }
-            Self::Threads(since) => {
-                write!(
-                    f,
-                    "the receive path hangs: its threads have not answered for {:.1} s",
-                    since.as_secs_f64()
-                )
-            }
-        }
-    }
 }
 
 /// What is seen of the receive path. Times are ns since `start`, 0 where there is none.

@@ -23,7 +23,7 @@ use isotherm_protocol::stream::UnitStream;
 use crate::control::change::Change;
 use crate::control::revision::Plan;
 use crate::control::{Inbox, Notice};
-use crate::receive::fault::{FaultKind, FaultLog};
+use crate::receive::fault::{FaultKind, FaultLog, Telling};
 use crate::receive::latency::Histogram;
 use arrivals::Arrivals;
 use journal_writer::JournalWriter;
@@ -31,11 +31,10 @@ use notices::NoticeCollector;
 use speech::Speech;
 
 pub(crate) use account::SwapAccount;
-pub use arrivals::StreamTimeoutSettings;
 pub use journal_writer::{Journal, JournalOutlet};
-pub use present::Present;
+pub(crate) use present::Present;
 pub(crate) use seen::TickSeen;
-pub(crate) use speech::{Alarm, Footing, Standing, Wants};
+pub(crate) use speech::{Footing, Standing, Wants};
 use unknown_channels::UnknownChannels;
 
 /// Where corrected frames go; `Err` is an output that could not be published.
@@ -84,19 +83,14 @@ impl std::fmt::Debug for UnitActor {
 impl UnitActor {
     /// A unit that has seen nothing and has no calibration.
     #[must_use]
-    pub fn new(
-        id: UnitId,
-        settings: UnitSettings,
-        stream_timeout: StreamTimeoutSettings,
-        outlet: Outlet,
-    ) -> Self {
+    pub fn new(id: UnitId, settings: UnitSettings, tail_flush: Duration, outlet: Outlet) -> Self {
         Self {
             stream: UnitStream::new(id, settings),
             plan: Plan::default(),
             outlet,
             faults: FaultLog::default(),
             latency: Histogram::default(),
-            arrivals: Arrivals::new(stream_timeout, Instant::now()),
+            arrivals: Arrivals::new(tail_flush, pairing_window(&settings), Instant::now()),
             unknown_channels: UnknownChannels::default(),
             notices: NoticeCollector::default(),
             journal_writer: JournalWriter::default(),
@@ -261,7 +255,7 @@ impl UnitActor {
     /// Counts a fault, and logs the first of its kind; of those that follow, their number once a minute.
     fn fault(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) {
         let Some(telling) = self.faults.note(kind, count, words) else { return };
-        self.status_due |= telling.is_first();
+        self.status_due |= matches!(telling, Telling::First(_));
         tracing::warn!(unit = %self.stream.id(), kind = kind.name(), "{telling}");
     }
 
@@ -306,8 +300,7 @@ impl UnitActor {
     }
 
     /// What the unit is like at this moment.
-    #[must_use]
-    pub fn present(&self) -> Present {
+    pub(crate) fn present(&self) -> Present {
         Present::of(self.stream.unit())
     }
 
@@ -318,8 +311,7 @@ impl UnitActor {
     }
 
     /// Sequence number of the last tick that was corrected under the calibration in force.
-    #[must_use]
-    pub fn last_sequence(&self) -> Option<u64> {
+    pub(crate) fn last_sequence(&self) -> Option<u64> {
         self.stream.unit().observation().map(|seen| seen.sequence)
     }
 
@@ -329,8 +321,7 @@ impl UnitActor {
     }
 
     /// What the unit is doing, and what becomes of its ticks.
-    #[must_use]
-    pub fn doing(&self) -> (status::State, Output) {
+    pub(crate) fn doing(&self) -> (status::State, Output) {
         let unit = self.stream.unit();
         let output = match (unit.calibration(), unit.settings().uncalibrated) {
             (Some(_), _) => Output::Calibrated,
@@ -341,28 +332,29 @@ impl UnitActor {
     }
 
     /// How long no good frame has come.
-    #[must_use]
-    pub fn silence(&self, now: Instant) -> Duration {
+    pub(crate) fn silence(&self, now: Instant) -> Duration {
         now.saturating_duration_since(self.heard)
     }
 
     /// Whether frames come.
-    #[must_use]
-    pub fn is_heard(&self, now: Instant) -> bool {
+    pub(crate) fn is_heard(&self, now: Instant) -> bool {
         self.silence(now) < LONGEST_SILENCE
     }
 
     /// Whether something goes on whose progress should be seen more often than once a status interval.
-    #[must_use]
-    pub fn is_in_progress(&self) -> bool {
+    pub(crate) fn is_in_progress(&self) -> bool {
         matches!(self.stream.unit().state(), State::SelfTest | State::PreLaunchCalibration)
     }
 
     /// Serial of the unit.
-    #[must_use]
-    pub fn id(&self) -> &UnitId {
+    pub(crate) fn id(&self) -> &UnitId {
         self.stream.id()
     }
+}
+
+/// How long a unit's gyro tick waits for its accelerometer tick.
+pub(crate) fn pairing_window(settings: &UnitSettings) -> Duration {
+    Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs())
 }
 
 #[cfg(test)]

@@ -51,18 +51,18 @@ impl Declared {
         let alive = key::service_alive(&session.zid().to_string());
         let own = session.liveliness().declare_token(alive).await;
         let own = own.map_err(|source| ServiceError::Declare { key: key::ALL_SERVICES_ALIVE, source })?;
-        let ask = |asked| {
-            let bell = bell.clone();
-            move |query| bell.ask(asked, query)
-        };
         let mut queryables = orders(session, inbox).await?;
-        queryables.extend([
-            answer(session, key::ALL_CONFIGURATIONS, ask(Asked::Configuration)).await?,
-            answer(session, key::ALL_JOURNALS, ask(Asked::Memory)).await?,
-            answer(session, key::ALL_PAIRS, ask(Asked::Pair)).await?,
-            answer(session, key::ALL_SERVICE_STATUS, ask(Asked::Status)).await?,
-            answer(session, key::ALL_STATUS, ask(Asked::Status)).await?,
-        ]);
+        for (key, asked) in [
+            (key::ALL_CONFIGURATIONS, Asked::Configuration),
+            (key::ALL_JOURNALS, Asked::Memory),
+            (key::ALL_PAIRS, Asked::Pair),
+            (key::ALL_SERVICE_STATUS, Asked::Status),
+            (key::ALL_STATUS, Asked::Status),
+        ] {
+            let bell = bell.clone();
+            let take = move |query| bell.ask(asked, query);
+            queryables.push(answer(session, key, Locality::Any, take).await?);
+        }
         // Whoever sees it may ask.
         let member = session.liveliness().declare_token(pair.me().token()).await;
         let member = member.map_err(|source| ServiceError::Declare { key: key::ALL_MEMBERS, source })?;
@@ -207,20 +207,12 @@ async fn orders(session: &Session, inbox: &Inbox) -> Result<Vec<Queryable<()>>, 
     ] {
         let inbox = inbox.clone();
         let take = move |query| inbox.ask(asked, query, origin);
-        queryables.push(answer_from(session, key, from, take).await?);
+        queryables.push(answer(session, key, from, take).await?);
     }
     Ok(queryables)
 }
 
 async fn answer(
-    session: &Session,
-    key: &'static str,
-    callback: impl Fn(Query) + Send + Sync + 'static,
-) -> Result<Queryable<()>, ServiceError> {
-    answer_from(session, key, Locality::Any, callback).await
-}
-
-async fn answer_from(
     session: &Session,
     key: &'static str,
     from: Locality,

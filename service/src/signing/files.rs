@@ -16,7 +16,7 @@ const NEW_FILE: u32 = 0o666;
 ///
 /// A symbolic link stays one, its target is replaced. Permissions are kept, the owner too where the caller may give
 /// files away. Whatever happens on the way, the old file or the new one is there in whole.
-pub(super) fn replace(path: &Path, text: &str) -> io::Result<()> {
+pub(crate) fn replace(path: &Path, text: &str) -> io::Result<()> {
     let target = match path.canonicalize() {
         Err(error) if error.kind() == ErrorKind::NotFound && !path.is_symlink() => path.to_owned(),
         target => target?,

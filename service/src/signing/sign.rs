@@ -61,6 +61,9 @@ struct Outcome {
     failure: Option<String>,
     problems: Vec<Problem>,
     warnings: Vec<Problem>,
+    /// The signed text, where the document is good.
+    #[serde(skip)]
+    text: Option<String>,
 }
 
 /// Signs the files and says what became of each.
@@ -85,17 +88,11 @@ pub fn run(args: &SignArgs) -> Exit {
         }
     };
     let existing = if args.replace { Existing::Replace } else { Existing::Refuse };
-    let mut prepared: Vec<_> = args
-        .files
-        .iter()
-        .map(|file| prepare(file, args.output.as_deref().unwrap_or(file), &key, existing))
-        .collect();
-    if prepared.iter().all(|(_, text)| text.is_some()) {
-        for (outcome, text) in &mut prepared {
-            write(outcome, text.as_deref().unwrap_or_default());
-        }
+    let prepare = |file| prepare(file, args.output.as_deref().unwrap_or(file), &key, existing);
+    let mut outcomes: Vec<_> = args.files.iter().map(|file| prepare(file)).collect();
+    if outcomes.iter().all(|outcome| outcome.text.is_some()) {
+        outcomes.iter_mut().for_each(write);
     }
-    let outcomes: Vec<_> = prepared.into_iter().map(|(outcome, _)| outcome).collect();
     report(&outcomes, key.public().id(), args.json)
 }
 
@@ -115,7 +112,7 @@ fn kept(args: &SignArgs, output: &Path) -> Option<String> {
 }
 
 /// Validates one document and signs its text, without writing it yet.
-fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> (Outcome, Option<String>) {
+fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> Outcome {
     let mut outcome = Outcome {
         file: file.display().to_string(),
         output: output.display().to_string(),
@@ -123,13 +120,11 @@ fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> 
     };
     let bytes = match read_bounded(file) {
         Ok(bytes) => bytes,
-        Err(error) => {
-            return (Outcome { failure: Some(format!("cannot be read: {error}")), ..outcome }, None);
-        }
+        Err(error) => return Outcome { failure: Some(format!("cannot be read: {error}")), ..outcome },
     };
     let text = match text(&bytes, Some(&outcome.file)) {
         Ok(text) => text,
-        Err(problems) => return (Outcome { problems, ..outcome }, None),
+        Err(problems) => return Outcome { problems, ..outcome },
     };
     let signed = match signature::sign(text, key, existing) {
         Ok(signed) => Some(signed),
@@ -151,8 +146,7 @@ fn prepare(file: &Path, output: &Path, key: &PrivateKey, existing: Existing) -> 
         }
         Err(problems) => outcome.problems.extend(problems),
     }
-    let is_good = outcome.problems.is_empty();
-    (outcome, signed.filter(|_| is_good))
+    Outcome { text: signed.filter(|_| outcome.problems.is_empty()), ..outcome }
 }
 
 /// Unit and warnings of a document, or of an overlay. Whether an overlay fits its document is seen where both are.
@@ -163,17 +157,18 @@ fn unit_and_warnings(text: &str, file: &str) -> Result<(String, Vec<Problem>), V
     Document::parse(text, Some(file)).map(|parsed| (parsed.document.unit, parsed.warnings))
 }
 
-fn write(outcome: &mut Outcome, text: &str) {
-    match files::replace(Path::new(&outcome.output), text) {
+fn write(outcome: &mut Outcome) {
+    match files::replace(Path::new(&outcome.output), outcome.text.as_deref().unwrap_or_default()) {
         Ok(()) => outcome.signed = true,
         Err(error) => outcome.failure = Some(format!("cannot write {}: {error}", outcome.output)),
     }
 }
 
 fn report(outcomes: &[Outcome], key_id: KeyId, json: bool) -> Exit {
-    let exit = verdict(outcomes);
+    let signed = outcomes.iter().all(|outcome| outcome.signed);
+    let is_bad = outcomes.iter().any(|outcome| !outcome.problems.is_empty());
+    let exit = if signed { Exit::Ok } else { Exit::blaming(false, is_bad) };
     if json {
-        let signed = exit == Exit::Ok;
         let report = serde_json::json!({ "signed": signed, "key_id": key_id, "files": outcomes });
         return print(&isotherm_cli::json(&report), exit);
     }
@@ -199,14 +194,4 @@ fn in_words(outcome: &Outcome, key_id: KeyId) -> String {
         outcome.unit.as_deref().unwrap_or_default(),
         outcome.digest.as_deref().and_then(|digest| digest.get(..16)).unwrap_or_default()
     )
-}
-
-fn verdict(outcomes: &[Outcome]) -> Exit {
-    if outcomes.iter().any(|outcome| !outcome.problems.is_empty()) {
-        Exit::BadConfiguration
-    } else if outcomes.iter().all(|outcome| outcome.signed) {
-        Exit::Ok
-    } else {
-        Exit::Failed
-    }
 }

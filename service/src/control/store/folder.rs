@@ -103,15 +103,15 @@ impl Mark {
         if revision <= self.reserved {
             return Ok(());
         }
-        let next = Self { reserved: revision.saturating_add(AHEAD), ..*self };
-        next.write(folder)?;
-        *self = next;
-        Ok(())
+        self.turn_into(folder, Self { reserved: revision.saturating_add(AHEAD), ..*self })
     }
 
     /// The audit file was lost: no number that may have been given is given again.
     pub(super) fn lose(&mut self, folder: &Path) -> io::Result<()> {
-        let next = Self { floor: self.floor.max(self.reserved), ..*self };
+        self.turn_into(folder, Self { floor: self.floor.max(self.reserved), ..*self })
+    }
+
+    fn turn_into(&mut self, folder: &Path, next: Self) -> io::Result<()> {
         next.write(folder)?;
         *self = next;
         Ok(())

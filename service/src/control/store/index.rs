@@ -18,7 +18,7 @@ const MAX_SETS: usize = 1000;
 const MAX_FILES: usize = 4096;
 
 /// What holds, by the entries so far.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Index {
     units: BTreeMap<UnitId, OfUnit>,
     /// What was last seen in each file of the watched folder.
@@ -27,8 +27,8 @@ pub(super) struct Index {
     rivals: BTreeMap<String, Digest>,
     /// Revisions up to this one were given by an audit file that is lost.
     pub(super) floor: u64,
-    /// Number of the next entry.
-    pub(super) next_number: u64,
+    /// Number of the last entry; 0 where there is none.
+    pub(super) last_number: u64,
 }
 
 /// What was last seen in a file of the watched folder.
@@ -74,22 +74,10 @@ impl TakenCommand {
     }
 }
 
-impl Default for Index {
-    fn default() -> Self {
-        Self {
-            units: BTreeMap::new(),
-            files: BTreeMap::new(),
-            rivals: BTreeMap::new(),
-            floor: 0,
-            next_number: 1,
-        }
-    }
-}
-
 impl Index {
     /// Takes an entry in; entries come in the order of their numbers.
     pub(super) fn apply(&mut self, entry: &AuditEntry) {
-        self.next_number = self.next_number.max(entry.number.saturating_add(1));
+        self.last_number = self.last_number.max(entry.number);
         let unit = entry.unit.as_deref().and_then(|unit| UnitId::new(unit).ok());
         match &entry.event {
             AuditEvent::Accepted(accepted) => {
@@ -168,11 +156,16 @@ impl Index {
     /// acceptance.
     pub(super) fn skip(&mut self, number: Option<u64>, acceptance: Option<(UnitId, u64)>) {
         // Whatever stood there had a number.
-        self.next_number = self.next_number.max(number.unwrap_or(self.next_number).saturating_add(1));
+        self.last_number = self.last_number.max(number.unwrap_or(self.next_number()));
         let Some((unit, revision)) = acceptance else { return };
         let of_unit = self.units.entry(unit).or_default();
         of_unit.highest_revision = of_unit.highest_revision.max(revision);
         of_unit.lose(revision);
+    }
+
+    /// Number of the next entry.
+    pub(super) fn next_number(&self) -> u64 {
+        self.last_number.saturating_add(1)
     }
 
     /// Units whose newest acceptance cannot be read, with its revision.
@@ -239,13 +232,12 @@ impl Index {
 /// What holds by the entries so far.
 impl Store {
     /// What an operator wants of a unit, by the commands that were carried out.
-    #[must_use]
-    pub fn intent(&self, unit: &UnitId) -> Option<&Intent> {
+    pub(crate) fn intent(&self, unit: &UnitId) -> Option<&Intent> {
         self.index.units.get(unit).map(|of_unit| &of_unit.intent)
     }
 
     /// Units that were ever given a calibration or a command.
-    pub fn units(&self) -> impl Iterator<Item = &UnitId> {
+    pub(crate) fn units(&self) -> impl Iterator<Item = &UnitId> {
         let forgotten = |of_unit: &OfUnit| of_unit.sets.is_empty() && of_unit.intent.is_empty();
         self.index.units.iter().filter(move |(_, of_unit)| !forgotten(of_unit)).map(|(unit, _)| unit)
     }
@@ -264,8 +256,7 @@ impl Store {
 
     /// The set that a rollback goes to: the newest before the last good one that corrects otherwise. Rollbacks are followed to
     /// the revision that they went back to, so that a second one goes further back instead of forth again.
-    #[must_use]
-    pub fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
+    pub(crate) fn previous(&self, unit: &UnitId) -> Option<&GoodSet> {
         let last = self.last_good(unit)?;
         let mut from = last;
         loop {
@@ -299,28 +290,19 @@ impl Store {
         self.index.units.get(unit).map_or(0, |of_unit| of_unit.highest_revision).max(self.index.floor)
     }
 
-    /// Digest of what was last seen in a file of the watched folder, accepted or refused.
-    #[must_use]
-    pub fn seen_in_folder(&self, path: &str) -> Option<Digest> {
-        self.index.files.get(path).map(|seen| seen.digest)
-    }
-
     /// Digest of what was last refused in a file of the watched folder, where nothing else was seen in it since.
-    #[must_use]
-    pub fn refused_in_folder(&self, path: &str) -> Option<Digest> {
+    pub(crate) fn refused_in_folder(&self, path: &str) -> Option<Digest> {
         self.index.files.get(path).filter(|seen| seen.refused).map(|seen| seen.digest)
     }
 
     /// Digest of what was last refused in a file of the watched folder because of another one that names its unit.
-    #[must_use]
-    pub fn rival_in_folder(&self, path: &str) -> Option<Digest> {
+    pub(crate) fn rival_in_folder(&self, path: &str) -> Option<Digest> {
         self.index.rivals.get(path).copied()
     }
 
     /// Digest of what the watched folder said for a unit last and was taken, under whatever name: the same again, under
     /// whatever name, is no swap.
-    #[must_use]
-    pub fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
+    pub(crate) fn said_by_folder(&self, unit: &UnitId) -> Option<Digest> {
         self.index.units.get(unit)?.folder
     }
 }

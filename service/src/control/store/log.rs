@@ -266,12 +266,6 @@ fn acceptance_in(line: &[u8]) -> Option<(UnitId, u64)> {
     Some((UnitId::new(unit).ok()?, digits.parse().ok()?))
 }
 
-/// Whether a crash came between putting a full file aside and beginning a new one: then there is no file to write to, and
-/// nothing is lost. To be asked before half-written files are swept away.
-pub(super) fn was_being_begun_anew(folder: &Path) -> bool {
-    files::is_half_written(folder, NAME)
-}
-
 /// Adds the line feed that is missing.
 fn complete(file: &mut File) -> io::Result<Torn> {
     Write::write_all(file, b"\n")?;

@@ -1,7 +1,8 @@
 //! What the audit file was found like.
 
-use std::fmt;
 use std::path::PathBuf;
+
+use thiserror::Error;
 
 /// Most damaged lines that are kept in words.
 const MAX_DAMAGES: usize = 16;
@@ -28,7 +29,12 @@ pub struct Opened {
 }
 
 /// A revision that was accepted, and cannot be put in force again because its line is damaged.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "unit {unit}: revision {revision} was accepted, but its line of the audit file is damaged: {}; put the newer \
+     document in force with `isotherm swap`",
+    instead(*in_its_place)
+)]
 pub struct LostRevision {
     /// Serial of the unit.
     pub unit: String,
@@ -39,7 +45,20 @@ pub struct LostRevision {
 }
 
 /// An audit file without entries beside documents that were accepted.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "the audit file of {folder} is empty, though {documents} document{} kept next to it: the history is lost; was the \
+     file emptied or removed? {}; check every unit, and restore what is missing with `isotherm swap` (documents: \
+     {folder}/documents). {}",
+    if *documents == 1 { " is" } else { "s are" },
+    if *has_older {
+        "Older sets, of the audit file before it, are in force"
+    } else {
+        "What was in force is unknown, and units begin with the folder of calibrations"
+    },
+    next_revision(*floor),
+    folder = folder.display()
+)]
 pub struct Emptied {
     /// The state folder.
     pub folder: PathBuf,
@@ -52,7 +71,13 @@ pub struct Emptied {
 }
 
 /// Entries whose lines are missing in the middle of an audit file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "{file}:{line}: {} missing before this line; if it was an acceptance, an older calibration may be in force than \
+     expected: check `isotherm status`",
+    entries(*first, *last),
+    file = file.display()
+)]
 pub struct Gap {
     /// The audit file.
     pub file: PathBuf,
@@ -65,7 +90,14 @@ pub struct Gap {
 }
 
 /// Entries that were written and are missing at the end of the audit file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are missing, and older \
+     calibrations may be in force than before. Check every unit, and restore what is missing with `isotherm swap`. \
+     Revisions continue from {}, so no number is used twice",
+    written - last,
+    floor.saturating_add(1)
+)]
 pub struct Cut {
     /// Number of the last entry that is there; 0 where there is none.
     pub last: u64,
@@ -76,7 +108,11 @@ pub struct Cut {
 }
 
 /// A line that was skipped; it stays in its file as it is.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "{file}:{line}: {words}; the line is skipped, and if it was an acceptance, the one before it is in force",
+    file = file.display()
+)]
 pub struct Damage {
     /// The audit file.
     pub file: PathBuf,
@@ -87,11 +123,13 @@ pub struct Damage {
 }
 
 /// A last line that was not written to its end.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Torn {
     /// Only the line feed was missing: the entry counts, the line feed was added.
+    #[error("the last line of the audit file had no line feed: it was added")]
     Completed,
     /// It was cut off the audit file.
+    #[error("the last line of the audit file was cut short: its {bytes} bytes are now in {to}", to = to.display())]
     Moved {
         /// The file that holds it now.
         to: PathBuf,
@@ -126,92 +164,23 @@ impl Opened {
     }
 }
 
-impl fmt::Display for LostRevision {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { unit, revision, in_its_place } = self;
-        write!(
-            f,
-            "unit {unit}: revision {revision} was accepted, but its line of the audit file is damaged: "
-        )?;
-        match in_its_place {
-            Some(older) => write!(f, "the older revision {older} is in force instead")?,
-            None => f.write_str("there is no older one to put in force")?,
-        }
-        f.write_str("; put the newer document in force with `isotherm swap`")
+/// What is in force in the place of a revision that is lost.
+fn instead(older: Option<u64>) -> String {
+    older.map_or_else(
+        || "there is no older one to put in force".to_owned(),
+        |older| format!("the older revision {older} is in force instead"),
+    )
+}
+
+/// Where revisions go on.
+fn next_revision(floor: u64) -> String {
+    match floor {
+        0 => "Revisions begin at 1 again".to_owned(),
+        floor => format!("Revisions continue from {}, so no number is used twice", floor.saturating_add(1)),
     }
 }
 
-impl fmt::Display for Emptied {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { folder, documents, has_older, floor } = self;
-        let folder = folder.display();
-        write!(
-            f,
-            "the audit file of {folder} is empty, though {documents} document{} kept next to it: the history is \
-             lost; was the file emptied or removed? ",
-            if *documents == 1 { " is" } else { "s are" }
-        )?;
-        f.write_str(if *has_older {
-            "Older sets, of the audit file before it, are in force; "
-        } else {
-            "What was in force is unknown, and units begin with the folder of calibrations; "
-        })?;
-        write!(
-            f,
-            "check every unit, and restore what is missing with `isotherm swap` (documents: {folder}/documents). "
-        )?;
-        match floor {
-            0 => f.write_str("Revisions begin at 1 again"),
-            floor => {
-                write!(f, "Revisions continue from {}, so no number is used twice", floor.saturating_add(1))
-            }
-        }
-    }
-}
-
-impl fmt::Display for Gap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, line, first, last } = self;
-        let entries = if first == last {
-            format!("entry {first} is")
-        } else {
-            format!("entries {first} to {last} are")
-        };
-        write!(f, "{}:{line}: {entries} missing before this line; if it was an acceptance", file.display())?;
-        f.write_str(", an older calibration may be in force than expected: check `isotherm status`")
-    }
-}
-
-impl fmt::Display for Cut {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { last, written, floor } = self;
-        write!(
-            f,
-            "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are \
-             missing, and older calibrations may be in force than before. Check every unit, and restore what is \
-             missing with `isotherm swap`. Revisions continue from {}, so no number is used twice",
-            written - last,
-            floor.saturating_add(1)
-        )
-    }
-}
-
-impl fmt::Display for Damage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}: {}; the line is skipped", self.file.display(), self.line, self.words)?;
-        f.write_str(", and if it was an acceptance, the one before it is in force")
-    }
-}
-
-impl fmt::Display for Torn {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Completed => f.write_str("the last line of the audit file had no line feed: it was added"),
-            Self::Moved { to, bytes } => write!(
-                f,
-                "the last line of the audit file was cut short: its {bytes} bytes are now in {}",
-                to.display()
-            ),
-        }
-    }
+/// Entries that are missing.
+fn entries(first: u64, last: u64) -> String {
+    if first == last { format!("entry {first} is") } else { format!("entries {first} to {last} are") }
 }

@@ -29,8 +29,7 @@ impl Store {
     }
 
     /// The file that a document is kept in; `None` where there is no state folder.
-    #[must_use]
-    pub fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
+    pub(crate) fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
         self.documents.file(digest)
     }
 
@@ -58,7 +57,8 @@ impl Store {
         unit: Option<&UnitId>,
         limit: usize,
     ) -> Result<Vec<AuditEntry>, StoreError> {
-        let mut newest = Newest::new(unit, limit.min(MAX_ENTRIES), after);
+        let mark = unit.map(|unit| format!("\"unit\":\"{unit}\""));
+        let mut newest = Newest { mark, limit: limit.min(MAX_ENTRIES), after, entries: Vec::new() };
         match &self.journal {
             Journal::Folder { log, .. } => {
                 let (before, current) = log.files()?;
@@ -67,19 +67,17 @@ impl Store {
                 {
                     newest.read(&before, false)?;
                 }
-                newest.entries.reverse();
-                Ok(newest.entries)
             }
             Journal::Memory(recent) => {
                 let of_unit = |entry: &&AuditEntry| {
                     unit.is_none_or(|unit| entry.unit.as_deref() == Some(unit.as_str()))
                 };
                 let recent = recent.iter().rev().take_while(|entry| entry.number > after);
-                let mut newest: Vec<_> = recent.filter(of_unit).take(limit).cloned().collect();
-                newest.reverse();
-                Ok(newest)
+                newest.entries = recent.filter(of_unit).take(limit).cloned().collect();
             }
         }
+        newest.entries.reverse();
+        Ok(newest.entries)
     }
 
     /// Whether an entry of a unit is written down, under whatever number.
@@ -187,10 +185,6 @@ struct Newest {
 }
 
 impl Newest {
-    fn new(unit: Option<&UnitId>, limit: usize, after: u64) -> Self {
-        Self { mark: unit.map(|unit| format!("\"unit\":\"{unit}\"")), limit, after, entries: Vec::new() }
-    }
-
     /// Reads a file from its end; whether nothing older is wanted. Damaged lines are skipped: they were told when the file was
     /// opened.
     fn read(&mut self, path: &Path, carried: bool) -> Result<bool, StoreError> {

@@ -192,8 +192,8 @@ fn a_full_audit_file_is_put_aside_and_what_holds_is_carried_over() {
         assert_eq!(store.previous(&one).unwrap().revision, 58);
         assert_eq!(store.highest_revision(&one), 60);
         assert_eq!(store.last_good(&two).unwrap().digest, second);
-        assert_eq!(store.seen_in_folder("two.toml"), Some(second));
-        assert_eq!(store.seen_in_folder("bad.toml"), Some(Digest::of(b"bad")));
+        assert_eq!(store.said_by_folder(&two), Some(second));
+        assert_eq!(store.refused_in_folder("bad.toml"), Some(Digest::of(b"bad")));
         let expected = if round == 0 { &shown[..] } else { &[] };
         assert_eq!(store.history(Some(&one), 5).unwrap(), expected);
         for second in 0..60 {
@@ -365,7 +365,8 @@ fn what_is_forgotten_is_gone_and_its_numbers_are_not_given_again() {
     for _ in 0..2 {
         assert_eq!(store.units().collect::<Vec<_>>(), [&unit("ZLG-2")]);
         assert_eq!((store.last_good(&one), store.said_by_folder(&one)), (None, None));
-        assert_eq!((store.seen_in_folder("/a.toml"), store.highest_revision(&one)), (None, 4));
+        let is_file = |(_, event)| matches!(event, AuditEvent::CarriedFile(_));
+        assert_eq!((store.index.carried().any(is_file), store.highest_revision(&one)), (false, 4));
         drop(store);
         store = Store::open(folder.path()).unwrap().0;
     }

@@ -10,6 +10,7 @@ use isotherm_protocol::history::AuditEntry;
 use isotherm_protocol::history::chain::{Broken, Head, Verifier};
 use isotherm_protocol::overlay::base_of;
 use serde::Serialize;
+use thiserror::Error;
 
 use super::blobs::BlobStore;
 use super::folder::Mark;
@@ -46,7 +47,11 @@ pub struct Verification {
 }
 
 /// A document or an overlay that is not as it was stored.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Error, Serialize)]
+#[error(
+    "{file} {words}; revision {revision} of unit {unit} needs it: restore it from a backup",
+    file = file.display()
+)]
 pub struct Lost {
     /// Its file.
     pub file: PathBuf,
@@ -159,14 +164,6 @@ fn lost(folder: &Path, index: &Index) -> Vec<Lost> {
         Some(Lost { file, unit: unit.to_string(), revision, words })
     });
     lost.take(MAX_BREAKS).collect()
-}
-
-impl fmt::Display for Lost {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { file, unit, revision, words } = self;
-        let file = file.display();
-        write!(f, "{file} {words}; revision {revision} of unit {unit} needs it: restore it from a backup")
-    }
 }
 
 impl fmt::Display for Break {

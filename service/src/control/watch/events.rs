@@ -136,10 +136,10 @@ impl Drop for Listener {
 /// The operating system's events.
 pub(super) fn listener(folder: PathBuf, signals: Arc<Signals>) -> notify::Result<RecommendedWatcher> {
     let hear = move |event: notify::Result<Event>| match event {
-        Ok(event) if is_own_end(&event, &folder) => signals.deafen(),
-        Ok(event) if is_news(event.kind) => signals.stir(),
+        Ok(event) if is_own_end(&event, &folder) => signals.give(|heard| heard.deaf = true),
+        Ok(event) if is_news(event.kind) => signals.give(|heard| heard.stirred = true),
         Ok(_) => {}
-        Err(_) => signals.deafen(),
+        Err(_) => signals.give(|heard| heard.deaf = true),
     };
     RecommendedWatcher::new(hear, Config::default())
 }

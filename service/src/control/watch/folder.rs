@@ -5,8 +5,8 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
-use sha2::{Digest, Sha256};
 
 /// The files of a folder with an extension, in the order of their names, hidden files and sub-folders excepted.
 ///
@@ -102,7 +102,7 @@ pub(super) struct Content {
     /// At most one byte more than a document may have.
     pub(super) bytes: Vec<u8>,
     /// SHA-256 of the bytes.
-    pub(super) digest: [u8; 32],
+    pub(super) digest: Digest,
     /// Whether nobody wrote while it was read.
     pub(super) steady: bool,
 }
@@ -120,6 +120,6 @@ pub(super) fn read(path: &Path) -> std::io::Result<Content> {
     let mut bytes = Vec::new();
     (&file).take(MAX_DOCUMENT_BYTES as u64 + 1).read_to_end(&mut bytes)?;
     let steady = Stamp::of(&before) == Stamp::of(&file.metadata()?);
-    let digest = Sha256::digest(&bytes).into();
+    let digest = Digest::of(&bytes);
     Ok(Content { bytes, digest, steady })
 }

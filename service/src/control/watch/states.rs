@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
+
+use isotherm_protocol::digest::Digest;
 
 use super::folder::{Content, Sight};
-use super::{FolderEvent, Known, WatchSettings};
+use super::{FolderEvent, Known, grace};
+use crate::config::FolderSettings;
 
 /// A file that never settles is read after this many settling times.
 const PATIENCE: u32 = 20;
@@ -14,7 +17,7 @@ const PATIENCE: u32 = 20;
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Told {
     Nothing,
-    Content([u8; 32]),
+    Content(Digest),
     /// Why; `None` where the owner found it so before the start, for a reason not known here.
     Unreadable(Option<String>),
 }
@@ -37,8 +40,7 @@ struct Entry {
 /// All files.
 #[derive(Debug)]
 pub(super) struct FileStates {
-    settle: Duration,
-    grace: Duration,
+    settings: FolderSettings,
     entries: BTreeMap<PathBuf, Entry>,
     /// The file that was compared last.
     compared: Option<PathBuf>,
@@ -46,21 +48,18 @@ pub(super) struct FileStates {
 
 impl FileStates {
     /// With what the owner knows already.
-    pub(super) fn new(settings: WatchSettings, known: BTreeMap<PathBuf, Known>) -> Self {
-        let entry = |known| match known {
-            Known::Content(digest) => Told::Content(digest),
-            Known::Unreadable => Told::Unreadable(None),
-        };
+    pub(super) fn new(settings: FolderSettings, known: BTreeMap<PathBuf, Known>) -> Self {
         let now = Instant::now();
-        let entries = known
-            .into_iter()
-            .map(|(file, known)| {
-                // Restless from the start: whether it still is what the owner read has to be seen.
-                let unrest = Some(Unrest { first: now, last: now });
-                (file, Entry { sight: Sight::Absent, told: entry(known), unrest })
-            })
-            .collect();
-        Self { settle: settings.settle, grace: settings.grace(), entries, compared: None }
+        // Restless from the start: whether it still is what the owner read has to be seen.
+        let unrest = Some(Unrest { first: now, last: now });
+        let entries = known.into_iter().map(|(file, known)| {
+            let told = match known {
+                Known::Content(digest) => Told::Content(digest),
+                Known::Unreadable => Told::Unreadable(None),
+            };
+            (file, Entry { sight: Sight::Absent, told, unrest })
+        });
+        Self { settings, entries: entries.collect(), compared: None }
     }
 
     /// The files of which something is known.
@@ -111,9 +110,9 @@ impl FileStates {
     fn due_at(&self, entry: &Entry) -> Option<Instant> {
         let Unrest { first, last } = entry.unrest?;
         Some(match entry.sight {
-            Sight::File(_) => (last + self.settle).min(first + self.settle * PATIENCE),
+            Sight::File(_) => (last + self.settings.settle).min(first + self.settings.settle * PATIENCE),
             // What is about to be replaced is away for a moment, or a link to nothing.
-            Sight::Odd(_) | Sight::Absent => last + self.grace,
+            Sight::Odd(_) | Sight::Absent => last + grace(&self.settings),
         })
     }
 
@@ -138,7 +137,7 @@ impl FileStates {
         })
     }
 
-    /// A settled file has been read: what is to be told. `None` also where it was written meanwhile and has to settle
+    /// A settled file has been read, or cannot be: what is to be told. `None` also where it was written meanwhile and has to settle
     /// anew.
     pub(super) fn read(
         &mut self,
@@ -146,11 +145,16 @@ impl FileStates {
         file: &Path,
         reading: Result<Content, String>,
     ) -> Option<FolderEvent> {
-        let patience = self.settle * PATIENCE;
+        let patience = self.settings.settle * PATIENCE;
         let entry = self.entries.get_mut(file)?;
         let content = match reading {
             Ok(content) => content,
-            Err(reason) => return entry.unreadable(file, reason),
+            Err(reason) => {
+                entry.unrest = None;
+                let told = std::mem::replace(&mut entry.told, Told::Unreadable(Some(reason.clone())));
+                let known = told == Told::Unreadable(None) || told == entry.told;
+                return (!known).then(|| FolderEvent::Unreadable { file: file.to_owned(), reason });
+            }
         };
         let impatient =
             entry.unrest.is_some_and(|unrest| now.saturating_duration_since(unrest.first) >= patience);
@@ -161,12 +165,7 @@ impl FileStates {
         entry.unrest = None;
         let Content { bytes, digest, .. } = content;
         let told = std::mem::replace(&mut entry.told, Told::Content(digest));
-        (told != Told::Content(digest)).then(|| FolderEvent::Changed { file: file.to_owned(), bytes, digest })
-    }
-
-    /// What is in the place of a settled file cannot be read: what is to be told.
-    pub(super) fn unreadable(&mut self, file: &Path, reason: String) -> Option<FolderEvent> {
-        self.entries.get_mut(file)?.unreadable(file, reason)
+        (told != Told::Content(digest)).then(|| FolderEvent::Changed { file: file.to_owned(), bytes })
     }
 
     /// A file has been gone for the grace time: what is to be told.
@@ -180,13 +179,6 @@ impl Entry {
     fn stir(&mut self, now: Instant) {
         let first = self.unrest.map_or(now, |unrest| unrest.first);
         self.unrest = Some(Unrest { first, last: now });
-    }
-
-    fn unreadable(&mut self, file: &Path, reason: String) -> Option<FolderEvent> {
-        self.unrest = None;
-        let told = std::mem::replace(&mut self.told, Told::Unreadable(Some(reason.clone())));
-        let known = told == Told::Unreadable(None) || told == self.told;
-        (!known).then(|| FolderEvent::Unreadable { file: file.to_owned(), reason })
     }
 }
 

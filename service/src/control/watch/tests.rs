@@ -8,7 +8,6 @@ mod whole;
 use std::fs;
 use std::sync::mpsc::{Receiver, channel};
 
-use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::*;
@@ -25,9 +24,13 @@ enum By {
 }
 
 impl By {
-    fn settings(self) -> WatchSettings {
+    fn settings(self) -> FolderSettings {
         let poll = Duration::from_millis(if self == Self::Events { 3_600_000 } else { 50 });
-        WatchSettings { poll, events: self != Self::Poll, ..WatchSettings::default() }
+        FolderSettings { poll, ..FolderSettings::default() }
+    }
+
+    fn listener(self) -> events::MakeListener {
+        if self == Self::Poll { |_, _| Err(notify::Error::generic("none")) } else { events::listener }
     }
 }
 
@@ -42,7 +45,7 @@ struct Scene {
 impl Scene {
     /// A folder `calibration` with these files, watched, the files told.
     fn new(by: By, files: &[(&str, &str)]) -> Self {
-        Self::with(by.settings(), events::listener, |folder| {
+        Self::with(by.settings(), by.listener(), |folder| {
             for (name, text) in files {
                 fs::write(folder.join(name), text).unwrap();
             }
@@ -51,7 +54,7 @@ impl Scene {
     }
 
     /// A folder as `prepare` leaves it, watched.
-    fn with(settings: WatchSettings, listener: events::MakeListener, prepare: impl FnOnce(&Path)) -> Self {
+    fn with(settings: FolderSettings, listener: events::MakeListener, prepare: impl FnOnce(&Path)) -> Self {
         let temporary = TempDir::new().unwrap();
         let folder = temporary.path().join("calibration");
         fs::create_dir(&folder).unwrap();
@@ -87,8 +90,7 @@ impl Scene {
     }
 
     fn changed(&self, name: &str, text: &str) -> FolderEvent {
-        let digest = Sha256::digest(text).into();
-        FolderEvent::Changed { file: self.path(name), bytes: text.as_bytes().to_owned(), digest }
+        FolderEvent::Changed { file: self.path(name), bytes: text.as_bytes().to_owned() }
     }
 
     fn removed(&self, name: &str) -> FolderEvent {

@@ -8,7 +8,8 @@ use super::events::FsEvents;
 use super::folder::{self, Content, Sight, files_in};
 use super::signals::Signals;
 use super::states::FileStates;
-use super::{FolderEvent, WatchSettings};
+use super::{FolderEvent, grace};
+use crate::config::FolderSettings;
 
 /// How many settled files are read and compared at each poll.
 const COMPARED: usize = 64;
@@ -18,9 +19,9 @@ const AWAY: Duration = Duration::from_secs(1);
 /// What the thread works with.
 pub(super) struct Worker<S> {
     folder: PathBuf,
-    settings: WatchSettings,
+    settings: FolderSettings,
     signals: Arc<Signals>,
-    events: Option<FsEvents>,
+    events: FsEvents,
     states: FileStates,
     sink: S,
     outage: Option<Outage>,
@@ -42,16 +43,15 @@ struct Outage {
 
 impl<S: Fn(FolderEvent)> Worker<S> {
     pub(super) fn new(
-        folder: PathBuf,
-        settings: WatchSettings,
-        signals: Arc<Signals>,
-        events: Option<FsEvents>,
+        folder: &Path,
+        settings: FolderSettings,
+        (signals, events): (Arc<Signals>, FsEvents),
         states: FileStates,
         sink: S,
     ) -> Self {
         let now = Instant::now();
         Self {
-            folder,
+            folder: folder.to_owned(),
             settings,
             signals,
             events,
@@ -68,15 +68,13 @@ impl<S: Fn(FolderEvent)> Worker<S> {
 
     /// Works until it is told to end.
     pub(super) fn run(mut self) {
-        // Told in any case, also where the sink panics.
-        let _end = End(Arc::clone(&self.signals));
         loop {
             let heard = self.signals.wait(self.next_look());
             if heard.stop {
                 break;
             }
             if heard.deaf {
-                self.events.iter_mut().for_each(FsEvents::deafen);
+                self.events.deafen();
             }
             if heard.reread {
                 self.reread = true;
@@ -97,7 +95,7 @@ impl<S: Fn(FolderEvent)> Worker<S> {
     fn next_look(&self) -> Instant {
         let own = match &self.outage {
             None => self.states.next_due(),
-            Some(Outage { since, told: None }) => Some(*since + self.settings.grace()),
+            Some(Outage { since, told: None }) => Some(*since + grace(&self.settings)),
             Some(Outage { told: Some(_), .. }) => Some(self.last_look + AWAY),
         };
         [own, self.asked].into_iter().flatten().fold(self.next_poll, Instant::min)
@@ -106,11 +104,9 @@ impl<S: Fn(FolderEvent)> Worker<S> {
     fn look(&mut self) {
         let now = Instant::now();
         let polling = now >= self.next_poll;
-        if let Some(events) = &mut self.events
-            && (polling || events.are_deaf())
-        {
+        if polling || self.events.are_deaf() {
             // Before the look, so that what happens after it is heard.
-            events.tend();
+            self.events.tend();
         }
         self.tell_ears();
         self.asked = None;
@@ -135,7 +131,7 @@ impl<S: Fn(FolderEvent)> Worker<S> {
 
     /// Tells whether events come, where that has changed.
     fn tell_ears(&mut self) {
-        let deaf = self.events.as_ref().and_then(FsEvents::complaint);
+        let deaf = self.events.complaint();
         if deaf == self.deaf.as_deref() {
             return;
         }
@@ -145,7 +141,7 @@ impl<S: Fn(FolderEvent)> Worker<S> {
 
     /// The folder cannot be read.
     fn away(&mut self, now: Instant, reason: String) {
-        let grace = self.settings.grace();
+        let grace = grace(&self.settings);
         let outage = self.outage.get_or_insert(Outage { since: now, told: None });
         if now >= outage.since + grace && outage.told.as_ref() != Some(&reason) {
             outage.told = Some(reason.clone());
@@ -179,11 +175,14 @@ impl<S: Fn(FolderEvent)> Worker<S> {
             let event = match self.states.sight(&file) {
                 None => None,
                 Some(Sight::Absent) => self.states.removed(&file),
-                Some(Sight::Odd(reason)) => self.states.unreadable(&file, reason.clone()),
-                Some(Sight::File(_)) => match self.read(&file) {
-                    Some(reading) => self.states.read(Instant::now(), &file, reading),
-                    None => None,
-                },
+                Some(Sight::Odd(reason)) => {
+                    let reason = reason.clone();
+                    self.states.read(now, &file, Err(reason))
+                }
+                Some(Sight::File(_)) => {
+                    let reading = self.read(&file);
+                    reading.and_then(|reading| self.states.read(Instant::now(), &file, reading))
+                }
             };
             if let Some(event) = event {
                 (self.sink)(event);
@@ -213,14 +212,5 @@ impl<S: Fn(FolderEvent)> Worker<S> {
             return None;
         }
         Some(reading.map_err(|error| error.to_string()))
-    }
-}
-
-/// Tells the end of the thread when it is dropped.
-struct End(Arc<Signals>);
-
-impl Drop for End {
-    fn drop(&mut self) {
-        self.0.end();
     }
 }

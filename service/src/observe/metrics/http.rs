@@ -20,6 +20,7 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::{AbortHandle, JoinSet};
 
+use super::health::{Kind, Reason};
 use super::page::{pack, page};
 use super::source::{Look, Source, Verdict};
 use super::{Exporter, NoLook};
@@ -148,8 +149,16 @@ async fn answer(
     let answer = match request.uri().path() {
         "/metrics" if reads => metrics(&request, exporter).await,
         "/healthz" if reads => healthz(exporter).await,
-        "/livez" if reads => livez(exporter),
-        "/readyz" if reads => readyz(exporter),
+        // Nothing is looked at here: whether the process is worth keeping, and whether the service receives.
+        "/livez" if reads => match exporter.source.get().map_or(Ok(()), Source::receives) {
+            Ok(()) => text(StatusCode::OK, PLAIN, "alive\n"),
+            Err(stuck) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, format!("{stuck}\n")),
+        },
+        // A unit that is held up takes nothing of it.
+        "/readyz" if reads => match exporter.not_ready() {
+            None => text(StatusCode::OK, PLAIN, "ready\n"),
+            Some(words) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, words + "\n"),
+        },
         "/metrics" | "/healthz" | "/livez" | "/readyz" => {
             let mut answer = text(StatusCode::METHOD_NOT_ALLOWED, PLAIN, "only GET and HEAD\n");
             answer.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
@@ -184,30 +193,8 @@ async fn metrics(request: &Request<Incoming>, exporter: &Arc<Exporter>) -> Answe
         Ok(made) => made,
     };
     match made {
-        Ok(page) => {
-            let mut answer = text(StatusCode::OK, if open { OPEN_METRICS } else { PROMETHEUS }, page);
-            if packed {
-                answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-            }
-            answer
-        }
+        Ok(page) => good(packed, if open { OPEN_METRICS } else { PROMETHEUS }, page),
         Err(error) => text(StatusCode::INTERNAL_SERVER_ERROR, PLAIN, format!("{error}\n")),
-    }
-}
-
-/// Whether the process is worth keeping. Nothing is looked at here, either.
-fn livez(exporter: &Exporter) -> Answer {
-    match exporter.source.get().map_or(Ok(()), Source::receives) {
-        Ok(()) => text(StatusCode::OK, PLAIN, "alive\n"),
-        Err(stuck) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, format!("{stuck}\n")),
-    }
-}
-
-/// Whether the service receives. Nothing is looked at: a unit that is held up takes nothing of it.
-fn readyz(exporter: &Exporter) -> Answer {
-    match exporter.not_ready() {
-        None => text(StatusCode::OK, PLAIN, "ready\n"),
-        Some(words) => text(StatusCode::SERVICE_UNAVAILABLE, PLAIN, words + "\n"),
     }
 }
 
@@ -216,8 +203,20 @@ async fn healthz(exporter: &Arc<Exporter>) -> Answer {
     let uptime = exporter.started.elapsed();
     let verdict = match exporter.look(move |source, watch| source.judge(watch, stopping)).await {
         Ok(verdict) => verdict,
-        Err(NoLook::TooSlow) => Verdict::too_busy(uptime, exporter.limits.look),
-        Err(NoLook::Starting) => Verdict::starting(uptime, exporter.not_ready().unwrap_or_default()),
+        Err(why) => {
+            let limit_s = exporter.limits.look.as_secs_f64();
+            let (kind, words) = match why {
+                NoLook::Starting => (Kind::Starting, exporter.not_ready().unwrap_or_default()),
+                NoLook::TooSlow => (
+                    Kind::Busy,
+                    format!(
+                        "units or state folder could not be read within {limit_s} s: a slow subscriber or disk \
+                         blocks them"
+                    ),
+                ),
+            };
+            Verdict::new(uptime, vec![Reason { kind, unit: None, words }])
+        }
     };
     let status = if verdict.is_healthy() { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };
     match serde_json::to_string(&verdict) {
@@ -243,13 +242,18 @@ fn takes(headers: &HeaderMap, header: &HeaderName, what: &str) -> bool {
 /// Text in a tenth of its bytes, for those who take it so.
 pub(crate) fn packed(headers: &HeaderMap, kind: &'static str, body: &str) -> Answer {
     match takes(headers, &ACCEPT_ENCODING, "gzip").then(|| pack(body)) {
-        Some(Ok(body)) => {
-            let mut answer = text(StatusCode::OK, kind, body);
-            answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-            answer
-        }
-        _ => text(StatusCode::OK, kind, body.to_owned()),
+        Some(Ok(body)) => good(true, kind, body),
+        _ => good(false, kind, body.to_owned()),
     }
+}
+
+/// What was asked for, packed or not.
+fn good(packed: bool, kind: &'static str, body: impl Into<Bytes>) -> Answer {
+    let mut answer = text(StatusCode::OK, kind, body);
+    if packed {
+        answer.headers_mut().insert(CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    answer
 }
 
 /// Text as it is.

@@ -16,7 +16,7 @@ use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
-use crate::receive::unit::UnitActor;
+use crate::receive::unit::{UnitActor, pairing_window};
 use isotherm_cli::stderr::dropped_lines;
 
 /// Where a look is taken from.
@@ -33,7 +33,7 @@ pub(crate) struct Source {
 }
 
 /// One look at everything.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Look {
     /// The service's name for itself.
     pub(super) instance: String,
@@ -91,19 +91,16 @@ impl Look {
         Self {
             instance: "starting".to_owned(),
             uptime_s: uptime.as_secs_f64(),
-            healthy: false,
             instances: 1,
-            faults: Vec::new(),
             log_lines_dropped: dropped_lines(),
-            late_receipts: 0,
-            posted: Arc::default(),
-            units: Vec::new(),
+            ..Self::default()
         }
     }
 }
 
 impl Verdict {
-    fn new(uptime: Duration, reasons: Vec<Reason>) -> Self {
+    /// That of a service of which no unit was looked at.
+    pub(super) fn new(uptime: Duration, reasons: Vec<Reason>) -> Self {
         Self {
             status: if reasons.is_empty() { "ok" } else { "unhealthy" },
             reasons,
@@ -112,20 +109,6 @@ impl Verdict {
             uptime_s: uptime.as_secs_f64(),
             units: Vec::new(),
         }
-    }
-
-    /// That of a service which is not at work yet.
-    pub(super) fn starting(uptime: Duration, words: String) -> Self {
-        Self::new(uptime, vec![Reason { kind: Kind::Starting, unit: None, words }])
-    }
-
-    /// Where the units could not be looked at in time.
-    pub(super) fn too_busy(uptime: Duration, limit: Duration) -> Self {
-        let limit_s = limit.as_secs_f64();
-        let words = format!(
-            "units or state folder could not be read within {limit_s} s: a slow subscriber or disk blocks them"
-        );
-        Self::new(uptime, vec![Reason { kind: Kind::Busy, unit: None, words }])
     }
 
     /// Whether nothing speaks against the service's health.
@@ -142,7 +125,6 @@ impl Source {
         control_status: Arc<ControlStatus>,
     ) -> Self {
         let instance = pair.me().instance.clone();
-        let window = settings.unit.pairing_window.as_ns().unsigned_abs();
         Self {
             intake,
             pair,
@@ -151,7 +133,7 @@ impl Source {
             started: Instant::now(),
             held_back: HeldBack {
                 ticks: settings.unit.navigation.ticks().into(),
-                window: Duration::from_nanos(window),
+                window: pairing_window(&settings.unit),
             },
             pulse: None,
             subscribers: Arc::default(),

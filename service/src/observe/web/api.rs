@@ -23,6 +23,8 @@ const MAX_BODY: usize = 6 * MAX_DOCUMENT_BYTES + 4096;
 /// Entries of a history that can be asked for.
 const MAX_ENTRIES: usize = 1000;
 
+/// There is no other way to ask for what is read.
+const READS: Refused = Refused::Method("GET, HEAD");
 /// What browsers are told to keep to.
 const HEADERS: [(HeaderName, &str); 6] = [
     (
@@ -36,8 +38,16 @@ const HEADERS: [(HeaderName, &str); 6] = [
     (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
 ];
 
-/// What there is to say: its kind and itself; or why there is nothing.
-type Made = Result<(&'static str, String), (StatusCode, String)>;
+/// What is answered, or why not.
+type Made = Result<Answer, Refused>;
+
+/// Why a request is not answered.
+enum Refused {
+    /// In words.
+    Said(StatusCode, String),
+    /// It came with another method than there are.
+    Method(&'static str),
+}
 
 /// A swap, as the page asks for it.
 #[derive(Debug, Deserialize)]
@@ -100,125 +110,89 @@ impl Web {
         local: std::net::SocketAddr,
     ) -> Option<Answer> {
         let path = request.uri().path().to_owned();
-        let asset = assets::find(&path);
-        let route = Route::of(&path);
-        if asset.is_none() && !path.starts_with("/api/") {
+        if assets::find(&path).is_none() && !path.starts_with("/api/") {
             return None;
         }
-        let mut answer = match self.guard.host(request.headers(), local) {
-            Err(refusal) => refused(refusal),
-            Ok(host) => match (asset, route) {
-                (Some(asset), _) if is_read(request.method()) => {
-                    packed(request.headers(), asset.kind, &asset.text)
-                }
-                (Some(_), _) => not_allowed("GET, HEAD"),
-                (None, route) => match self.guard.caller(request.headers(), &host) {
-                    Err(refusal) => refused(refusal),
-                    Ok(()) => self.ask(route, request, &host).await,
-                },
-            },
-        };
+        let mut answer = self.ask(&path, request, local).await.unwrap_or_else(Refused::answer);
         for (name, value) in HEADERS {
             answer.headers_mut().insert(name, HeaderValue::from_static(value));
         }
         Some(answer)
     }
 
-    /// Answers somebody who may ask.
-    async fn ask(&self, route: Option<Route<'_>>, request: Request<Incoming>, host: &str) -> Answer {
-        let Some(route) = route else { return refused((StatusCode::NOT_FOUND, "not found")) };
+    /// Answers whoever may ask.
+    async fn ask(&self, path: &str, request: Request<Incoming>, local: std::net::SocketAddr) -> Made {
+        let headers = request.headers().clone();
+        let host = self.guard.host(&headers, local)?;
+        let reads = [Method::GET, Method::HEAD].contains(request.method());
+        if let Some(asset) = assets::find(path) {
+            let only_reads = reads.then_some(()).ok_or(READS);
+            return only_reads.map(|()| packed(&headers, asset.kind, &asset.text));
+        }
+        self.guard.caller(&headers, &host)?;
+        let route = Route::of(path).ok_or((StatusCode::NOT_FOUND, "not found"))?;
         if route.changes() {
             if request.method() != Method::POST {
-                return not_allowed("POST");
+                return Err(Refused::Method("POST"));
             }
-            return match Guard::change(request.headers(), host) {
-                Err(refusal) => refused(refusal),
-                Ok(()) => self.change(route, request).await,
-            };
+            Guard::change(&headers, &host)?;
+        } else if !reads {
+            return Err(READS);
         }
-        if !is_read(request.method()) {
-            return not_allowed("GET, HEAD");
-        }
-        let headers = request.headers().clone();
-        let made = match route {
-            Route::Units => of_json(self.units()),
-            Route::Unit(serial) => self.unit(serial).map_or_else(|| Err(no_unit(serial)), of_json),
-            Route::Live(unit) => self.watch(unit).await,
+        let (kind, body) = match &route {
+            Route::Units => (JSON, self.units()?),
+            Route::Unit(serial) => (JSON, self.unit(serial).ok_or_else(|| no_unit(serial))??),
+            Route::Live(unit) => (JSON, self.watch(unit).await?),
             Route::History(unit) => {
                 let limit = limit(request.uri().query().unwrap_or_default());
-                let parameters = format!("limit={limit}");
-                of_bus(self.client.text(&key::history(&unit), &parameters, None).await, JSON)
+                (JSON, self.client.text(&key::history(unit), &format!("limit={limit}"), None).await?)
             }
             Route::Document(unit) => {
-                let document = self.client.text(&key::calibration(&unit), "", None).await;
-                of_bus(document, "text/plain; charset=utf-8")
+                ("text/plain; charset=utf-8", self.client.text(&key::calibration(unit), "", None).await?)
             }
-            Route::Bundle(unit) => return self.download(unit).await,
-            Route::Swap(_) | Route::Command(_) => {
-                Err((StatusCode::METHOD_NOT_ALLOWED, "only POST".to_owned()))
-            }
+            Route::Bundle(unit) => return self.download(*unit).await,
+            Route::Swap(_) | Route::Command(_) => return self.change(&route, request).await,
         };
-        match made {
-            Ok((kind, body)) => packed(&headers, kind, &body),
-            Err((status, words)) => said(status, &words),
-        }
+        Ok(packed(&headers, kind, &body))
     }
 
     /// Half a second of a unit's ticks.
-    async fn watch(&self, unit: UnitId) -> Made {
+    async fn watch(&self, unit: &UnitId) -> Result<String, Refused> {
         let Ok(permit) = Arc::clone(&self.live).try_acquire_owned() else {
-            return Err((StatusCode::SERVICE_UNAVAILABLE, "too many live charts are open".to_owned()));
+            return Err((StatusCode::SERVICE_UNAVAILABLE, "too many live charts are open").into());
         };
-        let intake = Arc::clone(&self.intake);
+        let (intake, of) = (Arc::clone(&self.intake), unit.clone());
         let watched = tokio::task::spawn_blocking(move || {
             let _permit = permit;
-            live::watch(&intake, &unit).map(|live| serde_json::to_string(&live)).ok_or(unit)
+            live::watch(&intake, &of)
         });
-        match watched.await {
-            Ok(Ok(live)) => of_json(live),
-            Ok(Err(unit)) => Err(no_unit(unit.as_str())),
-            Err(_) => Err((StatusCode::INTERNAL_SERVER_ERROR, "the unit could not be read".to_owned())),
-        }
+        let Ok(live) = watched.await else {
+            return Err((StatusCode::INTERNAL_SERVER_ERROR, "the unit could not be read").into());
+        };
+        Ok(serde_json::to_string(&live.ok_or_else(|| no_unit(unit.as_str()))?)?)
     }
 
-    async fn download(&self, unit: Option<&str>) -> Answer {
-        match self.bundle(unit).await {
-            Ok(file) => {
-                let mut answer = text(StatusCode::OK, "application/gzip", file);
-                let name = HeaderValue::from_static("attachment; filename=\"isotherm-report.tar.gz\"");
-                answer.headers_mut().insert(CONTENT_DISPOSITION, name);
-                answer
-            }
-            Err(error) => said(StatusCode::INTERNAL_SERVER_ERROR, &error.to_string()),
-        }
+    async fn download(&self, unit: Option<&str>) -> Made {
+        let file = self.bundle(unit).await.map_err(|error| failed(&error))?;
+        let mut answer = text(StatusCode::OK, "application/gzip", file);
+        let name = HeaderValue::from_static("attachment; filename=\"isotherm-report.tar.gz\"");
+        answer.headers_mut().insert(CONTENT_DISPOSITION, name);
+        Ok(answer)
     }
 
     /// Asks on the bus for what may change something, as the commands `swap`, `rollback` and `command` do.
-    async fn change(&self, route: Route<'_>, request: Request<Incoming>) -> Answer {
-        let body = match Limited::new(request.into_body(), MAX_BODY).collect().await {
-            Ok(body) => body.to_bytes(),
-            Err(_) => {
-                return refused((StatusCode::PAYLOAD_TOO_LARGE, "longer than any document, or cut short"));
-            }
+    async fn change(&self, route: &Route<'_>, request: Request<Incoming>) -> Made {
+        let Ok(body) = Limited::new(request.into_body(), MAX_BODY).collect().await else {
+            let words = "longer than any document, or cut short";
+            return Err((StatusCode::PAYLOAD_TOO_LARGE, words).into());
         };
-        match self.question(&route, &body) {
-            Ok((key, parameters, payload)) => {
-                match of_bus(self.client.text(&key, &parameters, Some(&payload)).await, JSON) {
-                    Ok((kind, body)) => text(StatusCode::OK, kind, body),
-                    Err((status, words)) => said(status, &words),
-                }
-            }
-            Err((status, words)) => said(status, &words),
-        }
+        let (key, parameters, payload) = self.question(route, &body.to_bytes())?;
+        Ok(text(StatusCode::OK, JSON, self.client.text(&key, &parameters, Some(&payload)).await?))
     }
 
     /// The question on the bus that a body stands for: key, parameters, payload.
-    fn question(
-        &self,
-        route: &Route<'_>,
-        body: &[u8],
-    ) -> Result<(String, String, Vec<u8>), (StatusCode, String)> {
-        let bad = |words: String| (StatusCode::BAD_REQUEST, words);
+    fn question(&self, route: &Route<'_>, body: &[u8]) -> Result<(String, String, Vec<u8>), Refused> {
+        let bad = |words: String| Refused::Said(StatusCode::BAD_REQUEST, words);
         let (by, dry_run, question) = match route {
             Route::Swap(unit) => {
                 let asked: SwapRequest = serde_json::from_slice(body)
@@ -241,14 +215,14 @@ impl Web {
                 let dry_run = matches!(order.order, Order::Rollback { dry_run: true, .. });
                 (order.by, dry_run, (key::command(unit), String::new(), body.to_vec()))
             }
-            _ => return Err((StatusCode::NOT_FOUND, "not found".to_owned())),
+            _ => return Err((StatusCode::NOT_FOUND, "not found").into()),
         };
         if dry_run {
             return Ok(question);
         }
         if !self.write {
             let words = "this console is read-only: set write = true in [web], and restart the service";
-            return Err((StatusCode::FORBIDDEN, words.to_owned()));
+            return Err((StatusCode::FORBIDDEN, words).into());
         }
         if by.trim().is_empty() || by.chars().count() > MAX_BY {
             return Err(bad(format!("give your name for the audit file, in 1 to {MAX_BY} characters")));
@@ -257,46 +231,56 @@ impl Web {
     }
 }
 
-fn is_read(method: &Method) -> bool {
-    [Method::GET, Method::HEAD].contains(method)
-}
-
 /// Reads `limit=20`.
 fn limit(query: &str) -> usize {
     let limit = query.split('&').find_map(|part| part.strip_prefix("limit=")?.parse().ok());
     limit.unwrap_or(50).clamp(1, MAX_ENTRIES)
 }
 
-fn of_json(json: serde_json::Result<String>) -> Made {
-    json.map(|json| (JSON, json)).map_err(|error| (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()))
-}
-
-fn of_bus(answer: Result<String, ConsoleError>, kind: &'static str) -> Made {
-    answer.map(|body| (kind, body)).map_err(|error| match error {
-        ConsoleError::Refused(words) => (StatusCode::CONFLICT, words),
-        error => (StatusCode::GATEWAY_TIMEOUT, error.to_string()),
-    })
-}
-
-fn no_unit(serial: &str) -> (StatusCode, String) {
-    (StatusCode::NOT_FOUND, format!("this service knows no unit {serial}"))
-}
-
-fn refused((status, words): Refusal) -> Answer {
-    let mut answer = said(status, words);
-    if status == StatusCode::UNAUTHORIZED {
-        answer.headers_mut().insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+impl Refused {
+    fn answer(self) -> Answer {
+        let (status, words, header) = match self {
+            Self::Method(methods) => {
+                (StatusCode::METHOD_NOT_ALLOWED, format!("only {methods}"), Some((ALLOW, methods)))
+            }
+            Self::Said(status @ StatusCode::UNAUTHORIZED, words) => {
+                (status, words, Some((WWW_AUTHENTICATE, "Bearer")))
+            }
+            Self::Said(status, words) => (status, words, None),
+        };
+        let mut answer = text(status, JSON, json!({ "error": words }).to_string());
+        if let Some((name, value)) = header {
+            answer.headers_mut().insert(name, HeaderValue::from_static(value));
+        }
+        answer
     }
-    answer
 }
 
-fn not_allowed(methods: &'static str) -> Answer {
-    let mut answer = said(StatusCode::METHOD_NOT_ALLOWED, &format!("only {methods}"));
-    answer.headers_mut().insert(ALLOW, HeaderValue::from_static(methods));
-    answer
+impl From<Refusal> for Refused {
+    fn from((status, words): Refusal) -> Self {
+        Self::Said(status, words.to_owned())
+    }
 }
 
-/// Words, as JSON.
-fn said(status: StatusCode, words: &str) -> Answer {
-    text(status, JSON, json!({ "error": words }).to_string())
+impl From<serde_json::Error> for Refused {
+    fn from(error: serde_json::Error) -> Self {
+        failed(&error)
+    }
+}
+
+impl From<ConsoleError> for Refused {
+    fn from(error: ConsoleError) -> Self {
+        match error {
+            ConsoleError::Refused(words) => Self::Said(StatusCode::CONFLICT, words),
+            error => Self::Said(StatusCode::GATEWAY_TIMEOUT, error.to_string()),
+        }
+    }
+}
+
+fn failed(error: &impl ToString) -> Refused {
+    Refused::Said(StatusCode::INTERNAL_SERVER_ERROR, error.to_string())
+}
+
+fn no_unit(serial: &str) -> Refused {
+    Refused::Said(StatusCode::NOT_FOUND, format!("this service knows no unit {serial}"))
 }

@@ -13,7 +13,7 @@ use super::units::{Unit, Units};
 use super::{Intake, lock, read};
 use crate::control::revision::Calibrations;
 use crate::receive::fault::{FaultKind, standing};
-use crate::receive::unit::{Footing, Outlet, StreamTimeoutSettings, UnitActor};
+use crate::receive::unit::{Footing, Outlet, UnitActor};
 
 /// How long a unit without a calibration is silent before another may have its place.
 const STRANGER_KEPT: Duration = Duration::from_secs(60);
@@ -49,7 +49,11 @@ impl Intake {
             return Some(Arc::clone(unit));
         }
         if !self.has_place(&units, calibrated) {
-            return self.refuse(&id);
+            let limit = self.settings.max_units;
+            self.fault(FaultKind::TooManyUnits, || {
+                format!("unit {id} is refused: all {limit} places (max_units) are taken")
+            });
+            return None;
         }
         let outlet = match self.outlets.take(&id) {
             Ok(outlet) => outlet,
@@ -88,10 +92,7 @@ impl Intake {
 
     /// A unit that knows nothing yet.
     fn make(&self, id: &UnitId, outlet: Outlet) -> UnitActor {
-        let settings = self.settings.unit;
-        let pairing_window = Duration::from_nanos(settings.pairing_window.as_ns().unsigned_abs());
-        let quiet = StreamTimeoutSettings { tail_flush: self.settings.tail_flush, pairing_window };
-        let mut actor = UnitActor::new(id.clone(), settings, quiet, outlet);
+        let mut actor = UnitActor::new(id.clone(), self.settings.unit, self.settings.tail_flush, outlet);
         if self.pair.as_ref().is_some_and(|pair| !pair.speaks_first()) {
             // The others may have heard more of it; where none speaks it does, after a while.
             actor.follow(Instant::now(), Footing::Nothing);
@@ -153,14 +154,6 @@ impl Intake {
             tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());
             self.forget(&id);
         }
-    }
-
-    fn refuse<T>(&self, id: &UnitId) -> Option<T> {
-        let limit = self.settings.max_units;
-        self.fault(FaultKind::TooManyUnits, || {
-            format!("unit {id} is refused: all {limit} places (max_units) are taken")
-        });
-        None
     }
 }
 

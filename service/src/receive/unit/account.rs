@@ -66,8 +66,7 @@ impl UnitActor {
     }
 
     /// What the unit says of itself; `instance` is the service's name for itself.
-    #[must_use]
-    pub fn status(&self, instance: &str) -> Status {
+    pub(crate) fn status(&self, instance: &str) -> Status {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         let mut status = self.stream.status(Edge {
             instance,
@@ -105,8 +104,7 @@ impl UnitActor {
     }
 
     /// Sum of the latencies that the status counts (ns).
-    #[must_use]
-    pub fn latency_sum_ns(&self) -> u64 {
+    pub(crate) fn latency_sum_ns(&self) -> u64 {
         self.latency.sum_ns()
     }
 
@@ -121,8 +119,7 @@ impl UnitActor {
     }
 
     /// The account of the unit since the service started.
-    #[must_use]
-    pub fn totals(&self) -> UnitTotals {
+    pub(crate) fn totals(&self) -> UnitTotals {
         let counters = self.counters();
         let value = |name| value_of(&counters, name);
         UnitTotals {

@@ -32,15 +32,6 @@ const CONTRADICTING: [&str; 3] = ["gyro_late", "gyro_implausible", "gyro_duplica
 /// Gyro frames of which a repeat is the network's doing.
 const REPEATED: usize = 8;
 
-/// Limits of a stream that may have stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StreamTimeoutSettings {
-    /// Shortest silence that counts as a stop.
-    pub tail_flush: Duration,
-    /// Pairing window of the unit; twice as long must pass.
-    pub pairing_window: Duration,
-}
-
 /// Follows the messages of one unit.
 ///
 /// A producer that sends a batch of 64 ticks every 640 ms has not stopped 500 ms after the last one. The silence that
@@ -48,7 +39,8 @@ pub struct StreamTimeoutSettings {
 /// stream that goes on.
 #[derive(Debug)]
 pub(super) struct Arrivals {
-    timeout: StreamTimeoutSettings,
+    /// Shortest silence that counts as a stop.
+    shortest: Duration,
     /// When the last gyro message came, and the distance of such messages.
     last: Option<Instant>,
     interval: Duration,
@@ -68,9 +60,10 @@ pub(super) struct Arrivals {
 }
 
 impl Arrivals {
-    pub(super) fn new(timeout: StreamTimeoutSettings, now: Instant) -> Self {
+    /// A stream has stopped after `tail_flush`, and not before twice the unit's pairing window has passed.
+    pub(super) fn new(tail_flush: Duration, pairing_window: Duration, now: Instant) -> Self {
         Self {
-            timeout,
+            shortest: tail_flush.max(pairing_window * 2),
             last: None,
             interval: ASSUMED_INTERVAL,
             messages: 0,
@@ -132,40 +125,40 @@ impl Arrivals {
 
     /// Whether the gyro stream has been silent for long enough to be called stopped.
     pub(super) fn is_over(&self, now: Instant) -> bool {
-        let StreamTimeoutSettings { tail_flush, pairing_window } = self.timeout;
-        let shortest = tail_flush.max(pairing_window * 2).max(self.interval * INTERVALS);
+        let shortest = self.shortest.max(self.interval * INTERVALS);
         self.last.is_none_or(|last| now.saturating_duration_since(last) >= shortest)
     }
 
     /// Goes on from other counters: what they had before did not come since.
     pub(super) fn go_on_from(&mut self, now: Instant, counters: &[Counter]) {
+        self.looked = (now, self.counts(counters));
+        self.contradicting = contradicting(counters);
+    }
+
+    fn counts(&self, counters: &[Counter]) -> [u64; 4] {
         let [gyro, accel, temperature] = COUNTERS.map(|name| value_of(counters, name));
-        self.looked = (now, [gyro, accel, temperature, self.messages]);
-        self.contradicting = CONTRADICTING.iter().map(|name| value_of(counters, name)).sum();
+        [gyro, accel, temperature, self.messages]
     }
 
     /// Looks at what has come since the last look: measures the rates; in words where two producers are at work, which looks like an
     /// input of twice the rate and is none.
     #[expect(clippy::cast_precision_loss, reason = "fewer than 2⁵³ messages")]
     pub(super) fn look(&mut self, now: Instant, counters: &[Counter]) -> Option<String> {
-        let value = |name| value_of(counters, name);
-        let [gyro, accel, temperature] = COUNTERS.map(value);
-        let counts = [gyro, accel, temperature, self.messages];
+        let counts = self.counts(counters);
         let (then, before) = std::mem::replace(&mut self.looked, (now, counts));
-        let [ticks, ..] = before;
+        let came: [u64; 4] = std::array::from_fn(|i| counts[i].saturating_sub(before[i]));
         let elapsed_s = now.saturating_duration_since(then).as_secs_f64();
         if elapsed_s > 0.0 {
-            let mut per_s =
-                counts.iter().zip(before).map(|(now, then)| now.saturating_sub(then) as f64 / elapsed_s);
-            let mut next = || per_s.next().unwrap_or_default();
+            let [gyro_ticks_per_s, accel_ticks_per_s, temperature_readings_per_s, messages_per_s] =
+                came.map(|count| count as f64 / elapsed_s);
             self.rates = InputRates {
-                gyro_ticks_per_s: next(),
-                accel_ticks_per_s: next(),
-                temperature_readings_per_s: next(),
-                messages_per_s: next(),
+                gyro_ticks_per_s,
+                accel_ticks_per_s,
+                temperature_readings_per_s,
+                messages_per_s,
             };
         }
-        self.two_producers(gyro.saturating_sub(ticks), CONTRADICTING.iter().map(|name| value(name)).sum())
+        self.two_producers(came[0], contradicting(counters))
     }
 
     /// Whether two producers are at work, in words; `ticks` came since the last look, and so many contradicted others so far.
@@ -193,6 +186,11 @@ impl Arrivals {
     }
 }
 
+/// Ticks that contradict others.
+fn contradicting(counters: &[Counter]) -> u64 {
+    CONTRADICTING.iter().map(|name| value_of(counters, name)).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -202,7 +200,7 @@ mod tests {
 
     fn arrivals(tail_flush: u32, pairing_window: u32, now: Instant) -> Arrivals {
         let [tail_flush, pairing_window] = [tail_flush, pairing_window].map(|ms| MS * ms);
-        Arrivals::new(StreamTimeoutSettings { tail_flush, pairing_window }, now)
+        Arrivals::new(tail_flush, pairing_window, now)
     }
 
     fn counters(ticks: u64, late: u64) -> [Counter; 2] {

@@ -54,19 +54,23 @@ impl UnitActor {
 
     /// Everything that the unit's stream knows at this moment, as the journal's entry; `instance` is the service's name for
     /// itself.
-    #[must_use]
     pub(crate) fn memory(&self, instance: &str) -> JournalEntry {
         let text = |next: &Arc<Revision>| next.document.text.as_ref().map(CompressedText::read);
+        let event = JournalEvent::Memory {
+            memory: self.stream.memory(),
+            document: self.plan.current.as_ref().and_then(text),
+            pending: self.plan.pending.as_ref().and_then(|change| text(&change.next)),
+        };
+        self.entry(instance, event)
+    }
+
+    fn entry(&self, instance: &str, event: JournalEvent) -> JournalEntry {
         JournalEntry {
             unit: self.id().to_string(),
             instance: instance.to_owned(),
             number: self.journal_writer.number,
             heard: self.stream.heard(),
-            event: JournalEvent::Memory {
-                memory: self.stream.memory(),
-                document: self.plan.current.as_ref().and_then(text),
-                pending: self.plan.pending.as_ref().and_then(|change| text(&change.next)),
-            },
+            event,
         }
     }
 
@@ -88,23 +92,15 @@ impl UnitActor {
     }
 
     fn write_entry(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
-        let Some(journal) = &self.journal_writer.journal else { return };
+        let Some(journal) = self.journal_writer.journal.clone() else { return };
         self.journal_writer.number += 1;
-        let entry = JournalEntry {
-            unit: self.stream.id().to_string(),
-            instance: journal.instance.as_ref().to_owned(),
-            number: self.journal_writer.number,
-            heard: self.stream.heard(),
-            event: event(&self.stream),
-        };
-        self.tell_entry(&entry);
+        self.tell_entry(&self.entry(&journal.instance, event(&self.stream)));
     }
 
     /// Says in the journal what the stream knows.
     pub(super) fn journal_memory(&mut self) {
-        let Some(journal) = &self.journal_writer.journal else { return };
-        let instance = Arc::clone(&journal.instance);
-        self.tell_entry(&self.memory(&instance));
+        let Some(journal) = self.journal_writer.journal.clone() else { return };
+        self.tell_entry(&self.memory(&journal.instance));
     }
 
     fn tell_entry(&mut self, entry: &JournalEntry) {

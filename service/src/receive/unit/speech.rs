@@ -15,6 +15,7 @@ use isotherm_protocol::pair::{Role, UnitRole};
 
 use super::{Plan, UnitActor};
 use crate::control::Notice;
+use crate::receive::fault::FaultKind;
 use following::Following;
 
 /// How often the memory is asked for while none comes.
@@ -63,19 +64,10 @@ pub(crate) struct Wants {
     pub(crate) memory: bool,
     /// It has begun to speak.
     pub(crate) spoke: bool,
-    /// What is wrong, in words.
-    pub(crate) alarm: Option<Alarm>,
+    /// What was to be impossible, in words.
+    pub(crate) alarm: Option<(FaultKind, String)>,
     /// When the other instance's output is late, if nothing is heard until then: the next look is due by that time.
     pub(crate) late_at: Option<Instant>,
-}
-
-/// What was to be impossible.
-#[derive(Debug)]
-pub(crate) enum Alarm {
-    /// Another instance computed other bits.
-    OtherBits(String),
-    /// Two instances publish the unit that are not configured to.
-    TwoSpeak(String),
 }
 
 /// Where the output of a unit goes, and what is known of the other instance's.
@@ -110,20 +102,17 @@ impl UnitActor {
     }
 
     /// Highest revision counter that the unit was given.
-    #[must_use]
     pub(crate) fn highest_revision(&self) -> u64 {
         self.stream.next_counter().saturating_sub(1)
     }
 
     /// Whether it is being found out if another instance speaks.
-    #[must_use]
     pub(crate) fn doubts(&self) -> bool {
         self.speech.following.as_ref().is_some_and(|following| following.doubt)
     }
 
     /// Whether this instance publishes the unit's ticks, and swaps and commands are its own.
-    #[must_use]
-    pub fn speaks(&self) -> bool {
+    pub(crate) fn speaks(&self) -> bool {
         self.speech.following.as_ref().is_none_or(|following| following.isolated)
     }
 
@@ -200,7 +189,10 @@ impl UnitActor {
                 return wants;
             }
             wants.alarm = self.two_speak(now);
-            self.tell_memory();
+            // Another instance's journal went before.
+            if std::mem::take(&mut self.speech.memory_due) {
+                self.journal_memory();
+            }
             return wants;
         }
         self.catch_up(now);
@@ -214,7 +206,7 @@ impl UnitActor {
             let series = self.stream.incoming_series();
             let words = format!("unit {}, series {series}, sequence {tick}: {words}", self.stream.id());
             self.speech.last_difference = Some(words.clone());
-            wants.alarm = Some(Alarm::OtherBits(words));
+            wants.alarm = Some((FaultKind::OtherBits, words));
             following.lose();
         } else if settled.missed {
             following.lose();
@@ -303,15 +295,7 @@ impl UnitActor {
         self.plan = plan;
     }
 
-    /// Says in the journal what the stream knows, where another instance's journal went before.
-    fn tell_memory(&mut self) {
-        if std::mem::take(&mut self.speech.memory_due) {
-            self.journal_memory();
-        }
-    }
-
     /// What the instance does for the unit.
-    #[must_use]
     pub(crate) fn role(&self) -> UnitRole {
         let Speech { following, compared, differing, takeovers, last_difference, .. } = &self.speech;
         let role = match following {

@@ -52,11 +52,8 @@ impl Sink {
 }
 
 fn actor(outlet: Outlet) -> UnitActor {
-    let stream_timeout = StreamTimeoutSettings {
-        tail_flush: Duration::from_millis(100),
-        pairing_window: Duration::from_millis(50),
-    };
-    UnitActor::new(UnitId::new("U-1").unwrap(), UnitSettings::default(), stream_timeout, outlet)
+    let tail_flush = Duration::from_millis(100);
+    UnitActor::new(UnitId::new("U-1").unwrap(), UnitSettings::default(), tail_flush, outlet)
 }
 
 fn example() -> (Arc<Calibration>, [u8; 8]) {
@@ -228,8 +225,11 @@ fn a_reset_keeps_a_change_that_waits_and_the_state() {
     actor.change(Change { next, at: Schedule::Sequence(70), slew: Span::ZERO });
     actor.reset("a test says so");
     assert_eq!(actor.waiting(), Some((2, Schedule::Sequence(70))));
-    let present = actor.present();
-    assert_eq!((present.state, present.revision, present.pending), (State::Standby, 1, Some(2)));
+    let pending = actor.stream.unit().pending().map(|(counter, _)| counter);
+    assert_eq!(
+        (actor.present().state, actor.stream.revision().counter, pending),
+        (State::Standby, 1, Some(2))
+    );
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn a_revision_that_was_given_already_is_passed_over() {
     actor.take_status_due();
     assert_eq!(actor.change(change), None);
     assert!(!actor.take_status_due());
-    assert_eq!(actor.present().revision, 4);
+    assert_eq!(actor.stream.revision().counter, 4);
 }
 
 #[test]

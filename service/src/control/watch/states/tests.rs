@@ -1,10 +1,12 @@
+use std::time::Duration;
+
 use super::*;
 use crate::control::watch::folder::look;
 
 const MS: Duration = Duration::from_millis(1);
 
-fn settings() -> WatchSettings {
-    WatchSettings { settle: MS * 100, ..WatchSettings::default() }
+fn settings() -> FolderSettings {
+    FolderSettings { settle: MS * 100, ..FolderSettings::default() }
 }
 
 /// What a look at a file of this length sees.
@@ -15,7 +17,7 @@ fn sight(length: usize) -> Sight {
 }
 
 fn content(digest: u8) -> Content {
-    Content { bytes: vec![digest], digest: [digest; 32], steady: true }
+    Content { bytes: vec![digest], digest: Digest([digest; 32]), steady: true }
 }
 
 /// When (ms after `start`) the next file has settled.
@@ -36,7 +38,7 @@ fn a_file_settles_anew_with_every_change_that_a_look_sees() {
     assert!(states.due(start + MS * 189).is_empty());
     assert_eq!(states.due(start + MS * 190), [file]);
     let event = states.read(start + MS * 190, file, Ok(content(1)));
-    assert!(matches!(event, Some(FolderEvent::Changed { digest, .. }) if digest == [1; 32]), "{event:?}");
+    assert!(matches!(&event, Some(FolderEvent::Changed { bytes, .. }) if *bytes == [1]), "{event:?}");
     assert_eq!(due_ms(&states, start), None);
 }
 
@@ -70,7 +72,7 @@ fn a_file_that_is_written_while_it_is_read_settles_anew() {
 #[test]
 fn a_file_that_is_away_within_the_grace_time_was_never_gone() {
     let (start, file) = (Instant::now(), Path::new("a.toml"));
-    let known = BTreeMap::from([(file.to_owned(), Known::Content([1; 32]))]);
+    let known = BTreeMap::from([(file.to_owned(), Known::Content(Digest([1; 32])))]);
     let mut states = FileStates::new(settings(), known);
     states.see(start, file, sight(1));
     assert_eq!(states.read(start + MS * 100, file, Ok(content(1))), None, "the owner knows it");

@@ -197,9 +197,8 @@ fn a_huge_file_is_told_with_one_byte_too_many() {
         let scene = Scene::new(by, &[]);
         let mut file = File::create(scene.path("a.toml")).unwrap();
         file.write_all(&vec![b'#'; 3 * MAX_DOCUMENT_BYTES]).unwrap();
-        let FolderEvent::Changed { bytes, digest, .. } = scene.next() else { panic!("not a change") };
+        let FolderEvent::Changed { bytes, .. } = scene.next() else { panic!("not a change") };
         assert_eq!(bytes.len(), MAX_DOCUMENT_BYTES + 1);
-        assert_eq!(digest, <[u8; 32]>::from(Sha256::digest(&bytes)));
         file.write_all(b"behind the cut").unwrap();
         scene.expect_nothing();
     });

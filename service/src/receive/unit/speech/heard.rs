@@ -10,8 +10,9 @@ use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::raw::GyroBatch;
 use isotherm_protocol::stream::UnitStream;
 
-use super::{Alarm, Footing, Standing};
+use super::{Footing, Standing};
 use crate::control::Notice;
+use crate::receive::fault::FaultKind;
 use crate::receive::unit::UnitActor;
 
 /// How long after the other instance is lost what the producer sent before may still come.
@@ -164,7 +165,7 @@ impl UnitActor {
     }
 
     /// Whether two speak for so long that it is an alarm.
-    pub(super) fn two_speak(&mut self, now: Instant) -> Option<Alarm> {
+    pub(super) fn two_speak(&mut self, now: Instant) -> Option<(FaultKind, String)> {
         let (first, last) = self.speech.doubled?;
         let lasts = now.saturating_duration_since(last) < DOUBLED;
         if !lasts {
@@ -173,10 +174,9 @@ impl UnitActor {
         }
         let long = last.saturating_duration_since(first) >= DOUBLED;
         (long && !std::mem::replace(&mut self.speech.two_told, true)).then(|| {
-            Alarm::TwoSpeak(format!(
-                "unit {}: another service publishes its corrected ticks too",
-                self.stream.id()
-            ))
+            let words =
+                format!("unit {}: another service publishes its corrected ticks too", self.stream.id());
+            (FaultKind::TwoSpeak, words)
         })
     }
 }
