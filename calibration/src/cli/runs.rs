@@ -29,14 +29,6 @@ pub(super) struct LogArgs {
     pub(super) reading: Reading,
 }
 
-/// Logs that a document is judged on.
-#[derive(Debug, Clone, Args)]
-pub(super) struct JudgeArgs {
-    /// Log to judge the new document by, not used in the fit; repeatable
-    #[arg(long, value_name = "LOG")]
-    pub(super) judge: Vec<PathBuf>,
-}
-
 /// The document that a fit starts from.
 #[derive(Debug, Clone, Args)]
 pub(super) struct BaseArgs {
