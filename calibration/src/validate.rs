@@ -89,9 +89,7 @@ pub fn validate(
         let rows = Rows::mostly_valid(window_s);
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
         let tables = Table::together_seen(run, &documents, rows, &mut watch, seen)?;
-        let mut tables = tables.into_iter();
-        let mut next = || tables.next().unwrap_or_default();
-        let (after, nominal) = (next(), next());
+        let [after, nominal] = <[Table; 2]>::try_from(tables).unwrap_or_default();
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = nothing_valid(&run.name, name, &after);
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));

@@ -136,25 +136,19 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
 
 fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let step = median_step_s(&ticks.end_ns);
-    let mut missing = 0.0;
-    let (mut count, mut longest, mut at) = (0, 0.0, 0.0);
-    let first = ticks.end_ns.first().copied().unwrap_or_default();
-    for pair in ticks.end_ns.windows(2) {
-        let (gap, since) = (seconds(pair[1].saturating_sub(pair[0])), seconds(pair[0].saturating_sub(first)));
-        if gap > MISSING_TICK * step {
-            count += 1;
-            missing += gap - step;
-            if gap > longest {
-                (longest, at) = (gap, since);
-            }
-        }
-    }
-    let whole = seconds(ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first));
-    if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
+    let since = |end: i64| seconds(end.saturating_sub(ticks.end_ns[0]));
+    // Lengths, and since when.
+    let long = ticks.end_ns.windows(2).map(|pair| [seconds(pair[1].saturating_sub(pair[0])), since(pair[0])]);
+    let gaps: Vec<[f64; 2]> = long.filter(|[gap, _]| *gap > MISSING_TICK * step).collect();
+    let missing = gaps.iter().map(|[gap, _]| gap - step).sum::<f64>();
+    let Some([longest, at]) = gaps.iter().copied().reduce(|a, b| if b[0] > a[0] { b } else { a }) else {
+        return;
+    };
+    if missing > SMALL_SHARE * ticks.length_s() || longest > 60.0 {
         found.warnings.push(format!(
             "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags \
              and derivatives are poor after a gap; if it matters, leave it out with --start and --duration",
-            counted(count, "gap", "gaps")
+            counted(gaps.len(), "gap", "gaps")
         ));
     }
 }

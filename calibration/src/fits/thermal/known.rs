@@ -73,7 +73,7 @@ pub(super) fn histories(
             range_deg_c: [-300.0, 1000.0],
             derivatives: [[0.0; 2]; 2],
         };
-        let (temperature, _) = Columns::new(basis, samples).temperature()?;
+        let temperature = Columns::new(basis, samples).temperature()?;
         let mut parts = Vec::new();
         let mut from = 0;
         for run in samples {
