@@ -52,7 +52,6 @@ pub(super) struct DriftArgs {
 }
 
 impl DriftArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let files = self.output.files();
         if files.out.is_some() && (self.base.document.is_none() || self.accelerometers) {
@@ -105,10 +104,8 @@ impl DriftArgs {
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
         if self.is_corrected() {
             let unit = self.log.reading.serial()?;
-            let mut bar = job.at_work("reading");
-            let columns = Columns::of_corrected(&self.log.log, unit.as_ref(), kind, &work.cut, || bar.step());
-            bar.finish();
-            return columns;
+            let bar = job.at_work("reading");
+            return Columns::of_corrected(&self.log.log, unit.as_ref(), kind, &work.cut, bar);
         }
         let run = work.run()?;
         if let Some(document) = &work.base {

@@ -103,7 +103,6 @@ impl Gyro {
 }
 
 impl ImpactArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.check()?;
         let mut voyage = self.voyage;
@@ -204,10 +203,7 @@ impl ImpactArgs {
         let unit = self.reading.serial()?;
         let raw = self.reading.mapping.is_some();
         if !raw && (logs.iter().all(|path| is_csv(path)) || self.document.is_none()) {
-            let mut bar = Bar::at_work("reading");
-            let columns = Columns::of_corrected(logs, unit.as_ref(), Kind::Rate, cut, || bar.step());
-            bar.finish();
-            return columns;
+            return Columns::of_corrected(logs, unit.as_ref(), Kind::Rate, cut, Bar::at_work("reading"));
         }
         let Some(document) = &self.document else {
             return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));

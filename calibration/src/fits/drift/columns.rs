@@ -150,7 +150,7 @@ impl Columns {
         unit: Option<&UnitId>,
         kind: Kind,
         cut: &Cut,
-        mut progress: impl FnMut(),
+        mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let unnamed = unnamed()?;
         let units = unit.cloned().into_iter().collect();
@@ -166,10 +166,11 @@ impl Columns {
                     )));
                 }
                 ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
-                progress();
+                watch.step();
             }
             log.cut_short().iter().for_each(|words| cut.recording(words));
         }
+        watch.end();
         columns.map_or_else(
             || {
                 let none =

@@ -163,7 +163,7 @@ fn finish(
     let fitted: Vec<Variance> = overlapping.map(|(_, variance)| *variance).collect();
     let noise = NoiseFit::of(&fitted, grid.tick_s).map(|noise| noise.of_pieces(sensor.pieces.len()));
     let slow = prepared.slow.clone();
-    let markov = Fit::with_daily_lines(&slow, 1);
+    let markov = Fit::with_daily_lines(&slow);
     let second_order = markov
         .as_ref()
         .and_then(|(fit, _)| Fit::with_noise(&slow, &Beside { degree: 2, ..fit.beside.clone() }, fit.noise));
