@@ -202,18 +202,15 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
 
 /// Columns that look swapped, where the attitude is known.
 fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
-    let looks = |of: [&'static str; 2], sizes: [Size; 3], stated: Option<[f64; 3]>| {
-        Shown::of(of, sizes, stated?).swapped()
-    };
-    let words = [
-        looks(["gyros", "°/h"], [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
-        looks(
-            ["accelerometers", "m/s²"],
-            [0, 1, 2].map(|axis| Size::of(means.force(axis))),
-            place.and_then(force_at_rest),
-        ),
+    let sizes = |column: fn(&Table, usize) -> &[f64]| [0, 1, 2].map(|axis| Size::of(column(means, axis)));
+    let kinds = [
+        (["gyros", "°/h"], sizes(Table::rate), rest.rate_deg_per_h),
+        (["accelerometers", "m/s²"], sizes(Table::force), place.and_then(force_at_rest)),
     ];
-    words.into_iter().flatten().map(|words| format!("{name}: {words}")).collect()
+    let looks = |(of, sizes, stated): ([&'static str; 2], [Size; 3], Option<[f64; 3]>)| {
+        Some(format!("{name}: {}", Shown::of(of, sizes, stated?).swapped()?))
+    };
+    kinds.into_iter().filter_map(looks).collect()
 }
 
 /// The curves of the three axes of a kind.

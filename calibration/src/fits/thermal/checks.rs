@@ -311,20 +311,16 @@ pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &
     if stand.turning.is_some() {
         return found;
     }
-    let along = |rows: &[[f64; 3]], vector: [f64; 3]| -> Option<[f64; 3]> {
-        let along = |row: &[f64; 3]| dot(*row, vector);
-        <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
+    let shown = |of, columns: &[Vec<f64>], rows: &[[f64; 3]], truth: Option<[f64; 3]>| {
+        let truth = truth?;
+        let stated: Vec<f64> = rows.iter().map(|row| dot(*row, truth)).collect();
+        let sizes: Vec<Size> = columns.iter().map(|values| Size::of(values)).collect();
+        Some(Shown::of(of, sizes.try_into().ok()?, stated.try_into().ok()?))
     };
-    let sizes = |columns: &[Vec<f64>]| -> Option<[Size; 3]> {
-        <[Size; 3]>::try_from(columns.iter().map(|values| Size::of(values)).collect::<Vec<Size>>()).ok()
-    };
-    let rate = rest.rate_deg_per_h.and_then(|rate| along(&document.gyro.orientation.rows, rate));
-    let accel = document.accel.as_ref();
-    let force = rest.force_m_per_s2.zip(accel).and_then(|(force, a)| along(&a.orientation.rows, force));
-    let gyros = sizes(&samples.gyros).zip(rate).map(|(sizes, rate)| Shown::of(["gyros", "°/h"], sizes, rate));
-    let forces = sizes(&samples.forces)
-        .zip(force)
-        .map(|(sizes, force)| Shown::of(["accelerometers", "m/s²"], sizes, force));
+    let rows = document.accel.as_ref().map_or(&[][..], |accel| &accel.orientation.rows);
+    let forces = shown(["accelerometers", "m/s²"], &samples.forces, rows, rest.force_m_per_s2);
+    let rows = &document.gyro.orientation.rows;
+    let gyros = shown(["gyros", "°/h"], &samples.gyros, rows, rest.rate_deg_per_h);
     let named = |looks: Option<Looks>| looks.map(|looks| format!("{}: {looks}", samples.name));
     found.warnings.extend([gyros, forces].into_iter().flatten().filter_map(|shown| named(shown.swapped())));
     // The bias of a gyro may be many times the Earth's rate; that of an accelerometer is no third of gravity.
