@@ -32,7 +32,6 @@ pub(super) struct BoardArgs {
 }
 
 impl BoardArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.common.run("Boards of several units", None, |job| self.fit(job))
     }

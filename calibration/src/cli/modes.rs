@@ -33,7 +33,6 @@ const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not state
                            --calibration with increment weights, input axes, temperature channels and filter";
 
 impl ModesArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         if self.common.base.document.is_none() {
             return Err(Error::Usage(NO_DOCUMENT.to_owned()));

@@ -74,7 +74,6 @@ pub(super) struct PositionsArgs {
 }
 
 impl PositionsArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let plan = Plan::named(&self.plan)?;
         if self.budget {

@@ -61,7 +61,6 @@ pub(super) struct RatesArgs {
 }
 
 impl RatesArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.common.run("Rate table, several units", self.steps.as_deref(), |job| self.fit(job))
     }

@@ -45,7 +45,6 @@ pub(super) struct ThermalArgs {
 }
 
 impl ThermalArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let judging = Reading {
             start: self.judge_start.map_or(Span::ZERO, Span::from_s),
