@@ -83,8 +83,8 @@ pub struct Report {
     pub charts: Vec<(String, Chart)>,
     /// A row for each sensor, or case, where sizes before and after do not say what came of it.
     pub summary: Option<Table>,
-    /// What its JSON has besides.
-    pub figures: serde_json::Map<String, Value>,
+    /// What its JSON has besides: an object, or nothing.
+    pub figures: Value,
 }
 
 impl Report {

@@ -89,9 +89,7 @@ pub fn validate(
         let rows = Rows::mostly_valid(window_s);
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
         let tables = Table::together_seen(run, &documents, rows, &mut watch, seen)?;
-        let mut tables = tables.into_iter();
-        let mut next = || tables.next().unwrap_or_default();
-        let (after, nominal) = (next(), next());
+        let [after, nominal] = <[Table; 2]>::try_from(tables).unwrap_or_default();
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = nothing_valid(&run.name, name, &after);
             return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
@@ -204,18 +202,15 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
 
 /// Columns that look swapped, where the attitude is known.
 fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
-    let looks = |of: [&'static str; 2], sizes: [Size; 3], stated: Option<[f64; 3]>| {
-        Shown::of(of, sizes, stated?).swapped()
-    };
-    let words = [
-        looks(["gyros", "°/h"], [0, 1, 2].map(|axis| Size::of(means.rate(axis))), rest.rate_deg_per_h),
-        looks(
-            ["accelerometers", "m/s²"],
-            [0, 1, 2].map(|axis| Size::of(means.force(axis))),
-            place.and_then(force_at_rest),
-        ),
+    let sizes = |column: fn(&Table, usize) -> &[f64]| [0, 1, 2].map(|axis| Size::of(column(means, axis)));
+    let kinds = [
+        (["gyros", "°/h"], sizes(Table::rate), rest.rate_deg_per_h),
+        (["accelerometers", "m/s²"], sizes(Table::force), place.and_then(force_at_rest)),
     ];
-    words.into_iter().flatten().map(|words| format!("{name}: {words}")).collect()
+    let looks = |(of, sizes, stated): ([&'static str; 2], [Size; 3], Option<[f64; 3]>)| {
+        Some(format!("{name}: {}", Shown::of(of, sizes, stated?).swapped()?))
+    };
+    kinds.into_iter().filter_map(looks).collect()
 }
 
 /// The curves of the three axes of a kind.

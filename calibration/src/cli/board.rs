@@ -2,11 +2,9 @@
 
 use clap::{Arg, Args};
 
-use super::driver::{Job, Task};
-use super::output::OutputArgs;
-use super::runs::{BaseArgs, JudgeArgs, LogArgs};
+use super::driver::Job;
+use super::output::FitArgs;
 use super::thermal::StandArgs;
-use super::units::Logs;
 use crate::document::{About, Fitted};
 use crate::error::Error;
 use crate::fits::board::{Wanted, fit};
@@ -22,11 +20,7 @@ use crate::limits::within;
     The document names the boards' channels.", mut_arg("document", |document: Arg| document.required(true)))]
 pub(super) struct BoardArgs {
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
-    judge: JudgeArgs,
-    #[command(flatten)]
-    base: BaseArgs,
+    common: FitArgs,
     /// Temperature of the board at which the ratio is 1 (°C) (default: the middle of its range)
     #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true, value_parser = within(-100.0, 200.0))]
     reference: Option<f64>,
@@ -35,16 +29,11 @@ pub(super) struct BoardArgs {
     fit_window: f64,
     #[command(flatten)]
     stands: StandArgs,
-    #[command(flatten)]
-    output: OutputArgs,
 }
 
 impl BoardArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let logs = Logs::apart(&self.log, &self.judge, &self.base);
-        let task = Task::new("Boards of several units", self.output.files(), logs);
-        task.run(|job| self.output.done(self.fit(job)?, job))
+        self.common.run("Boards of several units", None, |job| self.fit(job))
     }
 
     fn fit(&self, job: &Job<'_>) -> Result<Fitted, Error> {

@@ -38,7 +38,6 @@ pub(super) struct DiffArgs {
 }
 
 impl DiffArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let paths: Vec<&Path> = [&self.before].into_iter().chain(&self.after).map(PathBuf::as_path).collect();
         let files = self.page.files();

@@ -52,7 +52,6 @@ pub(super) struct DriftArgs {
 }
 
 impl DriftArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let files = self.output.files();
         if files.out.is_some() && (self.base.document.is_none() || self.accelerometers) {
@@ -125,7 +124,8 @@ impl DriftArgs {
         let work = job.work;
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
         if self.is_corrected() {
-            return self.log.reading.corrected(&self.log.log, kind, &work.cut, job.at_work("reading"));
+            let part = self.log.reading.part()?;
+            return Columns::of_corrected(&self.log.log, &part, kind, &work.cut, job.at_work("reading"));
         }
         let run = work.run()?;
         if let Some(document) = &work.base {

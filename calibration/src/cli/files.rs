@@ -92,21 +92,15 @@ pub(super) fn writable(out: &Path, inputs: &[&Path], overwrite: bool) -> Result<
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
-    if !folder.exists() {
-        return Err(Error::Usage(format!(
-            "{} cannot be written: first create the folder with mkdir -p {}",
-            out.display(),
-            folder.display()
-        )));
+    if folder.is_dir() {
+        return probe(out, folder).map_err(|source| Error::file(out, "write", source));
     }
-    if !folder.is_dir() {
-        return Err(Error::Usage(format!(
-            "{} cannot be written: {} is not a folder",
-            out.display(),
-            folder.display()
-        )));
-    }
-    probe(out, folder).map_err(|source| Error::file(out, "write", source))
+    let why = if folder.exists() {
+        format!("{} is not a folder", folder.display())
+    } else {
+        format!("first create the folder with mkdir -p {}", folder.display())
+    };
+    Err(Error::Usage(format!("{} cannot be written: {why}", out.display())))
 }
 
 /// Tries whether a file can be written, and leaves everything as it was: permissions do not tell of a file system that is read only.

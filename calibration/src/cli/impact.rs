@@ -103,7 +103,6 @@ impl Gyro {
 }
 
 impl ImpactArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         self.check()?;
         let mut voyage = self.voyage;
@@ -203,7 +202,8 @@ impl ImpactArgs {
         let args = LogArgs { log: logs.to_vec(), reading: self.reading.clone() };
         let raw = self.reading.mapping.is_some();
         if !raw && (logs.iter().all(|path| is_csv(path)) || self.document.is_none()) {
-            return self.reading.corrected(logs, Kind::Rate, cut, Bar::at_work("reading"));
+            let part = self.reading.part()?;
+            return Columns::of_corrected(logs, &part, Kind::Rate, cut, Bar::at_work("reading"));
         }
         let Some(document) = &self.document else {
             return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));

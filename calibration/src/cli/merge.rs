@@ -44,7 +44,6 @@ pub(super) struct MergeArgs {
 }
 
 impl MergeArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let inputs: Vec<&Path> = self.part.iter().chain([&self.base]).map(PathBuf::as_path).collect();
         let files = Files { out: Some(&self.out), html: None, overwrite: self.overwrite, json: self.json };

@@ -3,11 +3,9 @@
 use clap::Args;
 use isotherm_correction::earth::Place;
 
-use super::driver::{Job, Task};
-use super::output::OutputArgs;
+use super::driver::Job;
+use super::output::FitArgs;
 use super::place::PlaceArgs;
-use super::runs::{BaseArgs, JudgeArgs, LogArgs};
-use super::units::Logs;
 use crate::document::{About, Fitted};
 use crate::error::Error;
 use crate::fits::modes::document::{details, sigmas};
@@ -24,32 +22,23 @@ use crate::numbers::hull;
     The runs are at rest, with mode reversal, over the temperatures of use. The document gives scale, axes, temperature channels and filter; its static, magnetic and slow-meander terms are replaced, and transition ticks and servo if the runs show them.")]
 pub(super) struct ModesArgs {
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
-    judge: JudgeArgs,
-    #[command(flatten)]
-    base: BaseArgs,
+    common: FitArgs,
     #[command(flatten)]
     place: PlaceArgs,
     #[command(flatten)]
     asked: Asked,
-    #[command(flatten)]
-    output: OutputArgs,
 }
 
 const NO_DOCUMENT: &str = "a mode-reversed gyro counts, and a log does not state its increment weight: give \
                            --calibration with increment weights, input axes, temperature channels and filter";
 
 impl ModesArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        if self.base.document.is_none() {
+        if self.common.base.document.is_none() {
             return Err(Error::Usage(NO_DOCUMENT.to_owned()));
         }
         let place = self.place.place()?;
-        let logs = Logs::apart(&self.log, &self.judge, &self.base);
-        let task = Task::new("Mode-reversed gyros of several units", self.output.files(), logs);
-        task.run(|job| self.output.done(self.fit(job, place)?, job))
+        self.common.run("Mode-reversed gyros of several units", None, |job| self.fit(job, place))
     }
 
     fn fit(&self, job: &Job<'_>, place: Option<Place>) -> Result<Fitted, Error> {

@@ -1,16 +1,50 @@
 //! The arguments that say where a fit's document and report go, and what the document says of the fit.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
 use isotherm_protocol::document::Created;
 use isotherm_protocol::history::WallTime;
 
-use super::driver::{Done, Job};
+use super::driver::{Done, Job, Task};
 use super::files::Files;
+use super::runs::{BaseArgs, LogArgs};
+use super::units::Logs;
 use crate::document::Fitted;
 use crate::error::Error;
+
+/// What the fits have in common: logs, of which each is a run, those that judge, the document at the beginning, and what is written.
+#[derive(Debug, Clone, Args)]
+pub(super) struct FitArgs {
+    #[command(flatten)]
+    pub(super) log: LogArgs,
+    /// Log to judge the new document by, not used in the fit; repeatable
+    #[arg(long, value_name = "LOG")]
+    judge: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) base: BaseArgs,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+}
+
+impl FitArgs {
+    /// Its logs and its document.
+    pub(super) fn logs(&self) -> Logs<'_> {
+        Logs { judge: &self.judge, document: self.base.document.as_deref(), ..Logs::of(&self.log) }
+    }
+
+    /// Fits every unit; `beside` is what else is read.
+    pub(super) fn run(
+        &self,
+        title: &'static str,
+        beside: Option<&Path>,
+        fit: impl Fn(&Job<'_>) -> Result<Fitted, Error> + Sync,
+    ) -> Result<(), Error> {
+        let task = Task { beside, ..Task::new(title, self.output.files(), self.logs()) };
+        task.run(|job| self.output.done(fit(job)?, job))
+    }
+}
 
 /// What a fit writes.
 #[derive(Debug, Clone, Args)]

@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Arg, Args};
 
-use super::driver::{Job, Task, close};
-use super::output::OutputArgs;
+use super::driver::{Job, close};
+use super::output::FitArgs;
 use super::place::GravityArgs;
-use super::runs::{BaseArgs, JudgeArgs, LogArgs};
-use super::units::Logs;
 use crate::document::{About, Fitted, Written};
 use crate::error::Error;
 use crate::fits::positions::bare::of_run;
@@ -39,7 +37,7 @@ use crate::runs::{Run, Watch};
     mut_arg("log", |log: Arg| log.required(false).required_unless_present("budget")))]
 pub(super) struct PositionsArgs {
     #[command(flatten)]
-    log: LogArgs,
+    common: FitArgs,
     /// Print only the error budget of a planned calibration (default: the example of 004)
     #[arg(long, conflicts_with_all = ["log", "document", "out", "judge", "html", "times"])]
     budget: bool,
@@ -49,10 +47,6 @@ pub(super) struct PositionsArgs {
     /// Times of the positions (CSV: `start_s,end_s,position[,log]`), for logs without turns (default: found in the logs)
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    #[command(flatten)]
-    base: BaseArgs,
-    #[command(flatten)]
-    judge: JudgeArgs,
     #[command(flatten)]
     gravity: GravityArgs,
     /// σ1: standard deviation of the stand's positioning (″)
@@ -77,24 +71,18 @@ pub(super) struct PositionsArgs {
     accelerometer_unit: Option<String>,
     #[command(flatten)]
     planned: Budget,
-    #[command(flatten)]
-    output: OutputArgs,
 }
 
 impl PositionsArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let plan = Plan::named(&self.plan)?;
         if self.budget {
             return self.print_budget(&plan);
         }
         let (settings, about_gravity) = self.settings(plan)?;
-        let logs = Logs::apart(&self.log, &self.judge, &self.base);
-        let task = Task {
-            beside: self.times.as_deref(),
-            ..Task::new("Accelerometers of several units", self.output.files(), logs)
-        };
-        task.run(|job| self.output.done(self.fit(job, &settings, about_gravity.as_ref())?, job))
+        self.common.run("Accelerometers of several units", self.times.as_deref(), |job| {
+            self.fit(job, &settings, about_gravity.as_ref())
+        })
     }
 
     fn print_budget(&self, plan: &Plan) -> Result<(), Error> {
@@ -104,7 +92,7 @@ impl PositionsArgs {
             ..self.planned.clone()
         };
         let levelling_rad = self.levelling / ARCSEC_PER_RAD;
-        close(&self.output.files(), &budget.report(plan, levelling_rad), Report::whole_text)
+        close(&self.common.output.files(), &budget.report(plan, levelling_rad), Report::whole_text)
     }
 
     fn settings(&self, plan: Plan) -> Result<(Settings, Option<String>), Error> {

@@ -6,11 +6,9 @@ use clap::Args;
 use isotherm_cli::Bar;
 use isotherm_protocol::document::{Document, GyroOutput};
 
-use super::driver::{Job, Task};
-use super::output::OutputArgs;
+use super::driver::Job;
+use super::output::FitArgs;
 use super::place::PlaceArgs;
-use super::runs::{BaseArgs, JudgeArgs, LogArgs};
-use super::units::Logs;
 use crate::axes::AXES;
 use crate::document::{About, Fitted};
 use crate::error::Error;
@@ -33,9 +31,7 @@ use crate::runs::table::is_one_g;
     Plateaus of steady rate and the rests between them are found in the log, in the order of --rates. --steps is a CSV with the columns log, axis, rate_deg_per_s, begin_s, end_s (log and times optional), or TOML with [[step]] tables of these keys; judging logs are numbered after the others, for each unit separately. Latitude and attitude are those of the beginning of each log.")]
 pub(super) struct RatesArgs {
     #[command(flatten)]
-    log: LogArgs,
-    #[command(flatten)]
-    judge: JudgeArgs,
+    common: FitArgs,
     /// Axis of the table in case axes (x, -y, … or 0,0.6,0.8); once for each log, then for each judging log
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "rates")]
     axis: Vec<String>,
@@ -55,8 +51,6 @@ pub(super) struct RatesArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "rates", "judge_rates"])]
     steps: Option<PathBuf>,
     #[command(flatten)]
-    base: BaseArgs,
-    #[command(flatten)]
     place: PlaceArgs,
     /// Standard deviation of the table's rates (ppm)
     #[arg(long, hide_short_help = true, value_name = "PPM", default_value_t = 0.0, value_parser = within(0.0, 1e6))]
@@ -64,19 +58,11 @@ pub(super) struct RatesArgs {
     /// Add the remaining bias to the document's static bias
     #[arg(long, hide_short_help = true)]
     with_bias: bool,
-    #[command(flatten)]
-    output: OutputArgs,
 }
 
 impl RatesArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
-        let logs = Logs::apart(&self.log, &self.judge, &self.base);
-        let task = Task {
-            beside: self.steps.as_deref(),
-            ..Task::new("Rate table, several units", self.output.files(), logs)
-        };
-        task.run(|job| self.output.done(self.fit(job)?, job))
+        self.common.run("Rate table, several units", self.steps.as_deref(), |job| self.fit(job))
     }
 
     fn fit(&self, job: &Job<'_>) -> Result<Fitted, Error> {

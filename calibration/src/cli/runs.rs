@@ -11,13 +11,9 @@ use isotherm_log::part::{LogFiles, Part, are_recordings};
 use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
-use isotherm_cli::Bar;
-
 use super::bar;
 use crate::document::{name_of, recordings_in};
 use crate::error::Error;
-use crate::fits::drift::columns::{Columns, Kind};
-use crate::runs::cut::Cut;
 use crate::runs::{Run, units_of};
 
 /// Gyro ticks in a batch of a text log.
@@ -31,14 +27,6 @@ pub(super) struct LogArgs {
     pub(super) log: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) reading: Reading,
-}
-
-/// Logs that a document is judged on.
-#[derive(Debug, Clone, Args)]
-pub(super) struct JudgeArgs {
-    /// Log to judge the new document by, not used in the fit; repeatable
-    #[arg(long, value_name = "LOG")]
-    pub(super) judge: Vec<PathBuf>,
 }
 
 /// The document that a fit starts from.
@@ -82,7 +70,7 @@ impl Reading {
         [start, end.unwrap_or(f64::INFINITY)]
     }
 
-    /// The part of each log's time.
+    /// The part of each log's time, and the unit that was given.
     pub(super) fn part(&self) -> Result<Part, Error> {
         let length = |length: Span| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns()));
         let end = self.end.or_else(|| self.duration.map(length));
@@ -91,21 +79,7 @@ impl Reading {
                 format!("--end is {} s, must not be before --start, {} s", end.as_s(), self.start.as_s());
             return Err(Error::Usage(words));
         }
-        Ok(Part { start: self.start, end, ..Part::default() })
-    }
-
-    /// Corrected ticks of these logs.
-    pub(super) fn corrected(
-        &self,
-        logs: &[PathBuf],
-        kind: Kind,
-        cut: &Cut,
-        mut bar: Bar,
-    ) -> Result<Columns, Error> {
-        let part = Part { units: self.serial()?.into_iter().collect(), ..self.part()? };
-        let columns = Columns::of_corrected(logs, &part, kind, cut, || bar.step());
-        bar.finish();
-        columns
+        Ok(Part { units: self.serial()?.into_iter().collect(), start: self.start, end })
     }
 
     /// Runs by unit, each log for itself: every recording is a run, and of text logs as many files as the mapping has.

@@ -25,7 +25,6 @@ pub(super) struct ShowArgs {
 }
 
 impl ShowArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let files = self.page.files();
         files.check(&[&self.document])?;

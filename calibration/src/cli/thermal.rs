@@ -6,9 +6,9 @@ use clap::Args;
 use isotherm_correction::units::Span;
 
 use super::driver::{Done, Job, Task};
-use super::output::OutputArgs;
-use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
-use super::units::{Logs, Work};
+use super::output::FitArgs;
+use super::runs::Reading;
+use super::units::Logs;
 use crate::error::Error;
 use crate::fits::thermal::{Settings, fit};
 use crate::limits::within;
@@ -28,53 +28,44 @@ pub(super) use stands::StandArgs;
     A refused sensor keeps its old terms; the others are written, and the exit code is 1 unless --accept-partial.")]
 pub(super) struct ThermalArgs {
     #[command(flatten)]
-    log: LogArgs,
+    common: FitArgs,
     #[command(flatten)]
     settings: Settings,
-    #[command(flatten)]
-    judge: JudgeArgs,
     /// Start this long after each judging log's beginning (s)
     #[arg(long, value_name = "SECONDS", requires = "judge", value_parser = within(0.0, 1e9))]
     judge_start: Option<f64>,
     /// Length of each judging log to read (s) (default: all)
     #[arg(long, value_name = "SECONDS", requires = "judge", value_parser = within(1.0, 1e9))]
     judge_duration: Option<f64>,
-    #[command(flatten)]
-    base: BaseArgs,
     /// Exit code 0 although a sensor was refused
     #[arg(long)]
     accept_partial: bool,
-    #[command(flatten)]
-    output: OutputArgs,
     #[command(flatten)]
     stands: StandArgs,
 }
 
 impl ThermalArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let judging = Reading {
             start: self.judge_start.map_or(Span::ZERO, Span::from_s),
             duration: self.judge_duration.map(Span::from_s),
             end: None,
-            ..self.log.reading.clone()
+            ..self.common.log.reading.clone()
         };
-        let logs = Logs { judging: &judging, ..Logs::apart(&self.log, &self.judge, &self.base) };
-        let title = "Thermal calibration of several units";
-        let task =
-            Task { accept_partial: self.accept_partial, ..Task::new(title, self.output.files(), logs) };
+        let logs = Logs { judging: &judging, ..self.common.logs() };
+        let task = Task {
+            accept_partial: self.accept_partial,
+            ..Task::new("Thermal calibration of several units", self.common.output.files(), logs)
+        };
         task.run(|job| self.fit(job))
     }
 
     fn fit(&self, job: &Job<'_>) -> Result<Done, Error> {
         let work = job.work;
         let base = work.base.as_ref().map(|base| &base.document);
-        let fitted = fit(base, (&work.runs, &work.judges), &self.settings(work)?, job.at_work("fitting"))?;
-        self.output.done(fitted, job)
-    }
-
-    fn settings(&self, work: &Work) -> Result<Settings, Error> {
         let stands = self.stands.stands(work.runs.len(), work.judges.len())?;
-        Ok(Settings { stands, ..self.settings.clone() })
+        let settings = Settings { stands, ..self.settings.clone() };
+        let fitted = fit(base, (&work.runs, &work.judges), &settings, job.at_work("fitting"))?;
+        self.common.output.done(fitted, job)
     }
 }

@@ -56,7 +56,6 @@ pub(super) struct TumbleArgs {
 }
 
 impl TumbleArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let gravity = self.gravity.stated();
         let logs = Logs::together(&self.log, &self.base);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use isotherm_protocol::key::UnitId;
 
-use super::runs::{BaseArgs, JudgeArgs, LogArgs, Reading};
+use super::runs::{BaseArgs, LogArgs, Reading};
 use crate::document::{Written, are_copies, files_of, name_of};
 use crate::error::Error;
 use crate::numbers::once_each;
@@ -106,17 +106,13 @@ impl<'a> Logs<'a> {
         Self { together: true, document: base.document.as_deref(), ..Self::of(log) }
     }
 
-    /// Logs of which each is a run, and others to judge on.
-    pub(super) fn apart(log: &'a LogArgs, judge: &'a JudgeArgs, base: &'a BaseArgs) -> Self {
-        Self { judge: &judge.judge, document: base.document.as_deref(), ..Self::of(log) }
-    }
-
     /// Logs to judge a document on, or the documents of a folder.
     pub(super) fn judging(log: &'a LogArgs, document: &'a Path) -> Self {
         Self { document: Some(document), ..Self::of(log) }
     }
 
-    fn of(log: &'a LogArgs) -> Self {
+    /// Logs of which each is a run.
+    pub(super) fn of(log: &'a LogArgs) -> Self {
         let LogArgs { log, reading } = log;
         Self {
             reading,

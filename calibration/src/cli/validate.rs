@@ -36,7 +36,6 @@ pub(super) struct ValidateArgs {
 }
 
 impl ValidateArgs {
-    /// Does what the command says.
     pub(super) fn run(&self) -> Result<(), Error> {
         let wanted = Wanted { window_s: self.window, place: self.place.known([1, 0])?.pop() };
         let logs = Logs::judging(&self.log, &self.document);

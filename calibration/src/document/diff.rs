@@ -104,24 +104,16 @@ pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Resul
         axis_sigma,
     };
     let (mut axes, mut values) = (Vec::new(), Vec::new());
-    let gyros = |written: &Written| -> Vec<String> {
-        written.document.gyro.sensor.iter().map(|sensor| sensor.name.clone()).collect()
-    };
-    let same = before.document.gyro.output == after.document.gyro.output;
-    for (name, places) in matched(&gyros(before), &gyros(after)) {
-        axes.push(compared.axis(&format!("gyro {name}"), ("gyro", &name), places, |s| &s.gyro_axes));
-        compared.gyro(&name, places, same, &mut values);
+    let gyros = compared.documents.map(|document| document.gyro.sensor.iter().map(|sensor| &sensor.name));
+    for (name, places) in matched(gyros) {
+        axes.push(compared.axis(("gyro", "gyro", name), places, |s| &s.gyro_axes));
+        compared.gyro(name, places, &mut values);
     }
-    if let (Some(first), Some(second)) = (&before.document.accel, &after.document.accel) {
-        let accels = |accel: &isotherm_protocol::document::Accel| -> Vec<String> {
-            accel.sensor.iter().map(|sensor| sensor.name.clone()).collect()
-        };
-        let same = first.output == second.output;
-        for (name, places) in matched(&accels(first), &accels(second)) {
-            let of = format!("accelerometer {name}");
-            axes.push(compared.axis(&of, ("accel", &name), places, |s| &s.accel_axes));
-            compared.accel(&name, places, same, &mut values);
-        }
+    let accels =
+        compared.documents.map(|document| accelerometers(document).iter().map(|sensor| &sensor.name));
+    for (name, places) in matched(accels) {
+        axes.push(compared.axis(("accelerometer", "accel", name), places, |s| &s.accel_axes));
+        compared.accel(name, places, &mut values);
     }
     values.retain(|value| value.change.iter().chain([&value.at_reference]).any(|change| *change != 0.0));
     let entries = difference(&before.document, &after.document);
@@ -131,11 +123,13 @@ pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Resul
 }
 
 /// Names that both have, with their places in either.
-fn matched(before: &[String], after: &[String]) -> Vec<(String, [usize; 2])> {
-    let places = after.iter().enumerate().filter_map(|(j, name)| {
-        before.iter().position(|other| other == name).map(|i| (name.clone(), [i, j]))
-    });
-    places.collect()
+fn matched<'a>(
+    [before, after]: [impl Iterator<Item = &'a String> + Clone; 2],
+) -> impl Iterator<Item = (&'a str, [usize; 2])> {
+    let place = move |(j, name): (usize, &'a String)| {
+        before.clone().position(|other| other == name).map(|i| (name.as_str(), [i, j]))
+    };
+    after.enumerate().filter_map(place)
 }
 
 /// Temperature that a document's curves are given about (°C), where its standard errors are known best.
@@ -167,8 +161,7 @@ struct Compared<'a> {
 impl Compared<'_> {
     fn axis(
         &self,
-        of: &str,
-        (kind, sensor): (&str, &str),
+        (called, kind, sensor): (&str, &str, &str),
         [first, second]: [usize; 2],
         rows: impl Fn(&Steady) -> &[[f64; 3]],
     ) -> AxisChange {
@@ -203,7 +196,7 @@ impl Compared<'_> {
             angle(old, new)
         });
         AxisChange {
-            of: of.to_owned(),
+            of: format!("{called} {sensor}"),
             change_arcsec: change,
             sigma_arcsec: sigma,
             turned_arcsec: turned,
@@ -224,21 +217,22 @@ impl Compared<'_> {
         stated.or_else(|| self.axis_sigma.map(|sigma| [sigma; 3]))
     }
 
-    fn gyro(&self, name: &str, places: [usize; 2], same_output: bool, values: &mut Vec<ValueChange>) {
+    fn gyro(&self, name: &str, places: [usize; 2], values: &mut Vec<ValueChange>) {
         let deg_per_h = |[a, b]: [f64; 2]| AngularRate::from_rad_per_s(b - a).as_deg_per_h();
         let gyro = |side: usize| self.documents[side].gyro.sensor.get(places[side]);
         let biases = [0, 1].map(|side| about(gyro(side)?.terms.curve(Feature::One)));
         let sigma = self.value_sigma(("gyro", name, "static_bias"), biases, [1.0; 2]);
         let of = format!("gyro {name} bias");
         values.extend(self.value(of, "°/h", places, |s| &s.gyro_bias, deg_per_h, sigma));
-        if same_output {
+        let [before, after] = self.documents;
+        if before.gyro.output == after.gyro.output {
             let of = format!("gyro {name} increment weight");
             let sigma = self.value_sigma(("gyro", name, "increment_weight_ppm"), [None; 2], [1.0; 2]);
             values.extend(self.value(of, "ppm", places, |s| &s.gyro_weight, ppm, sigma));
         }
     }
 
-    fn accel(&self, name: &str, places: [usize; 2], same_output: bool, values: &mut Vec<ValueChange>) {
+    fn accel(&self, name: &str, places: [usize; 2], values: &mut Vec<ValueChange>) {
         let milli_g = |force: f64| SpecificForce::from_m_per_s2(force).as_g() * 1e3;
         let scale = [0, 1].map(|side| {
             let scales = &self.reference[side].accel_scale;
@@ -252,7 +246,9 @@ impl Compared<'_> {
         let change = |[a, b]: [f64; 2]| milli_g(b - a);
         let of = format!("accelerometer {name} bias");
         values.extend(self.value(of, "mg", places, |s| &s.accel_bias, change, sigma));
-        if same_output {
+        let [before, after] =
+            self.documents.map(|document| document.accel.as_ref().map(|accel| accel.output));
+        if before == after {
             let of = format!("accelerometer {name} scale factor");
             let scales = [0, 1].map(|side| about(Some(&accel(side)?.scale_factor)));
             let sigma =

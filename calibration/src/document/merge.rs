@@ -270,12 +270,10 @@ impl Merged {
         sheet.table("Taken", ["section", "from"], self.taken.iter().map(row));
         let heading = "Left out, because the part does without";
         sheet.table(heading, ["section", "by"], self.gone.iter().map(row));
+        let pairs = |(key, from): &(String, String)| (key.clone(), json!(from));
         let map =
-            |pairs: &[(String, String)]| pairs.iter().map(|(key, from)| (key.clone(), json!(from))).collect();
-        sheet.figures = Map::from_iter([
-            ("taken".to_owned(), map(&self.taken)),
-            ("left_out".to_owned(), map(&self.gone)),
-        ]);
+            |all: &[(String, String)]| -> Map<String, serde_json::Value> { all.iter().map(pairs).collect() };
+        sheet.figures = json!({ "taken": map(&self.taken), "left_out": map(&self.gone) });
         sheet
     }
 }

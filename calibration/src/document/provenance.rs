@@ -114,22 +114,13 @@ pub fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 
 /// A name as text and numbers in turn, so that 10 comes behind 9.
 fn pieces(name: &str) -> Vec<(String, u128)> {
-    let mut pieces = vec![(String::new(), 0_u128)];
-    let mut in_number = false;
-    for letter in name.chars() {
-        match (letter.to_digit(10), pieces.last_mut()) {
-            (Some(digit), Some((_, number))) => {
-                *number = number.saturating_mul(10).saturating_add(digit.into());
-                in_number = true;
-            }
-            (None, Some((text, _))) if !in_number => text.push(letter),
-            _ => {
-                pieces.push((letter.to_string(), 0));
-                in_number = false;
-            }
-        }
-    }
-    pieces
+    let letters: Vec<char> = name.chars().collect();
+    let pieces = letters.chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit()).map(String::from_iter);
+    let piece = |piece: String| match piece.parse() {
+        Ok(number) if piece.starts_with(|letter: char| letter.is_ascii_digit()) => (String::new(), number),
+        _ => (piece, 0),
+    };
+    pieces.map(piece).collect()
 }
 
 /// The command line as it was given, for the document.

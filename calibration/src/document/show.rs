@@ -9,7 +9,7 @@ use isotherm_correction::calibration::Steady;
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
@@ -51,10 +51,8 @@ pub fn show(written: &Written) -> Result<Report, Error> {
     over_temperature(&mut sheet, &terms, range);
     sums_table(&mut sheet, written, range);
     charts::charts(&mut sheet, written, &terms, range);
-    sheet.figures = Map::from_iter([
-        ("document".to_owned(), serde_json::to_value(&tree).map_err(|error| Error::document(&error))?),
-        ("terms".to_owned(), terms.iter().map(|term| term_json(term, range)).collect()),
-    ]);
+    let terms: Vec<Value> = terms.iter().map(|term| term_json(term, range)).collect();
+    sheet.figures = json!({ "document": tree, "terms": terms });
     Ok(sheet)
 }
 
@@ -82,19 +80,16 @@ pub(crate) fn places([low, high]: [f64; 2], count: usize) -> Vec<f64> {
 }
 
 fn over_temperature(sheet: &mut Report, terms: &[Term], range: [f64; 2]) {
-    for argument in ["°C", "°C/s", "°C/s²"] {
-        let mine = || {
-            terms
-                .iter()
-                .filter(|term| term.argument == argument && (term.range.is_some() || argument == "°C"))
-        };
-        let range = if argument == "°C" {
-            range
-        } else {
-            hull(mine().filter_map(|term| term.range)).unwrap_or_default()
-        };
-        let at = places(range, COLUMNS);
-        let head = heads(&at, argument);
+    let headings = [
+        ("°C", "Over temperature (in brackets: clamped, outside the fitted range)"),
+        ("°C/s", "Over the temperature's rate"),
+        ("°C/s²", "Over the temperature's acceleration"),
+    ];
+    for (argument, heading) in headings {
+        let over = |term: &&Term| term.argument == argument && (term.range.is_some() || argument == "°C");
+        let mine: Vec<&Term> = terms.iter().filter(over).collect();
+        let own = hull(mine.iter().filter_map(|term| term.range)).unwrap_or_default();
+        let at = places(if argument == "°C" { range } else { own }, COLUMNS);
         let row = |term: &Term| {
             let values: Vec<(f64, bool)> = at.iter().map(|x| term.at(*x)).collect();
             let words = alike(&values.iter().map(|(value, _)| *value).collect::<Vec<_>>(), RANGE_DIGITS);
@@ -104,12 +99,7 @@ fn over_temperature(sheet: &mut Report, terms: &[Term], range: [f64; 2]) {
             let cells = words.into_iter().zip(&values).map(cell);
             std::iter::once(format!("{}, {}", title(term), term.unit)).chain(cells).collect()
         };
-        let heading = match argument {
-            "°C" => "Over temperature (in brackets: clamped, outside the fitted range)",
-            "°C/s" => "Over the temperature's rate",
-            _ => "Over the temperature's acceleration",
-        };
-        sheet.table(heading, head, mine().map(row));
+        sheet.table(heading, heads(&at, argument), mine.into_iter().map(row));
     }
 }
 

@@ -47,6 +47,19 @@ pub struct Rest {
     pub levels: Option<[[f64; 2]; 6]>,
 }
 
+impl Rest {
+    /// What is known of an output, 0…5, gyros first.
+    pub fn truth(&self, output: usize) -> Option<f64> {
+        let known = if output < 3 { self.rate_deg_per_h } else { self.force_m_per_s2 };
+        known.map(|known| known[output % 3])
+    }
+}
+
+/// An output of a table, 0…5, gyros first.
+pub fn column(table: &Table, output: usize) -> &[f64] {
+    if output < 3 { table.rate(output) } else { table.force(output - 3) }
+}
+
 /// Runs, corrected before and after.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Judged {
@@ -76,9 +89,8 @@ pub fn judge(
     for (index, run) in runs.iter().chain(unseen).enumerate() {
         let (rest, rows, counts) = of_run(index, run)?;
         let sample = if index < runs.len() { Sample::In } else { Sample::Out };
-        let mut tables = Table::together(run, &loaded, rows, &mut watch)?.into_iter();
-        let mut next = || tables.next().unwrap_or_default();
-        let (of_after, of_before) = (next(), next());
+        let tables = Table::together(run, &loaded, rows, &mut watch)?;
+        let [of_after, of_before] = <[Table; 2]>::try_from(tables).unwrap_or_default();
         let curves = Curve::of_tables(&run.name, sample, [&of_before, &of_after], &after.document, &rest);
         judged.curves.extend(curves.into_iter().filter(|curve| curve.of.starts_with(counts)));
         let passed_over = once_each([of_after.troubles, of_before.troubles].concat());
@@ -97,15 +109,12 @@ impl Curve {
         rest: &Rest,
     ) -> Vec<Self> {
         let time_s: Arc<[f64]> = after.time_s.as_slice().into();
-        let axis_of = |gyro: bool, axis: usize| {
-            let (values, truth) = if gyro {
-                ([before.rate(axis), after.rate(axis)], rest.rate_deg_per_h)
-            } else {
-                ([before.force(axis), after.force(axis)], rest.force_m_per_s2)
-            };
-            let truth = truth.and_then(|truth| truth.get(axis).copied()).map(|truth| [truth; 2]);
-            let carried = rest.levels.and_then(|levels| levels.get(axis + if gyro { 0 } else { 3 }).copied());
-            let [before, after_values] = common(values, truth.or(carried))?;
+        let axis_of = |output: usize| {
+            let (gyro, axis) = (output < 3, output % 3);
+            let truth = rest.truth(output).map(|truth| [truth; 2]);
+            let carried = rest.levels.map(|levels| levels[output]);
+            let [before, after_values] =
+                common([before, after].map(|table| column(table, output)), truth.or(carried))?;
             let channel = channel_of(document, gyro, axis);
             let temperature = channel.and_then(|channel| after.temperature_deg_c.get(&channel).cloned());
             Some(Self {
@@ -120,8 +129,7 @@ impl Curve {
                 after: after_values,
             })
         };
-        let axes = [true, false].into_iter().flat_map(|gyro| (0..3).map(move |axis| (gyro, axis)));
-        axes.filter_map(|(gyro, axis)| axis_of(gyro, axis)).collect()
+        (0..6).filter_map(axis_of).collect()
     }
 
     /// Sizes before and after.

@@ -34,8 +34,8 @@ impl Report {
             "residuals": self.residuals.iter().map(curve).collect::<Vec<_>>(),
             "tables": self.tables.iter().map(further).collect::<serde_json::Map<_, _>>(),
         });
-        if let Some(object) = value.as_object_mut() {
-            object.extend(self.figures.clone());
+        if let (Value::Object(all), Value::Object(besides)) = (&mut value, &self.figures) {
+            all.extend(besides.clone());
         }
         value
     }

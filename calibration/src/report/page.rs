@@ -81,27 +81,14 @@ impl Report {
     }
 
     fn over_temperature(&self, page: &mut Page) {
-        let spread = |outside: bool| {
+        let chart = |outside: bool| {
             let own = self.residuals.iter().filter(|curve| (curve.sample == Sample::Out) == outside);
-            let all = own.flat_map(|curve| &curve.temperature_deg_c).filter(|t| t.is_finite());
-            let [low, high] = ends(all.copied());
-            high - low
-        };
-        if [false, true].into_iter().any(|outside| spread(outside) >= LEAST_DEG_C) {
-            page.heading("Over temperature");
-        }
-        let known = |curve: &&Curve| curve.temperature_deg_c.iter().any(|t| t.is_finite());
-        for outside in [false, true].into_iter().filter(|outside| spread(*outside) >= LEAST_DEG_C) {
-            let curves: Vec<&Curve> = self
-                .residuals
-                .iter()
-                .filter(known)
-                .filter(|curve| (curve.sample == Sample::Out) == outside)
-                .collect();
+            let finite = |deg_c: &f64| deg_c.is_finite();
+            let curves: Vec<&Curve> =
+                own.filter(|curve| curve.temperature_deg_c.iter().any(finite)).collect();
+            let [low, high] =
+                ends(curves.iter().flat_map(|curve| curve.temperature_deg_c.iter().copied().filter(finite)));
             let names = once_each(curves.iter().map(|curve| (curve.of.as_str(), curve.measure.as_str())));
-            if names.is_empty() {
-                continue;
-            }
             let panel_of = |(of, measure): (&str, &str)| {
                 let (mut before, mut after) = (Vec::new(), Vec::new());
                 for curve in curves.iter().filter(|curve| curve.of == of) {
@@ -112,8 +99,15 @@ impl Report {
                 Panel::of(of, measure, HEIGHT, pair(before, after, Series::dots))
             };
             let caption = format!("All runs {}: error before and after.", sample_words(outside));
-            let panels = names.into_iter().map(panel_of).collect();
-            page.chart(&Chart::of(caption, Axis::of("temperature", "°C"), panels));
+            let panels = || names.into_iter().map(panel_of).collect();
+            (high - low >= LEAST_DEG_C).then(|| Chart::of(caption, Axis::of("temperature", "°C"), panels()))
+        };
+        let charts: Vec<Chart> = [false, true].into_iter().filter_map(chart).collect();
+        if !charts.is_empty() {
+            page.heading("Over temperature");
+        }
+        for chart in &charts {
+            page.chart(chart);
         }
     }
 }
@@ -203,11 +197,9 @@ fn coefficients(all: &[Coefficient]) -> Option<Chart> {
     let mark = |(index, c): (usize, &Coefficient)| Mark {
         x: place(index),
         kind: "coefficient".to_owned(),
-        words: match c.sigma {
-            Some(sigma) => {
-                format!("{}: {} ± {} {}", c.name, stated(c.value, c.sigma), super::short(sigma), c.unit)
-            }
-            None => format!("{}: {} {}", c.name, stated(c.value, None), c.unit),
+        words: {
+            let sigma = c.sigma.map_or_else(String::new, |sigma| format!(" ± {}", super::short(sigma)));
+            format!("{}: {}{sigma} {}", c.name, stated(c.value, c.sigma), c.unit)
         },
         ink: Ink::Faint,
     };

@@ -8,7 +8,7 @@ use crate::numbers::{Size, real};
 use crate::report::short;
 
 /// What came of one sensor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Verdict {
     /// Of what, such as "gyro x".
     pub of: String,
@@ -29,15 +29,7 @@ pub struct Verdict {
 impl Verdict {
     /// An accepted sensor.
     pub fn new(of: impl Into<String>, measure: impl Into<String>, in_sample: [Size; 2]) -> Self {
-        Self {
-            of: of.into(),
-            measure: measure.into(),
-            in_sample,
-            out_of_sample: None,
-            accepted: true,
-            reason: String::new(),
-            said: String::new(),
-        }
+        Self { of: of.into(), measure: measure.into(), in_sample, accepted: true, ..Self::default() }
     }
 
     /// Something that is said instead of sizes.
@@ -55,29 +47,19 @@ impl Verdict {
     ) -> Self {
         let sizes = |values: &[Vec<f64>; 2]| values.each_ref().map(|values| Size::of(values));
         let verdict = Self::new(of, measure, sizes(&inside)).out_of_sample(outside.as_ref().map(sizes));
+        let [old, new] = verdict.deciding();
         let [before, after] = outside.unwrap_or(inside);
-        verdict.unless_worse(&before, &after).unless_few(before.len())
-    }
-
-    /// Refused where few of so many windows are whole: the others may say something else.
-    fn unless_few(self, all: usize) -> Self {
-        let [Size { count, .. }, _] = self.deciding();
-        match few([count, all]) {
-            Some(why) => self.refused(why),
-            None => self,
+        // Where few windows are whole, the others may say something else.
+        if let Some(why) = few([old.count, before.len()]) {
+            return verdict.refused(why);
         }
-    }
-
-    /// Refused where these values have grown by more than noise.
-    fn unless_worse(self, before: &[f64], after: &[f64]) -> Self {
-        let figure = |values: &[f64]| short(Size::of(values).rms);
-        match worse(before, after) {
-            Worse::No => self,
-            Worse::ByNoise => self.remark("its rms grows by no more than noise"),
-            Worse::Yes => {
-                let grown =
-                    format!("rms grows from {} to {} {}", figure(before), figure(after), self.measure);
-                self.refused(grown)
+        match grows(&before, &after) {
+            None => verdict,
+            Some(Growth::ByNoise) => verdict.remark("its rms grows by no more than noise"),
+            Some(Growth::Beyond) => {
+                let words =
+                    format!("rms grows from {} to {} {}", short(old.rms), short(new.rms), verdict.measure);
+                verdict.refused(words)
             }
         }
     }
@@ -177,12 +159,11 @@ pub fn few([complete, all]: [usize; 2]) -> Option<String> {
     })
 }
 
-/// Whether a change made something worse.
+/// By how much what is left has grown: by no more than noise, or beyond it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Worse {
-    No,
+enum Growth {
     ByNoise,
-    Yes,
+    Beyond,
 }
 
 /// Whether a change made something worse: what is left grows by more than [`SAME_SHARE`], and follows the change itself. The one rule
@@ -190,12 +171,12 @@ enum Worse {
 ///
 /// Were the change right, what is left after it would be noise, and its part along the change no larger than that of any other
 /// direction (Student's law). An rms alone grows or falls by chance where nothing has changed but its last digits.
-fn worse(before: &[f64], after: &[f64]) -> Worse {
+fn grows(before: &[f64], after: &[f64]) -> Option<Growth> {
     let both = || before.iter().zip(after).filter(|(a, b)| a.is_finite() && b.is_finite());
     let sum = |of: fn(f64, f64) -> f64| both().map(|(before, after)| of(*before, *after)).sum::<f64>();
     let (squares, left) = (sum(|before, _| before * before), sum(|_, after| after * after));
     if left <= squares * (1.0 + SAME_SHARE).powi(2) {
-        return Worse::No;
+        return None;
     }
     let change = sum(|before, after| (after - before).powi(2)).sqrt();
     let along = sum(|before, after| after * (after - before)) / change;
@@ -203,12 +184,12 @@ fn worse(before: &[f64], after: &[f64]) -> Worse {
     let noise = ((left - along * along).max(0.0) / others).sqrt();
     let by_chance = StudentsT::new(0.0, 1.0, others).map_or(0.0, |law| law.sf(along / noise));
     let doubled = left > LARGEST_GROWTH * LARGEST_GROWTH * squares;
-    if by_chance >= ACCIDENT && !doubled { Worse::ByNoise } else { Worse::Yes }
+    Some(if by_chance >= ACCIDENT && !doubled { Growth::ByNoise } else { Growth::Beyond })
 }
 
 /// Whether a change made something worse by more than noise.
 pub fn is_worse(before: &[f64], after: &[f64]) -> bool {
-    worse(before, after) == Worse::Yes
+    grows(before, after) == Some(Growth::Beyond)
 }
 
 /// Verdicts of a second judgement, without what was refused in the first, whose own verdicts stay.
@@ -288,8 +269,7 @@ mod tests {
     use super::*;
 
     fn judged(before: &[f64], after: &[f64]) -> Verdict {
-        let sizes = [Size::of(before), Size::of(after)];
-        Verdict::new("gyro x", "°/h", sizes).unless_worse(before, after)
+        Verdict::of_values("gyro x", "°/h", [before.to_vec(), after.to_vec()], None)
     }
 
     #[test]

@@ -22,25 +22,28 @@ struct ChannelRange {
     rate: Option<[f64; 2]>,
 }
 
-/// What is counted of a sensor.
-type Count = fn(&Sensor) -> u64;
+/// What is wrong with ticks of which each sensor's are counted.
+const FAULTS: [&str; 3] = [
+    "are outside the fitted range of temperature, where terms are clamped",
+    "are without a fresh temperature",
+    "are without a valid reading",
+];
 
 /// One sensor.
 #[derive(Debug)]
 struct Sensor {
     name: String,
     ticks: u64,
-    clamped: u64,
-    stale: u64,
-    invalid: u64,
+    /// Ticks with each of [`FAULTS`].
+    faults: [u64; 3],
 }
 
 /// What the runs cover.
 #[derive(Debug)]
 pub(super) struct Coverage {
     channels: Vec<ChannelRange>,
-    gyros: Vec<Sensor>,
-    accels: Vec<Sensor>,
+    /// Gyros first.
+    sensors: Vec<Sensor>,
 }
 
 impl Coverage {
@@ -53,30 +56,26 @@ impl Coverage {
             seen: None,
             rate: None,
         };
-        let sensor = |kind: &str, name: &str| Sensor {
-            name: format!("{kind} {name}"),
-            ticks: 0,
-            clamped: 0,
-            stale: 0,
-            invalid: 0,
-        };
         let document = &written.document;
-        let accels = accelerometers(document).iter();
+        let gyros = document.gyro.sensor.iter().map(|gyro| format!("gyro {}", gyro.name));
+        let accels = accelerometers(document).iter().map(|accel| format!("accelerometer {}", accel.name));
+        let sensor = |name: String| Sensor { name, ticks: 0, faults: [0; 3] };
         Self {
             channels: calibration.channels().iter().enumerate().map(channel).collect(),
-            gyros: document.gyro.sensor.iter().map(|gyro| sensor("gyro", &gyro.name)).collect(),
-            accels: accels.map(|accel| sensor("accelerometer", &accel.name)).collect(),
+            sensors: gyros.chain(accels).map(sensor).collect(),
         }
     }
 
     /// Counts a tick, with the unit as it stands behind it.
     pub(super) fn count(&mut self, tick: &CorrectedTick, unit: &Unit) {
-        let flagged = self.gyros.iter_mut().zip(&tick.gyro_flags);
-        for (sensor, flags) in flagged.chain(self.accels.iter_mut().zip(&tick.accel_flags)) {
+        for (sensor, flags) in self.sensors.iter_mut().zip(tick.gyro_flags.iter().chain(&tick.accel_flags)) {
+            let found = [
+                flags.contains(SensorFlags::CLAMPED_TEMPERATURE),
+                flags.contains(SensorFlags::STALE_TEMPERATURE),
+                !flags.contains(SensorFlags::VALID),
+            ];
             sensor.ticks += 1;
-            sensor.clamped += u64::from(flags.contains(SensorFlags::CLAMPED_TEMPERATURE));
-            sensor.stale += u64::from(flags.contains(SensorFlags::STALE_TEMPERATURE));
-            sensor.invalid += u64::from(!flags.contains(SensorFlags::VALID));
+            sensor.faults.iter_mut().zip(found).for_each(|(count, found)| *count += u64::from(found));
         }
         for (channel, report) in self.channels.iter_mut().zip(unit.channels()) {
             if let Some(state) = report.state.filter(|_| !report.stale) {
@@ -88,17 +87,21 @@ impl Coverage {
         }
     }
 
+    /// Names of the channels that there was no reading of.
+    fn unseen(&self) -> Vec<&str> {
+        let unseen = self.channels.iter().filter(|channel| channel.seen.is_none());
+        unseen.map(|channel| channel.name.as_str()).collect()
+    }
+
     /// Names of the channels, where there was no reading of any of them.
     pub(super) fn silent(&self) -> Option<String> {
-        let names: Vec<_> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
-        let silent = self.channels.iter().all(|channel| channel.seen.is_none());
-        (silent && !names.is_empty()).then(|| names.join(", "))
+        let unseen = self.unseen();
+        (!unseen.is_empty() && unseen.len() == self.channels.len()).then(|| unseen.join(", "))
     }
 
     /// What is to be looked at: one sentence of each kind, however many channels or sensors it is about.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let silent: Vec<&str> =
-            self.channels.iter().filter(|channel| channel.seen.is_none()).map(|c| c.name.as_str()).collect();
+        let silent = self.unseen();
         let mut warnings = Vec::new();
         if !silent.is_empty() {
             warnings.push(format!(
@@ -114,16 +117,11 @@ impl Coverage {
                 little.join(", ")
             ));
         }
-        let shares: [(Count, &str); 3] = [
-            (|sensor| sensor.clamped, "are outside the fitted range of temperature, where terms are clamped"),
-            (|sensor| sensor.stale, "are without a fresh temperature"),
-            (|sensor| sensor.invalid, "are without a valid reading"),
-        ];
-        for (count, what) in shares {
-            let sensors = self.gyros.iter().chain(&self.accels);
-            let many: Vec<String> = sensors
-                .filter(|sensor| sensor.share(count(sensor)) > CLAMPED)
-                .map(|sensor| format!("{:.1} % of {}", sensor.share(count(sensor)) * 100.0, sensor.name))
+        for (fault, what) in FAULTS.iter().enumerate() {
+            let shares = self.sensors.iter().map(|sensor| (sensor.shares()[fault], &sensor.name));
+            let many: Vec<String> = shares
+                .filter(|(share, _)| *share > CLAMPED)
+                .map(|(share, name)| format!("{:.1} % of {name}", share * 100.0))
                 .collect();
             if !many.is_empty() {
                 warnings.push(format!("of the ticks, {} {what}", many.join(", ")));
@@ -148,19 +146,13 @@ impl Coverage {
             ]
         };
         let sensor = |sensor: &Sensor| {
-            let share = |count| format!("{} %", short(sensor.share(count) * 100.0));
-            vec![
-                sensor.name.clone(),
-                sensor.ticks.to_string(),
-                share(sensor.clamped),
-                share(sensor.stale),
-                share(sensor.invalid),
-            ]
+            let shares = sensor.shares().map(|share| format!("{} %", short(share * 100.0)));
+            [sensor.name.clone(), sensor.ticks.to_string()].into_iter().chain(shares).collect()
         };
         let head = ["channel", "seen, °C", "fitted, °C", "covered", "rate, °C/min"];
         let channels = Table::of(head, self.channels.iter().map(channel));
         let head = ["sensor", "ticks", "clamped", "temperature stale", "not valid"];
-        let sensors = Table::of(head, self.gyros.iter().chain(&self.accels).map(sensor));
+        let sensors = Table::of(head, self.sensors.iter().map(sensor));
         vec![("Temperature".to_owned(), channels), ("Flags".to_owned(), sensors)]
     }
 }
@@ -183,8 +175,9 @@ impl ChannelRange {
 }
 
 impl Sensor {
-    fn share(&self, count: u64) -> f64 {
-        if self.ticks == 0 { 0.0 } else { real(count) / real(self.ticks) }
+    /// Shares of its ticks with each of [`FAULTS`].
+    fn shares(&self) -> [f64; 3] {
+        self.faults.map(|count| if self.ticks == 0 { 0.0 } else { real(count) / real(self.ticks) })
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use isotherm_protocol::document::Document;
-use toml::Value;
+use toml::{Table, Value};
 
 use crate::document::{files_of, name_of, origin};
 use crate::error::Error;
@@ -62,9 +62,7 @@ fn logs_of(document: &Document) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     if let Some(origin) = &document.origin {
         found.extend(origin.log.iter().map(|log| (log.sha256.clone(), log.name.clone())));
-        for value in origin.details.iter().flat_map(toml::Table::values) {
-            gather(value, &mut found);
-        }
+        origin.details.iter().flat_map(Table::values).for_each(|value| gather(value, &mut found));
     }
     found
 }

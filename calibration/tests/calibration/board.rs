@@ -124,7 +124,8 @@ fn logs_that_do_not_tell_the_ratio_are_refused_by_kind() {
                 run(&format!("log {number}"), "MEMS-0001", events)
             })
             .collect();
-        let stands = attitudes.map(|tilt| Stand::from(Site::at(55.75, 30.0, Some(tilt), None).unwrap()));
+        let stands = attitudes
+            .map(|tilt| Stand { site: Site::at(55.75, 30.0, Some(tilt), None).unwrap(), turning: None });
         let wanted =
             Wanted { runs: &runs, judges: &[], stands: &stands, base, reference_deg_c: None, window_s: 10.0 };
         let Err(Error::Found(findings)) = fit(&wanted, ()) else { panic!("it must be refused") };

@@ -130,7 +130,7 @@ fn sigma_and_correlation_time_of_table_1_are_recovered() {
         let (mut of_gyro, mut time) = (Vec::new(), Vec::new());
         for seed in 0..SEEDS {
             let slow = markov_log(sigma, tau, 8e-5, 216.0, seed * 10 + gyro as u64, &[]);
-            let (fit, _) = Fit::with_daily_lines(&slow, 1).unwrap();
+            let (fit, _) = Fit::with_daily_lines(&slow).unwrap();
             let (Some(s), Some(t)) = (fit.sigma, fit.correlation_time_h) else { panic!("no drift seen") };
             for (estimate, truth) in [(s, sigma), (t, tau)] {
                 if let Some([low, high]) = estimate.interval {
@@ -177,7 +177,7 @@ fn markov_log(sigma: f64, tau_h: f64, trend: f64, length_h: f64, seed: u64, line
 /// What a log of a Markov drift and a straight trend says of the trend.
 fn trend_of(sigma: f64, tau_h: f64, slope: f64, length_h: f64, seed: u64) -> Trend {
     let slow = markov_log(sigma, tau_h, slope, length_h, seed, &[]);
-    let (fit, _) = Fit::with_daily_lines(&slow, 1).unwrap();
+    let (fit, _) = Fit::with_daily_lines(&slow).unwrap();
     let beside = Beside { degree: 2, ..fit.beside.clone() };
     Trend::of(fit.slope(&slow), Fit::with_noise(&slow, &beside, fit.noise).as_ref())
 }
@@ -257,10 +257,10 @@ fn lines_of_the_hall_are_told_and_left_out_of_the_drift() {
     let (mut found, mut false_alarms, mut sigmas) = (0, 0, Vec::new());
     for seed in 0..SEEDS {
         let with = markov_log(0.0035, 9.5, 0.0, 240.0, seed, &[(0.006, 24.0), (0.004, 8.0)]);
-        let (fit, lines) = Fit::with_daily_lines(&with, 1).unwrap();
+        let (fit, lines) = Fit::with_daily_lines(&with).unwrap();
         found += lines.iter().filter(|line| line.stands_out()).count();
         sigmas.push(fit.sigma.unwrap().value);
-        let (_, lines) = Fit::with_daily_lines(&markov_log(0.0035, 9.5, 0.0, 240.0, seed, &[]), 1).unwrap();
+        let (_, lines) = Fit::with_daily_lines(&markov_log(0.0035, 9.5, 0.0, 240.0, seed, &[])).unwrap();
         assert_eq!(lines.len(), 2, "both are looked for");
         false_alarms += lines.iter().filter(|line| line.stands_out()).count();
     }

@@ -19,7 +19,7 @@ mod service;
 mod sparse;
 
 use isotherm_calibration::fits::thermal::bare::bare;
-use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, fit};
+use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, Stand, fit};
 use isotherm_calibration::report::Report;
 use isotherm_calibration::runs::Run;
 use isotherm_correction::earth::Place;
@@ -55,7 +55,7 @@ fn settings(method: Method) -> Settings {
     let place = Place::new(55.75, 30.0, Some([0.0, 0.0])).unwrap();
     Settings {
         method,
-        stands: vec![Site::Known { place, force_m_per_s2: None }.into()],
+        stands: vec![Stand { site: Site::Known { place, force_m_per_s2: None }, turning: None }],
         window_s: Some(100.0),
         ..Settings::default()
     }

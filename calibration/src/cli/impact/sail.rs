@@ -74,14 +74,13 @@ impl ImpactArgs {
             |path| format!("gyros as {} states them", path.display()),
         );
         let source = format!("Drifts of {count} seeds from {}, {from}{trend}", self.seed);
-        let mut notes =
-            vec!["Figures are the median of all seeds, and the bound of 95 % of them.".to_owned()];
-        notes.push(
+        let mut notes = vec![
+            "Figures are the median of all seeds, and the bound of 95 % of them.".to_owned(),
             "A drift held at its last value is held at its true value at departure, which no measurement gives: the \
              row is a bound. The estimators see the drift through the angle random walk of the gyros and the noise \
              of the references."
                 .to_owned(),
-        );
+        ];
         if parts.iter().all(|gyro| gyro.sigma_rad_per_s == 0.0 && gyro.trend_sigma_rad_per_s2 == 0.0) {
             notes.push(
                 "These gyros have a constant part only, neither a slow drift nor a trend: held, it leaves no error, \

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::{Map, json};
+use serde_json::json;
 
 use super::sheet::{plus_minus, tenths};
 use super::{BEYOND, Changes, changes};
@@ -79,10 +79,7 @@ impl Series {
             row(&format!("{of}, {unit}"), self.columns().map(changed))
         });
         sheet.table("Changes of biases and scale factors", head(""), values);
-        sheet.figures = Map::from_iter([
-            ("steps".to_owned(), json!(self.steps)),
-            ("whole".to_owned(), json!(self.whole)),
-        ]);
+        sheet.figures = json!({ "steps": self.steps, "whole": self.whole });
         sheet
     }
 }

@@ -1,7 +1,7 @@
 //! Changes in words, tables and charts.
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
@@ -17,21 +17,10 @@ impl Changes {
         self.axes.iter().filter(beyond).collect()
     }
 
-    /// The first line.
-    pub fn headline(&self) -> String {
-        let [before, after] = &self.names;
-        format!("{before} → {after}: {}.", self.words())
-    }
-
     /// A report with the first line.
     pub(super) fn saying(&self, title: String) -> Report {
         let [before, after] = &self.names;
         Report::saying(title, format!("{before} → {after}"), self.words())
-    }
-
-    /// Everything as JSON.
-    pub(super) fn figures(&self) -> Map<String, Value> {
-        json!(self).as_object().cloned().unwrap_or_default()
     }
 
     fn words(&self) -> String {
@@ -97,7 +86,7 @@ impl Changes {
         self.values_table(&mut sheet);
         self.entries_table(&mut sheet);
         self.charts(&mut sheet);
-        sheet.figures = self.figures();
+        sheet.figures = json!(self);
         sheet
     }
 

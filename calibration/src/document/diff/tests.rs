@@ -51,7 +51,7 @@ fn an_axis_that_was_knocked_is_told_beside_its_uncertainty() {
 fn without_stated_errors_those_of_the_stand_hold() {
     let (before, after) = (written(|_| ()), written(|document| turn(document, 60.0)));
     let unknown = changes([&before, &after], None).unwrap();
-    insta::assert_snapshot!(unknown.headline());
+    insta::assert_snapshot!(unknown.sheet().headline());
     assert_eq!(unknown.axes[3].significance, None);
     let stand = changes([&before, &after], Some(12.0)).unwrap();
     assert!((stand.axes[3].significance.unwrap() - 60.0 / (12.0 * 2.0_f64.sqrt())).abs() < 0.01);
@@ -85,7 +85,6 @@ fn biases_and_scale_factors_change_over_temperature() {
     assert!((of("accelerometer z scale factor").at_reference - 100.0).abs() < 0.1);
     assert!(changes.values.iter().all(|value| value.of != "gyro x bias"), "{:?}", changes.values);
     assert!(changes.entries.iter().any(|entry| entry.key.starts_with("gyro.sensor[1].static_bias")));
-    assert_eq!(changes.sheet().to_json()["verdict"], changes.headline());
     assert!(changes.sheet().to_html().contains(&bias.of));
 }
 
@@ -93,7 +92,7 @@ fn biases_and_scale_factors_change_over_temperature() {
 fn equal_documents_are_told_as_such() {
     let one = written(|_| ());
     let changes = changes([&one, &one], None).unwrap();
-    insta::assert_snapshot!(changes.headline());
+    insta::assert_snapshot!(changes.sheet().headline());
     assert!(changes.values.is_empty() && changes.axes.iter().all(|axis| axis.turned_arcsec == 0.0));
 }
 

@@ -29,20 +29,19 @@ pub enum Kind {
     Force,
 }
 
+/// Factors from readings and seconds to the units of measure that coefficients are stated in, and their symbols: of rates and of forces,
+/// by [`Term::ALL`].
+const STATED_IN: [[(f64, &str); 2]; 5] = [
+    [(1.0, "″"), (1.0, "m/s")],
+    [(1.0 / 60.0, "°/√h"), (60.0, "m/s/√h")],
+    [(1.0, "°/h"), (1.0, "m/s²")],
+    [(60.0, "°/h/√h"), (60.0, "m/s²/√h")],
+    [(3600.0, "°/h²"), (3600.0, "m/s²/h")],
+];
+
 /// Factor from readings and seconds to the unit of measure that a coefficient is stated in, and its symbol.
 pub(super) fn stated_in(term: Term, kind: Kind) -> (f64, &'static str) {
-    match (term, kind) {
-        (Term::Quantization, Kind::Rate) => (1.0, "″"),
-        (Term::AngleRandomWalk, Kind::Rate) => (1.0 / 60.0, "°/√h"),
-        (Term::BiasInstability, Kind::Rate) => (1.0, "°/h"),
-        (Term::RateRandomWalk, Kind::Rate) => (60.0, "°/h/√h"),
-        (Term::RateRamp, Kind::Rate) => (3600.0, "°/h²"),
-        (Term::Quantization, Kind::Force) => (1.0, "m/s"),
-        (Term::AngleRandomWalk, Kind::Force) => (60.0, "m/s/√h"),
-        (Term::BiasInstability, Kind::Force) => (1.0, "m/s²"),
-        (Term::RateRandomWalk, Kind::Force) => (60.0, "m/s²/√h"),
-        (Term::RateRamp, Kind::Force) => (3600.0, "m/s²/h"),
-    }
+    STATED_IN[term as usize][kind as usize]
 }
 
 /// Readings of several sensors at the same ticks.
@@ -152,7 +151,7 @@ impl Columns {
         part: &Part,
         kind: Kind,
         cut: &Cut,
-        mut progress: impl FnMut(),
+        mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let unnamed = unnamed()?;
         let mut columns: Option<Self> = None;
@@ -167,10 +166,11 @@ impl Columns {
                     )));
                 }
                 ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
-                progress();
+                watch.step();
             }
             log.cut_short().iter().for_each(|words| cut.recording(words));
         }
+        watch.end();
         columns.map_or_else(
             || {
                 let none =
@@ -230,29 +230,17 @@ impl Columns {
 impl Kind {
     /// Symbol of the unit of measure.
     pub const fn measure(self) -> &'static str {
-        match self {
-            Self::Rate => "°/h",
-            Self::Force => "m/s²",
-        }
+        self.over_hours(0)
     }
 
     /// Symbol of the unit of measure of a slope (power 1) or a bend (power 2), over hours.
     pub const fn over_hours(self, power: usize) -> &'static str {
-        match (self, power) {
-            (_, 0) => self.measure(),
-            (Self::Rate, 1) => "°/h²",
-            (Self::Rate, _) => "°/h³",
-            (Self::Force, 1) => "m/s²/h",
-            (Self::Force, _) => "m/s²/h²",
-        }
+        [["°/h", "°/h²", "°/h³"], ["m/s²", "m/s²/h", "m/s²/h²"]][self as usize][power]
     }
 
     /// What a sensor of the kind is called.
     pub const fn sensor(self) -> &'static str {
-        match self {
-            Self::Rate => "gyro",
-            Self::Force => "accelerometer",
-        }
+        ["gyro", "accelerometer"][self as usize]
     }
 }
 

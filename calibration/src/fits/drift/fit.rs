@@ -163,11 +163,10 @@ fn finish(
     let fitted: Vec<Variance> = overlapping.map(|(_, variance)| *variance).collect();
     let noise = NoiseFit::of(&fitted, grid.tick_s).map(|noise| noise.of_pieces(sensor.pieces.len()));
     let slow = prepared.slow.clone();
-    let markov = Fit::with_daily_lines(&slow, 1);
-    let beside = markov.as_ref().map(|(fit, _)| fit.beside.periods_h.clone());
-    let second_order = markov.as_ref().zip(beside).and_then(|((fit, _), periods_h)| {
-        Fit::with_noise(&slow, &Beside { degree: 2, periods_h }, fit.noise)
-    });
+    let markov = Fit::with_daily_lines(&slow);
+    let second_order = markov
+        .as_ref()
+        .and_then(|(fit, _)| Fit::with_noise(&slow, &Beside { degree: 2, ..fit.beside.clone() }, fit.noise));
     let autocorrelation = markov.as_ref().map(|(fit, _)| {
         let left: Vec<f64> =
             slow.time_h.iter().zip(&slow.mean).map(|(time, mean)| mean - fit.beside_at(*time)).collect();

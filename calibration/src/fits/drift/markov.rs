@@ -132,20 +132,20 @@ impl Fit {
 
     /// The same, with the lines of the day that stand out beside the trend, and what is to be said of each:
     /// lines of the hall must not count as the gyro's drift, so σ and τ are those without them.
-    pub fn with_daily_lines(slow: &Slow, degree: u32) -> Option<(Self, Vec<DailyLine>)> {
+    pub fn with_daily_lines(slow: &Slow) -> Option<(Self, Vec<DailyLine>)> {
         let length_h = slow.length_h();
         let resolved = |period: &u32| {
             f64::from(*period) * PERIODS <= length_h && f64::from(*period) > 4.0 * slow.width_h
         };
         let periods_h: Vec<u32> = [24, 8].into_iter().filter(resolved).collect();
-        let all = Self::of(slow, &Beside { degree, periods_h })?;
+        let all = Self::of(slow, &Beside { degree: 1, periods_h })?;
         let lines = all.lines();
         let stay: Vec<u32> =
             lines.iter().filter(|line| line.stands_out()).map(|line| line.period_h).collect();
         if stay.len() == lines.len() {
             return Some((all, lines));
         }
-        Some((Self::of(slow, &Beside { degree, periods_h: stay })?, lines))
+        Some((Self::of(slow, &Beside { degree: 1, periods_h: stay })?, lines))
     }
 
     fn build(problem: &Problem<'_>, beside: &Beside, noise: Noise, solution: &Solution) -> Self {

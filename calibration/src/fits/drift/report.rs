@@ -41,14 +41,14 @@ impl Found {
         report
             .verdicts
             .extend(grid.refused.iter().map(|(name, why)| Verdict::said(called(name), "").refused(why)));
-        report.figures = Map::from_iter([
-            ("corrected".to_owned(), json!(corrected)),
-            ("tick_s".to_owned(), json!(grid.tick_s)),
-            ("ticks".to_owned(), json!(grid.ticks)),
-            ("length_h".to_owned(), json!(self.length_h)),
-            ("measure".to_owned(), json!(if self.kind == Kind::Rate { "deg/h" } else { "m/s2" })),
-            ("sensors".to_owned(), self.sensors.iter().map(|sensor| self.sensor_json(sensor)).collect()),
-        ]);
+        report.figures = json!({
+            "corrected": corrected,
+            "tick_s": grid.tick_s,
+            "ticks": grid.ticks,
+            "length_h": self.length_h,
+            "measure": if self.kind == Kind::Rate { "deg/h" } else { "m/s2" },
+            "sensors": self.sensors.iter().map(|sensor| self.sensor_json(sensor)).collect::<Vec<_>>(),
+        });
         report.tell(grid.notes);
         report.notes.push(format!(
             "{} ticks of {} s, {:.2} h{}.",
@@ -141,13 +141,12 @@ impl Found {
                 _ => "–".to_owned(),
             });
             let slope = match trend(sensor) {
-                Trend::Seen { slope, .. } => Some(slope),
-                Trend::NotSeen { .. } => None,
+                Trend::Seen { slope, .. } => short(slope),
+                Trend::NotSeen { .. } => "none seen".to_owned(),
             };
-            let or_none = |value: Option<f64>| value.map_or_else(|| "none seen".to_owned(), short);
             let slow = self.markov(sensor, |estimate| short(estimate.value));
             let of = format!("{} {}", self.kind.sensor(), sensor.name);
-            [of].into_iter().chain(noise).chain(slow).chain([or_none(slope)]).collect()
+            [of].into_iter().chain(noise).chain(slow).chain([slope]).collect()
         };
         Table::of(head, self.sensors.iter().map(row))
     }
@@ -221,13 +220,10 @@ impl Found {
         row(format!("mean, {measure}"), &|a| short(a.mean));
         row(format!("standard deviation, {measure}"), &|a| short(a.deviation));
         row(format!("of the slow part, {measure}"), &|a| short(a.slow_deviation));
-        for (place, name) in
-            [format!("σ of the Markov part, {measure}"), "its correlation time, h".to_owned()]
-                .into_iter()
-                .enumerate()
-        {
-            row(name, &|a| self.markov(a, Estimate::words)[place].clone());
-        }
+        let [sigma, time] =
+            [0, 1].map(|place| move |a: &Analysis| self.markov(a, Estimate::words)[place].clone());
+        row(format!("σ of the Markov part, {measure}"), &sigma);
+        row("its correlation time, h".to_owned(), &time);
         row("the autocorrelation falls to 1/e at, h".to_owned(), &|a| {
             or_dash(a.autocorrelation.as_ref().and_then(|auto| auto.correlation_time_h).map(short))
         });
@@ -340,13 +336,10 @@ impl Found {
         let mut noise = Map::new();
         for term in Term::ALL {
             let (found, unit) = self.coefficient(sensor, term);
-            let value = match found {
-                Some(Coefficient::Observed { value, interval }) => {
-                    json!({ "value": value, "interval": interval, "unit": unit })
-                }
-                Some(Coefficient::NotObservable { below }) => json!({ "below": below, "unit": unit }),
-                None => Value::Null,
-            };
+            let mut value = json!(found);
+            if found.is_some() {
+                value["unit"] = json!(unit);
+            }
             noise.insert(term.symbol().to_owned(), value);
         }
         let fit = sensor.markov.as_ref().map(|(fit, _)| fit);

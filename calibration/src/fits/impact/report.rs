@@ -3,7 +3,7 @@
 use isotherm_correction::drift::DriftParts;
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::ins::Errors;
 use super::models::{Choice, TABLE_3, table_3, table_3_gains};
@@ -101,18 +101,15 @@ impl Sailed {
         cases.dedup();
         report.charts = cases.into_iter().map(|case| (case.to_owned(), self.chart(case))).collect();
         report.tables.push(("Position errors of real gyros in 002, table 3".to_owned(), table_3()));
-        report.figures = Map::from_iter([
-            ("source".to_owned(), json!(self.source)),
-            ("voyage".to_owned(), json!(self.voyage)),
-            ("seeds".to_owned(), json!(self.seeds)),
-            (
-                "columns_of_points".to_owned(),
-                json!(["hours", "heading_arcmin", "north_m", "east_m", "radial_m"]),
-            ),
-            ("rows".to_owned(), self.rows.iter().map(Row::to_json).collect()),
-            ("models".to_owned(), json!(self.choices)),
-            ("table_3".to_owned(), json!(TABLE_3)),
-        ]);
+        report.figures = json!({
+            "source": self.source,
+            "voyage": self.voyage,
+            "seeds": self.seeds,
+            "columns_of_points": ["hours", "heading_arcmin", "north_m", "east_m", "radial_m"],
+            "rows": self.rows.iter().map(Row::to_json).collect::<Vec<_>>(),
+            "models": self.choices,
+            "table_3": TABLE_3,
+        });
         report
     }
 

@@ -84,7 +84,7 @@ pub struct Gathered {
 }
 
 /// How a run is cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cut {
     /// Longest cell (s).
     pub cell_s: f64,

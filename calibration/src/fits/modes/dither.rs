@@ -100,21 +100,16 @@ fn fit(cells: &[Cell], place: usize, reference_deg_c: f64) -> Option<Rest> {
     })
 }
 
-/// Rate of temperature over neighbouring cells (°C/s).
+/// Rate of temperature over neighbouring cells of a run (°C/s).
 fn rates(cells: &[&Cell], temperature: &[f64]) -> Vec<f64> {
     const FAR_S: f64 = 1e8;
-    let at = |row: usize| Some((cells.get(row)?.time_s, *temperature.get(row)?));
-    (0..cells.len())
-        .map(|row| {
-            let near = |other: &Option<(f64, f64)>| {
-                other.zip(at(row)).is_some_and(|((there, _), (here, _))| (there - here).abs() < FAR_S)
-            };
-            let before = row.checked_sub(1).map(at).filter(near).flatten().or(at(row));
-            let behind = Some(at(row + 1)).filter(near).flatten().or(at(row));
-            match (before, behind) {
-                (Some(a), Some(b)) if b.0 > a.0 => (b.1 - a.1) / (b.0 - a.0),
-                _ => 0.0,
-            }
-        })
-        .collect()
+    let near = |a: usize, b: usize| (cells[a].time_s - cells[b].time_s).abs() < FAR_S;
+    let rate = |row: usize| {
+        let before = row.checked_sub(1).filter(|before| near(*before, row)).unwrap_or(row);
+        let behind =
+            Some(row + 1).filter(|behind| *behind < cells.len() && near(*behind, row)).unwrap_or(row);
+        let length_s = cells[behind].time_s - cells[before].time_s;
+        if length_s > 0.0 { (temperature[behind] - temperature[before]) / length_s } else { 0.0 }
+    };
+    (0..cells.len()).map(rate).collect()
 }

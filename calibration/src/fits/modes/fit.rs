@@ -106,8 +106,8 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         settle_s: wanted.asked.settle_s.unwrap_or(if known { 0.0 } else { settle_s }),
         reference_deg_c,
     };
-    let mut gyros: Vec<Option<Result<GyroFit, String>>> = vec![None; switches.sensors];
-    let mut servos: Vec<Option<Result<ServoFit, String>>> = vec![None; switches.sensors];
+    let mut gyros: Vec<Result<GyroFit, String>> = vec![Err(String::new()); switches.sensors];
+    let mut servos: Vec<Result<ServoFit, String>> = vec![Err(String::new()); switches.sensors];
     let mut earth_case = None;
     for group in groups(switches.sensors) {
         let gathered = gather(wanted.runs, &bare, group, cut, watch)?;
@@ -137,15 +137,13 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
                 reference_deg_c,
                 has_meander: switches.has_meander(),
             };
-            gyros[sensor] = Some(fit(given, wanted.asked));
-            servos[sensor] = Some(transients[sensor].clone().and_then(|transient| {
+            gyros[sensor] = fit(given, wanted.asked);
+            servos[sensor] = transients[sensor].clone().and_then(|transient| {
                 let rest = dither::found(&gathered.cells, place, reference_deg_c)?;
                 Ok(ServoFit { transient, rest })
-            }));
+            });
         }
     }
-    let gyros: Vec<Result<GyroFit, String>> = gyros.into_iter().flatten().collect();
-    let servos: Vec<Result<ServoFit, String>> = servos.into_iter().flatten().collect();
     if gyros.iter().all(Result::is_err) {
         let sensors = wanted.base.gyro.sensor.iter().zip(gyros);
         let reasons = sensors.filter_map(|(of, fit)| Some(format!("gyro {}: {}", of.name, fit.err()?)));
@@ -197,8 +195,7 @@ impl Made {
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         let document = document::fitted(&self.before.document, self, constants);
-        self.written = Written::of(&document)?;
-        self.residuals = self.judged(wanted, earth, watch)?;
+        self.write(&document, wanted, earth, watch)?;
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::refused(format!(
@@ -207,35 +204,35 @@ impl Made {
                 self.window_s
             )));
         }
-        let worse: Vec<String> =
-            verdicts.iter().filter(|one| !one.accepted).map(|one| one.of.clone()).collect();
-        if worse.is_empty() {
+        if verdicts.iter().all(|verdict| verdict.accepted) {
             return Ok(());
         }
         for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
             let axis = output_name(true, main_axis(row));
-            if worse.contains(&axis) {
+            if verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == axis) {
                 self.gyros[sensor] = Err(format!("its terms make {axis} worse: it keeps the old ones"));
             }
         }
         let mut document = document::fitted(&self.before.document, self, constants);
         document::keep_old(&mut document, wanted.base, &self.gyros);
-        self.written = Written::of(&document)?;
-        self.residuals = self.judged(wanted, earth, watch)?;
-        Ok(())
+        self.write(&document, wanted, earth, watch)
     }
 
-    fn judged(
-        &self,
+    /// Writes a document, and judges what is written.
+    fn write(
+        &mut self,
+        document: &Document,
         wanted: &Wanted<'_>,
         earth: Option<[f64; 3]>,
         watch: &mut dyn Watch,
-    ) -> Result<Vec<Residual>, Error> {
+    ) -> Result<(), Error> {
+        self.written = Written::of(document)?;
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
         let rest = Rest { rate_deg_per_h, ..Rest::default() };
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };
         let documents = [&self.before, &self.written];
         let of_run = |_, _: &Run| Ok((rest, rows, "gyro"));
-        Ok(judge((wanted.runs, wanted.judge), documents, of_run, watch)?.curves)
+        self.residuals = judge((wanted.runs, wanted.judge), documents, of_run, watch)?.curves;
+        Ok(())
     }
 }

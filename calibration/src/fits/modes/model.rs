@@ -41,11 +41,7 @@ pub enum Term {
 impl Term {
     /// Its key in the document.
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Static => "static_bias",
-            Self::Magnetic => "magnetic_bias",
-            Self::Meander => "slow_meander",
-        }
+        ["static_bias", "magnetic_bias", "slow_meander"][self as usize]
     }
 }
 

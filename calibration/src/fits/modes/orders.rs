@@ -70,8 +70,6 @@ pub struct Folds {
 impl Folds {
     /// Cooling and heating, where both cover the range; else pairs of stretches, every fifth in one fold.
     pub fn of(temperature: &[f64], time_s: &[f64], stretch: &[usize]) -> Self {
-        let pairs =
-            || Self { of: stretch.iter().map(|number| number / 2 % FOLDS).collect(), directions: false };
         let mut direction = 0;
         let mut of = Vec::with_capacity(temperature.len());
         for row in 0..temperature.len() {
@@ -95,7 +93,7 @@ impl Folds {
         if whole > 2.0 && [0, 1].into_iter().all(|direction| span(Some(direction)) > COVERED * whole) {
             Self { of, directions: true }
         } else {
-            pairs()
+            Self { of: stretch.iter().map(|number| number / 2 % FOLDS).collect(), directions: false }
         }
     }
 }
@@ -134,37 +132,27 @@ pub fn choose(
         (Some(largest), Some(order)) => vec![Some(order.min(largest).min(MEANDER_ORDER))],
         (Some(largest), None) => std::iter::once(None).chain((0..=largest).map(Some)).collect(),
     };
-    let models = || {
-        of_static.iter().flat_map(|&static_order| {
-            let of_meander = &of_meander;
-            of_magnetic.iter().flat_map(move |&magnetic_order| {
-                of_meander.iter().map(move |&meander_order| Model {
-                    static_order,
-                    magnetic_order,
-                    meander_order,
-                })
-            })
-        })
-    };
-    if let (Some(only), None) = (models().next(), models().nth(1)) {
+    let mut models = Vec::new();
+    for &static_order in &of_static {
+        for &magnetic_order in &of_magnetic {
+            let model = |&meander_order| Model { static_order, magnetic_order, meander_order };
+            models.extend(of_meander.iter().map(model));
+        }
+    }
+    if let [only] = models[..] {
         return Ok((only, Vec::new()));
     }
     let white = data.whitened(noise);
-    let mut scores: Vec<Score> = models()
-        .filter_map(|model| {
-            Some(Score { model, chi_square: score(&white, &folds.of, &model.columns())?, count: data.len() })
-        })
-        .collect();
+    let judged = |model: Model| {
+        Some(Score { model, chi_square: score(&white, &folds.of, &model.columns())?, count: data.len() })
+    };
+    let mut scores: Vec<Score> = models.into_iter().filter_map(judged).collect();
     scores.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
     let best =
         scores.first().ok_or("no order of its terms can be cross-validated: take a longer run")?.chi_square;
+    // The first of the smallest is the best of them.
     let near = scores.iter().filter(|score| score.chi_square <= best + BETTER);
-    let chosen = near
-        .min_by(|a, b| {
-            let width = |score: &Score| score.model.columns().len();
-            width(a).cmp(&width(b)).then(a.chi_square.total_cmp(&b.chi_square))
-        })
-        .map(|score| score.model);
+    let chosen = near.min_by_key(|score| score.model.columns().len()).map(|score| score.model);
     Ok((chosen.unwrap_or(full), scores))
 }
 

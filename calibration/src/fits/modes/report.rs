@@ -14,30 +14,29 @@ const MODELS: usize = 5;
 impl Made {
     /// The report.
     pub fn report(&self) -> Report {
-        let made = self;
-        let unit = made.written.document.unit.clone();
+        let unit = self.written.document.unit.clone();
         let mut report =
             Report::new("Mode-reversed laser gyro: drift polynomials and switch parameters", unit);
-        report.verdicts = Curve::verdicts(&made.residuals);
-        report.residuals.clone_from(&made.residuals);
-        report.warnings.clone_from(&made.warnings);
-        notes(made, &mut report);
+        report.verdicts = Curve::verdicts(&self.residuals);
+        report.residuals.clone_from(&self.residuals);
+        report.warnings.clone_from(&self.warnings);
+        notes(self, &mut report);
         let mut validation = Vec::new();
         let mut told: Vec<(&str, String)> = Vec::new();
-        for (index, sensor) in made.before.document.gyro.sensor.iter().enumerate() {
-            match made.gyros.get(index) {
+        for (index, sensor) in self.before.document.gyro.sensor.iter().enumerate() {
+            match self.gyros.get(index) {
                 Some(Ok(fit)) => {
-                    gyro(&sensor.name, fit, (made.keeps_constants, &mut report), &mut validation);
+                    gyro(&sensor.name, fit, (self.keeps_constants, &mut report), &mut validation);
                     if fit.left_out > 0 {
                         let are = counted(fit.left_out, "mean is", "means are");
                         told.push((&sensor.name, format!("{are} far off and left out")));
                     }
                     told.extend(fit.remarks.iter().map(|remark| (sensor.name.as_str(), remark.clone())));
                 }
-                Some(Err(reason)) => refuse(made, index, reason, &mut report),
+                Some(Err(reason)) => refuse(self, index, reason, &mut report),
                 None => {}
             }
-            match made.servos.get(index) {
+            match self.servos.get(index) {
                 Some(Ok(servo)) => transient(&sensor.name, servo, &mut report),
                 Some(Err(reason)) => {
                     let old = if sensor.servo.is_some() {

@@ -16,14 +16,6 @@ const SHORTEST_SECONDS: usize = 10;
 const RATE_DEG_PER_H: f64 = 1.0;
 const FORCE_M_PER_S2: f64 = 0.01;
 
-/// Means over some seconds.
-#[derive(Debug, Clone, Copy, Default)]
-struct Pair {
-    time_s: f64,
-    rate: [f64; 3],
-    force: [f64; 3],
-}
-
 /// The steps of the rates, and of the specific force, in words.
 pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
     let mut words = Vec::new();
@@ -33,7 +25,7 @@ pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
         let names = names.map(|name| format!("gyro {name}"));
         let rates = candidates(run)
             .iter()
-            .find_map(|parts| stepping(parts, (&names, "°/h", 2), RATE_DEG_PER_H, |pair| pair.rate));
+            .find_map(|parts| stepping(parts, (&names, "°/h", 2), RATE_DEG_PER_H, |part| part.rate));
         words.extend(rates.map(|(at_s, steps)| {
             format!(
                 "{log}about {at_s:.0} s after the beginning the mean rate steps and stays there: {steps}. Are two units of measure in one log, did a \
@@ -41,7 +33,7 @@ pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
             )
         }));
         let axes = AXES.map(|axis| format!("along {axis}"));
-        let forces = stepping(&parts(run), (&axes, "m/s²", 3), FORCE_M_PER_S2, |pair| pair.force);
+        let forces = stepping(&parts(run), (&axes, "m/s²", 3), FORCE_M_PER_S2, |part| part.force);
         words.extend(forces.map(|(at_s, steps)| {
             format!(
                 "{log}about {at_s:.0} s after the beginning the specific force steps and stays there: {steps}. Was the unit tilted, or is an \
@@ -54,10 +46,10 @@ pub(super) fn found(seconds: &[Second], names: [&str; 3]) -> Vec<String> {
 
 /// When the largest step is, and all steps in words; `None` without one.
 fn stepping(
-    parts: &[Pair],
+    parts: &[Second],
     (names, measure, places): (&[String; 3], &str, usize),
     least: f64,
-    of: fn(&Pair) -> [f64; 3],
+    of: fn(&Second) -> [f64; 3],
 ) -> Option<(f64, String)> {
     let axes = names.iter().enumerate().filter_map(|(axis, name)| {
         let means: Vec<f64> = parts.iter().map(|part| of(part)[axis]).collect();
@@ -73,9 +65,9 @@ fn stepping(
 }
 
 /// Parts of a run in which the modes cancel or stay: means over neighbouring stretches of both modes, and parts of each long stretch.
-fn candidates(run: &[Second]) -> Vec<Vec<Pair>> {
+fn candidates(run: &[Second]) -> Vec<Vec<Second>> {
     let in_modes = || run.chunk_by(|a, b| a.mode.total_cmp(&b.mode).is_eq());
-    let stretches: Vec<Pair> = in_modes().map(of_stretch).collect();
+    let stretches: Vec<Second> = in_modes().map(mean).collect();
     let together = stretches.len().div_ceil(2 * PARTS);
     let pairs = if together > 1 {
         stretches.chunks_exact(2 * together).map(mean).collect()
@@ -86,24 +78,19 @@ fn candidates(run: &[Second]) -> Vec<Vec<Pair>> {
 }
 
 /// Parts of some seconds.
-fn parts(seconds: &[Second]) -> Vec<Pair> {
-    seconds.chunks_exact(seconds.len().div_ceil(PARTS).max(SHORTEST_SECONDS)).map(of_stretch).collect()
+fn parts(seconds: &[Second]) -> Vec<Second> {
+    seconds.chunks_exact(seconds.len().div_ceil(PARTS).max(SHORTEST_SECONDS)).map(mean).collect()
 }
 
-fn of_stretch(seconds: &[Second]) -> Pair {
-    let pair = |second: &Second| Pair { time_s: second.time_s, rate: second.rate, force: second.force };
-    mean(&seconds.iter().map(pair).collect::<Vec<Pair>>())
-}
-
-fn mean(of: &[Pair]) -> Pair {
+/// What some seconds, or means over them, have in the mean; in both modes it is in none.
+fn mean(of: &[Second]) -> Second {
     let count = real(of.len().max(1));
-    let mean = |axis: usize, part: fn(&Pair) -> [f64; 3]| {
-        of.iter().map(|pair| part(pair)[axis]).sum::<f64>() / count
-    };
-    Pair {
-        time_s: of.iter().map(|pair| pair.time_s).sum::<f64>() / count,
-        rate: [0, 1, 2].map(|axis| mean(axis, |pair| pair.rate)),
-        force: [0, 1, 2].map(|axis| mean(axis, |pair| pair.force)),
+    let mean = |part: &dyn Fn(&Second) -> f64| of.iter().map(part).sum::<f64>() / count;
+    Second {
+        time_s: mean(&|second| second.time_s),
+        mode: 0.0,
+        rate: [0, 1, 2].map(|axis| mean(&|second| second.rate[axis])),
+        force: [0, 1, 2].map(|axis| mean(&|second| second.force[axis])),
     }
 }
 

@@ -160,7 +160,7 @@ impl Budget {
             ));
         }
         report.tables.push(("By the formula".to_owned(), self.rows()));
-        let figures = json!({
+        report.figures = json!({
             "noise_arcsec": self.noise_arcsec(),
             "stand_arcsec": self.stand_arcsec(),
             "housing_arcsec": self.housing_arcsec(),
@@ -175,7 +175,6 @@ impl Budget {
             "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
             "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
         });
-        report.figures = figures.as_object().cloned().unwrap_or_default();
         report
     }
 

@@ -61,11 +61,9 @@ impl History {
         let limit = (PLATEAU_SHARE * fastest).min(PLATEAU_DEG_C_PER_S);
         for ((temperature, window_s), slopes) in runs.iter().zip(&slopes) {
             history.add(temperature, *window_s, slopes, limit);
-            for slope in slopes.iter().filter(|slope| slope.is_finite()) {
-                history.rate_range_deg_c_per_s[0] = history.rate_range_deg_c_per_s[0].min(*slope);
-                history.rate_range_deg_c_per_s[1] = history.rate_range_deg_c_per_s[1].max(*slope);
-            }
         }
+        let known = slopes.iter().flatten().copied().filter(|slope| slope.is_finite());
+        history.rate_range_deg_c_per_s = ends([0.0].into_iter().chain(known));
         history
     }
 

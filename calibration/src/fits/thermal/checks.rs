@@ -136,25 +136,19 @@ fn sensor(found: &mut Findings, name: &str, (gyro, of, index): (bool, &str, usiz
 
 fn gaps(found: &mut Findings, name: &str, kind: &str, ticks: &Ticks) {
     let step = median_step_s(&ticks.end_ns);
-    let mut missing = 0.0;
-    let (mut count, mut longest, mut at) = (0, 0.0, 0.0);
-    let first = ticks.end_ns.first().copied().unwrap_or_default();
-    for pair in ticks.end_ns.windows(2) {
-        let (gap, since) = (seconds(pair[1].saturating_sub(pair[0])), seconds(pair[0].saturating_sub(first)));
-        if gap > MISSING_TICK * step {
-            count += 1;
-            missing += gap - step;
-            if gap > longest {
-                (longest, at) = (gap, since);
-            }
-        }
-    }
-    let whole = seconds(ticks.end_ns.last().copied().unwrap_or_default().saturating_sub(first));
-    if count > 0 && (missing > SMALL_SHARE * whole || longest > 60.0) {
+    let since = |end: i64| seconds(end.saturating_sub(ticks.end_ns[0]));
+    // Lengths, and since when.
+    let long = ticks.end_ns.windows(2).map(|pair| [seconds(pair[1].saturating_sub(pair[0])), since(pair[0])]);
+    let gaps: Vec<[f64; 2]> = long.filter(|[gap, _]| *gap > MISSING_TICK * step).collect();
+    let missing = gaps.iter().map(|[gap, _]| gap - step).sum::<f64>();
+    let Some([longest, at]) = gaps.iter().copied().reduce(|a, b| if b[0] > a[0] { b } else { a }) else {
+        return;
+    };
+    if missing > SMALL_SHARE * ticks.length_s() || longest > 60.0 {
         found.warnings.push(format!(
             "{name}: {} in the {kind} ticks, {missing:.1} s in all, the longest {longest:.1} s at {at:.0} s: lags \
              and derivatives are poor after a gap; if it matters, leave it out with --start and --duration",
-            counted(count, "gap", "gaps")
+            counted(gaps.len(), "gap", "gaps")
         ));
     }
 }
@@ -317,20 +311,16 @@ pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &
     if stand.turning.is_some() {
         return found;
     }
-    let along = |rows: &[[f64; 3]], vector: [f64; 3]| -> Option<[f64; 3]> {
-        let along = |row: &[f64; 3]| dot(*row, vector);
-        <[f64; 3]>::try_from(rows.iter().map(along).collect::<Vec<f64>>()).ok()
+    let shown = |of, columns: &[Vec<f64>], rows: &[[f64; 3]], truth: Option<[f64; 3]>| {
+        let truth = truth?;
+        let stated: Vec<f64> = rows.iter().map(|row| dot(*row, truth)).collect();
+        let sizes: Vec<Size> = columns.iter().map(|values| Size::of(values)).collect();
+        Some(Shown::of(of, sizes.try_into().ok()?, stated.try_into().ok()?))
     };
-    let sizes = |columns: &[Vec<f64>]| -> Option<[Size; 3]> {
-        <[Size; 3]>::try_from(columns.iter().map(|values| Size::of(values)).collect::<Vec<Size>>()).ok()
-    };
-    let rate = rest.rate_deg_per_h.and_then(|rate| along(&document.gyro.orientation.rows, rate));
-    let accel = document.accel.as_ref();
-    let force = rest.force_m_per_s2.zip(accel).and_then(|(force, a)| along(&a.orientation.rows, force));
-    let gyros = sizes(&samples.gyros).zip(rate).map(|(sizes, rate)| Shown::of(["gyros", "°/h"], sizes, rate));
-    let forces = sizes(&samples.forces)
-        .zip(force)
-        .map(|(sizes, force)| Shown::of(["accelerometers", "m/s²"], sizes, force));
+    let rows = document.accel.as_ref().map_or(&[][..], |accel| &accel.orientation.rows);
+    let forces = shown(["accelerometers", "m/s²"], &samples.forces, rows, rest.force_m_per_s2);
+    let rows = &document.gyro.orientation.rows;
+    let gyros = shown(["gyros", "°/h"], &samples.gyros, rows, rest.rate_deg_per_h);
     let named = |looks: Option<Looks>| looks.map(|looks| format!("{}: {looks}", samples.name));
     found.warnings.extend([gyros, forces].into_iter().flatten().filter_map(|shown| named(shown.swapped())));
     // The bias of a gyro may be many times the Earth's rate; that of an accelerometer is no third of gravity.

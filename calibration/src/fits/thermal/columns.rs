@@ -73,11 +73,7 @@ impl Form {
 
     /// Number of the knots that a curve over a derivative has its values at.
     pub const fn knots(self) -> usize {
-        match self {
-            Self::OverTemperature => 0,
-            Self::Parabola => 3,
-            Self::Lines | Self::Spline => 5,
-        }
+        [0, 3, 5, 5][self as usize]
     }
 }
 
@@ -372,14 +368,13 @@ impl<'a> Columns<'a> {
         self.known.get(&term).map_or(&[], Vec::as_slice)
     }
 
-    /// Smoothed temperature (°C) and Ṫ (°C/s) over the windows.
+    /// Smoothed temperature over the windows (°C).
     ///
     /// # Errors
     /// As [`Columns::make`].
-    pub fn temperature(&mut self) -> Result<(Vec<f64>, Vec<f64>), Error> {
-        let (level, rate) = (Effect::Static.power(1), Effect::Rate(Branch::Both).power(0));
-        self.make(&[level, rate])?;
-        let level = self.get(level).iter().map(|away| away + self.basis.reference_deg_c).collect();
-        Ok((level, self.get(rate).to_vec()))
+    pub fn temperature(&mut self) -> Result<Vec<f64>, Error> {
+        let level = Effect::Static.power(1);
+        self.make(&[level])?;
+        Ok(self.get(level).iter().map(|away| away + self.basis.reference_deg_c).collect())
     }
 }

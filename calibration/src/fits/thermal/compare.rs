@@ -14,9 +14,9 @@ use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::finding::ThermalKind;
 use crate::numbers::{Size, real, scatter_of_steps};
-use crate::report::curve::channel_of;
+use crate::report::curve::{Judging, channel_of, column};
 use crate::report::{Curve, Rest, is_worse, or_dash, short};
-use crate::runs::table::{Rows as Windows, Table};
+use crate::runs::table::Table;
 use crate::runs::{Run, Watch};
 
 /// Axes: gyros, then accelerometers.
@@ -28,24 +28,11 @@ const DOCUMENTS: usize = 5;
 /// Heading of the table that states each axis' accuracy.
 pub(super) const HEADING: &str = "Accuracy: rms of windows on the judging runs; noise of a window, and of single ticks from the thermometer";
 
-/// What a sensor's terms are compared with.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Rivals {
-    /// The mean; nothing where the level is not known.
-    pub(super) mean: Vec<(Term, f64, f64)>,
-    /// A cubic.
-    pub(super) cubic: Vec<(Term, f64, f64)>,
-    /// A cubic and Ṫ.
-    pub(super) with_rate: Vec<(Term, f64, f64)>,
-}
+/// What a sensor's terms are compared with: the mean, nothing where the level is not known; a cubic; a cubic and Ṫ.
+pub(super) type Rivals = [Vec<(Term, f64, f64)>; 3];
 
-/// A run with how long its windows are and what its unit would put out without error.
-struct Stage<'a> {
-    run: &'a Run,
-    window_s: f64,
-    rest: Rest,
-    at_rest: bool,
-}
+/// A run, and how it is judged.
+type Stage<'a> = (&'a Run, Judging);
 
 /// Rms of what is left on the judging runs, by axis and in the order of [`HEAD`]; and the levels that the document and none had where
 /// it was fitted.
@@ -57,8 +44,6 @@ pub(super) struct Compared {
     left: [[Vec<f64>; 2]; AXES],
 }
 
-/// Which of the rivals.
-type Pick = fn(&Rivals) -> &Vec<(Term, f64, f64)>;
 /// Squares and their number.
 type Sum = (f64, f64);
 
@@ -73,10 +58,11 @@ impl Compared {
         let loaded: Vec<Loaded> =
             documents.iter().copied().map(Written::compiled).collect::<Result<_, _>>()?;
         let mut levels = [[(0.0, 0.0); DOCUMENTS]; AXES];
-        for stage in fitted {
-            let tables = stage.tables(&loaded, &mut watch)?;
-            for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| stage.counts(*axis)) {
-                let truth = truth(&stage.rest, axis).unwrap_or(0.0);
+        for (run, (rest, rows, counts)) in fitted {
+            let tables = Table::together(run, &loaded, *rows, &mut watch)?;
+            for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| takes_part(counts, *axis))
+            {
+                let truth = rest.truth(axis).unwrap_or(0.0);
                 for ((sum, count), table) in levels.iter_mut().zip(&tables) {
                     let good = column(table, axis).iter().filter(|value| value.is_finite());
                     good.for_each(|value| (*sum, *count) = (*sum + value - truth, *count + 1.0));
@@ -87,13 +73,13 @@ impl Compared {
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
         let mut sums: [[Sum; HEAD.len()]; AXES] = Default::default();
         let mut left: [[Vec<f64>; 2]; AXES] = Default::default();
-        for stage in judging {
-            let tables = stage.tables(&loaded, &mut watch)?;
-            let shared = fitted.iter().any(|other| stage.run.shares_log(other.run));
-            let judges = |axis: &usize| stage.counts(*axis) && moves(&tables, documents[0], *axis);
+        for (run, (rest, rows, counts)) in judging {
+            let tables = Table::together(run, &loaded, *rows, &mut watch)?;
+            let shared = fitted.iter().any(|(other, _)| run.shares_log(other));
+            let judges = |axis: &usize| takes_part(counts, *axis) && moves(&tables, documents[0], *axis);
             for axis in (0..AXES).filter(judges) {
                 let into = (&mut sums[axis], &mut left[axis]);
-                add(into, &tables, (axis, truth(&stage.rest, axis)), levels[axis], shared);
+                add(into, &tables, (axis, rest.truth(axis)), levels[axis], shared);
             }
         }
         let rms = sums.map(|axis| {
@@ -108,15 +94,15 @@ impl Compared {
         self.levels
     }
 
-    /// What leaves less of an axis than the document does, in words: a mean or a cubic.
-    fn prefers(&self, axis: usize) -> Option<(&'static str, Pick)> {
+    /// Which of the rivals leaves less of an axis than the document does, and in words: a mean or a cubic.
+    fn prefers(&self, axis: usize) -> Option<(usize, &'static str)> {
         let [_, mean, cubic, _, document, _] = self.rms.get(axis).copied().flatten()?;
         if mean.min(cubic) >= document {
             None
         } else if mean < cubic {
-            Some(("constant", |rivals| &rivals.mean))
+            Some((0, "constant"))
         } else {
-            Some(("cubic by plain least squares", |rivals| &rivals.cubic))
+            Some((1, "cubic by plain least squares"))
         }
     }
 
@@ -161,17 +147,13 @@ impl Outcome {
         if judges.is_empty() {
             return Ok(Compared::default());
         }
-        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
-        let stage = |(index, run)| -> Result<Stage<'_>, Error> {
-            let stand: Stand = self.settings.stand(index);
-            let rest = rest(run, &stand)?;
-            Ok(Stage { run, window_s: stand.window_s(window_s), rest, at_rest: stand.turning.is_none() })
-        };
+        let all = runs.iter().chain(judges).enumerate();
         let stages: Vec<Stage<'_>> =
-            runs.iter().chain(judges).enumerate().map(stage).collect::<Result<_, _>>()?;
+            all.map(|of| Ok((of.1, self.judging(of, rest)?))).collect::<Result<_, Error>>()?;
         let (fitted, judging) = stages.split_at(runs.len());
-        let rival = |of: Pick| self.document(|found| found.rivals.as_ref().map_or(&found.terms, of));
-        let (cubic, with_rate) = (rival(|rivals| &rivals.cubic), rival(|rivals| &rivals.with_rate));
+        let [cubic, with_rate] = [1, 2].map(|rival: usize| {
+            self.document(|found| found.rivals.as_ref().map_or(&found.terms, |rivals| &rivals[rival]))
+        });
         Compared::of([&self.plain(), &cubic, &with_rate, document, &self.base], fitted, judging, watch)
     }
 
@@ -182,11 +164,11 @@ impl Outcome {
         for (sensor, _, found) in &mut self.found {
             // Of more than three sensors none stands for an axis.
             let axis = axis_of(sensor).filter(|_| sensors[usize::from(sensor.gyro)] == 3);
-            let Some((words, of)) = axis.and_then(|axis| compared.prefers(axis)) else { continue };
+            let Some((rival, words)) = axis.and_then(|axis| compared.prefers(axis)) else { continue };
             let Some(rivals) = found.rivals.as_ref().filter(|_| found.choice.is_some() && !stepwise) else {
                 continue;
             };
-            let simpler = of(rivals);
+            let simpler = &rivals[rival];
             if found.refused.is_none() && found.terms != *simpler && !simpler.is_empty() {
                 found.terms.clone_from(simpler);
                 found.words = format!("{words}: the judging run leaves more with {}", found.words);
@@ -204,15 +186,9 @@ impl Outcome {
     }
 }
 
-impl Stage<'_> {
-    fn tables(&self, loaded: &[Loaded], watch: impl Watch) -> Result<Vec<Table>, Error> {
-        Table::together(self.run, loaded, Windows::mostly_valid(self.window_s), watch)
-    }
-
-    /// On a table the accelerometers feel its turning, too.
-    fn counts(&self, axis: usize) -> bool {
-        self.at_rest || axis < 3
-    }
+/// Whether an axis is among those that count in a run: all, or the gyros.
+fn takes_part(counts: &str, axis: usize) -> bool {
+    counts.is_empty() || axis < 3
 }
 
 /// Adds the squares of what is left of an axis in windows that all have.
@@ -252,13 +228,4 @@ fn moves(tables: &[Table], document: &Document, axis: usize) -> bool {
     let channel = channel_of(document, axis < 3, axis % 3);
     let column = channel.and_then(|channel| tables.first()?.temperature_deg_c.get(&channel));
     column.is_some_and(|deg_c| moves_enough(deg_c))
-}
-
-fn column(table: &Table, axis: usize) -> &[f64] {
-    if axis < 3 { table.rate(axis) } else { table.force(axis - 3) }
-}
-
-fn truth(rest: &Rest, axis: usize) -> Option<f64> {
-    let known = if axis < 3 { rest.rate_deg_per_h } else { rest.force_m_per_s2 };
-    known.map(|known| known[axis % 3])
 }

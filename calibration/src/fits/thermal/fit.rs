@@ -230,7 +230,7 @@ fn sensors_of<'a>(
     }
     let basis = columns.basis().clone();
     for (sensor, _) in dead {
-        outcome.add(sensor, &basis, Found::dead(sensor.dead.as_deref().unwrap_or_default()));
+        outcome.add(sensor, &basis, Found::refused(sensor.dead.as_deref().unwrap_or_default()));
     }
     if method.is_stepwise() {
         for (sensor, target) in alive {

@@ -134,11 +134,7 @@ pub(super) fn rivals(
         let solution = plain.solve(columns, &spec, true);
         solution.map_or_else(Vec::new, |solution| spec.found(&solution, target.level))
     };
-    Ok(Rivals {
-        mean: solved(0, Vec::new()),
-        cubic: solved(CUBIC, Vec::new()),
-        with_rate: solved(CUBIC, rate),
-    })
+    Ok([solved(0, Vec::new()), solved(CUBIC, Vec::new()), solved(CUBIC, rate)])
 }
 
 /// What is to be known of a sensor whose passes through the same temperatures disagree; `None` where the log tells lags from
@@ -187,8 +183,6 @@ pub(super) struct Found {
     pub(super) rivals: Option<Rivals>,
     /// Root mean square of the thermometer's noise that they pass on.
     pub(super) passed_on: Option<f64>,
-    /// Whether the sensor does not work at all.
-    pub(super) dead: bool,
     /// Whether temperature does nothing to it.
     pub(super) flat: bool,
 }
@@ -196,10 +190,6 @@ pub(super) struct Found {
 impl Found {
     pub(super) fn refused(why: &str) -> Self {
         Self { refused: Some(why.to_owned()), ..Self::default() }
-    }
-
-    pub(super) fn dead(why: &str) -> Self {
-        Self { dead: true, ..Self::refused(why) }
     }
 
     /// A sensor that temperature does nothing to; where its level is known, that is its bias.

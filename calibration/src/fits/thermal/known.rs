@@ -73,15 +73,14 @@ pub(super) fn histories(
             range_deg_c: [-300.0, 1000.0],
             derivatives: [[0.0; 2]; 2],
         };
-        let (temperature, _) = Columns::new(basis, samples).temperature()?;
-        let mut parts = Vec::new();
-        let mut from = 0;
-        for run in samples {
-            let to = from + run.time_s.len();
-            parts.push((&temperature[from..to], run.window_s));
-            from = to;
-        }
-        let history = History::of(&parts);
+        let temperature = Columns::new(basis, samples).temperature()?;
+        let mut later = temperature.as_slice();
+        let part = |run: &Samples| {
+            let own;
+            (own, later) = later.split_at(run.time_s.len());
+            (own, run.window_s)
+        };
+        let history = History::of(&samples.iter().map(part).collect::<Vec<_>>());
         let [low, high] = history.range_deg_c;
         if !temperature.iter().any(|deg_c| deg_c.is_finite()) {
             refusals.push(format!(

@@ -70,11 +70,7 @@ impl Spec {
 
 /// Name and unit of a term's coefficient.
 pub fn described(basis: &Basis, term: Term, output: &str) -> (String, String) {
-    let branch = |branch: Branch| match branch {
-        Branch::Both => "",
-        Branch::RunUp => ", run-up",
-        Branch::Braking => ", braking",
-    };
+    let branch = |branch: Branch| ["", ", run-up", ", braking"][branch as usize];
     let (name, unit) = match term.effect {
         Effect::Static => ("static bias".to_owned(), output.to_owned()),
         Effect::Rate(on) => (format!("thermal rate{}", branch(on)), format!("({output})/(°C/s)")),

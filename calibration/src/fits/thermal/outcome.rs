@@ -3,7 +3,7 @@
 use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Document, Filter, Sample};
 
-use super::branches::History;
+use super::branches::{History, Plateau, Ramp};
 use super::checks::{SMALLEST_RANGE_DEG_C, moves_enough};
 use super::columns::{Basis, Term};
 use super::compare::{self, Compared};
@@ -17,7 +17,8 @@ use crate::axes::output_name;
 use crate::document::{Fitted, Written, accelerometers};
 use crate::error::Error;
 use crate::finding::ThermalKind;
-use crate::numbers::{Size, once_each};
+use crate::numbers::{Size, hull, once_each};
+use crate::report::curve::Judging;
 use crate::report::{Curve, FLAT, Judged, Rest, Verdict, judge};
 use crate::runs::table::Rows;
 use crate::runs::{Run, Watch};
@@ -77,23 +78,17 @@ impl Outcome {
 
     pub(super) fn history(&mut self, name: &str, history: &History) {
         let [low, high] = history.range_deg_c;
-        self.range_deg_c = [self.range_deg_c[0].min(low), self.range_deg_c[1].max(high)];
-        let [cooling, heating] = history.rate_range_deg_c_per_s;
-        self.rate_range_deg_c_per_s =
-            [self.rate_range_deg_c_per_s[0].min(cooling), self.rate_range_deg_c_per_s[1].max(heating)];
-        let ramps: Vec<String> = history
-            .ramps
-            .iter()
-            .map(|ramp| {
-                let [from, to] = ramp.from_to_deg_c;
-                format!("{from:.0} to {to:.0} °C at up to {:.1} °C/min", ramp.deg_c_per_min.abs())
-            })
-            .collect();
-        let plateaus: Vec<String> = history
-            .plateaus
-            .iter()
-            .map(|plateau| format!("{:.1} °C for {:.0} min", plateau.deg_c, plateau.length_s / 60.0))
-            .collect();
+        self.range_deg_c = hull([self.range_deg_c, history.range_deg_c]).unwrap_or_default();
+        let rates = [self.rate_range_deg_c_per_s, history.rate_range_deg_c_per_s];
+        self.rate_range_deg_c_per_s = hull(rates).unwrap_or_default();
+        let ramp = |ramp: &Ramp| {
+            let [from, to] = ramp.from_to_deg_c;
+            format!("{from:.0} to {to:.0} °C at up to {:.1} °C/min", ramp.deg_c_per_min.abs())
+        };
+        let ramps: Vec<String> = history.ramps.iter().map(ramp).collect();
+        let plateau =
+            |plateau: &Plateau| format!("{:.1} °C for {:.0} min", plateau.deg_c, plateau.length_s / 60.0);
+        let plateaus: Vec<String> = history.plateaus.iter().map(plateau).collect();
         let plateaus = if plateaus.is_empty() { "none".to_owned() } else { plateaus.join(", ") };
         self.notes.push(format!(
             "Channel {name}: {low:.1} to {high:.1} °C; ramps {}; plateaus {plateaus}.",
@@ -110,7 +105,6 @@ impl Outcome {
     ) -> Result<Fitted, Error> {
         self.found.sort_by_key(|(sensor, ..)| (!sensor.gyro, sensor.index));
         let before = Written::of(&self.plain())?;
-        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
         let (document, curves, mut verdicts, troubles, compared) = loop {
             let document = self.document(|found| &found.terms);
             let compared = self.compared(&document, (runs, judges), &rest, &mut watch)?;
@@ -119,12 +113,9 @@ impl Outcome {
             }
             let written = Written::of(&document)?;
             let of_run = |index: usize, run: &Run| {
-                let stand = self.settings.stand(index);
+                let (rest, rows, counts) = self.judging((index, run), &rest)?;
                 let shares = index >= runs.len() && runs.iter().any(|other| run.shares_log(other));
-                let rest = Rest { levels: shares.then(|| compared.levels()), ..rest(run, &stand)? };
-                // On a table the accelerometers feel its turning, too.
-                let counts = if stand.turning.is_none() { "" } else { "gyro" };
-                Ok((rest, Rows::mostly_valid(stand.window_s(window_s)), counts))
+                Ok((Rest { levels: shares.then(|| compared.levels()), ..rest }, rows, counts))
             };
             let Judged { mut curves, mut troubles } =
                 judge((runs, judges), [&before, &written], of_run, &mut watch)?;
@@ -160,6 +151,19 @@ impl Outcome {
         let mut report = self.report(verdicts, curves);
         report.tables.push((compare::HEADING.to_owned(), table));
         Ok(Fitted { written, report, about })
+    }
+
+    /// How a run is judged, by its number among all.
+    pub(super) fn judging(
+        &self,
+        (index, run): (usize, &Run),
+        rest: &impl Fn(&Run, &Stand) -> Result<Rest, Error>,
+    ) -> Result<Judging, Error> {
+        let stand = self.settings.stand(index);
+        let window_s = self.settings.window_s.unwrap_or(self.settings.fit_window_s);
+        // On a table the accelerometers feel its turning, too.
+        let counts = if stand.turning.is_none() { "" } else { "gyro" };
+        Ok((rest(run, &stand)?, Rows::mostly_valid(stand.window_s(window_s)), counts))
     }
 
     /// The document without the fitted terms, with the filter of the fit.
@@ -263,9 +267,10 @@ impl Outcome {
 
     /// Gives the verdicts their reasons, and a refused sensor of which no window is complete a verdict of its own.
     fn say(&self, verdicts: &mut Vec<Verdict>) {
-        let nothing = |found: &Found| found.dead || found.refused.as_deref() == Some(NO_WINDOW);
-        let unseen = self.found.iter().filter(|(.., found)| nothing(found));
-        for axis in unseen.filter_map(|(sensor, ..)| axis_name(sensor)) {
+        let unseen = |(sensor, _, found): &&(Sensor, Basis, Found)| {
+            sensor.dead.is_some() || found.refused.as_deref() == Some(NO_WINDOW)
+        };
+        for axis in self.found.iter().filter(unseen).filter_map(|(sensor, ..)| axis_name(sensor)) {
             if verdicts.iter().all(|verdict| verdict.of != axis) {
                 verdicts.push(Verdict::said(axis, ""));
             }
@@ -282,7 +287,7 @@ impl Outcome {
             };
             if let Some(why) = &found.refused {
                 *verdict = verdict.clone().refused(why.clone());
-                if found.dead {
+                if sensor.dead.is_some() {
                     // What comes out along its axis is not its own.
                     (verdict.in_sample, verdict.out_of_sample) = ([Size::default(); 2], None);
                 }

@@ -11,7 +11,7 @@ use isotherm_protocol::document::{Curve, Document, Shape};
 use super::bare::along_axes;
 use super::checks::median_step_s;
 use super::noise::Thermometer;
-use super::thermometer::{noise_of, without_noise};
+use super::thermometer::without_noise;
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::{median, real};
@@ -81,6 +81,7 @@ impl Samples {
         let responses = of_forces.iter().zip(&biased).map(difference).collect();
         let gyros = by_sensor(&rates, gyro_count);
         let Table { time_s, troubles, temperature_deg_c, .. } = tables.into_iter().next().unwrap_or_default();
+        let (temperatures, thermometers) = thermometers(series);
         Ok(Self {
             name: run.name.clone(),
             start_ns: start_ns(series),
@@ -89,8 +90,8 @@ impl Samples {
             gyros,
             forces: of_forces,
             responses,
-            temperatures: readings(series),
-            thermometers: thermometers(series),
+            temperatures,
+            thermometers,
             deg_c: temperature_deg_c,
             troubles,
         })
@@ -105,38 +106,30 @@ impl Samples {
 }
 
 /// Begin of the first gyro tick (ns).
-pub fn start_ns(series: &Series) -> i64 {
+fn start_ns(series: &Series) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a tick is at most some seconds")]
     let first = series.gyros.duration_s.first().map_or(0, |length| (length * 1e9) as i64);
     series.gyros.end_ns.first().map_or(0, |end| end.saturating_sub(first))
 }
 
-/// The temperature readings of a series by channel, without the noise of the thermometers: see [`without_noise`].
-pub fn readings(series: &Series) -> BTreeMap<String, Vec<TemperatureReading>> {
-    let channel = |(name, channel): (&String, &crate::runs::series::Channel)| {
-        let known = ChannelName::from(name).ok()?;
-        let pairs = channel.time_ns.iter().zip(without_noise(&channel.since_s(), &channel.raw));
-        let readings = pairs.map(|(time, raw)| TemperatureReading {
-            channel: known,
+/// The temperature readings of a series by channel, without the noise of the thermometers, and the thermometers: see [`without_noise`].
+fn thermometers(
+    series: &Series,
+) -> (BTreeMap<String, Vec<TemperatureReading>>, BTreeMap<String, Thermometer>) {
+    let (mut temperatures, mut thermometers) = (BTreeMap::new(), BTreeMap::new());
+    for (name, channel) in &series.temperatures {
+        let (raw, sigma) = without_noise(&channel.since_s(), &channel.raw);
+        let (usual, step_s) = (median(&channel.raw), median_step_s(&channel.time_ns));
+        thermometers.insert(name.clone(), Thermometer { usual, sigma, step_s });
+        let Ok(channel_name) = ChannelName::from(name) else { continue };
+        let reading = |(time, raw): (&i64, f64)| TemperatureReading {
+            channel: channel_name,
             time: Timestamp::from_ns(*time),
             raw,
-        });
-        Some((name.clone(), readings.collect()))
-    };
-    series.temperatures.iter().filter_map(channel).collect()
-}
-
-/// The thermometers of a series by channel.
-fn thermometers(series: &Series) -> BTreeMap<String, Thermometer> {
-    let thermometer = |(name, channel): (&String, &crate::runs::series::Channel)| {
-        let thermometer = Thermometer {
-            usual: median(&channel.raw),
-            sigma: noise_of(&channel.since_s(), &channel.raw),
-            step_s: median_step_s(&channel.time_ns),
         };
-        (name.clone(), thermometer)
-    };
-    series.temperatures.iter().map(thermometer).collect()
+        temperatures.insert(name.clone(), channel.time_ns.iter().zip(raw).map(reading).collect());
+    }
+    (temperatures, thermometers)
 }
 
 /// A constant bias of one output unit on every accelerometer.

@@ -48,17 +48,15 @@ fn offers(gyro: bool, method: Method, grid_step_s: f64) -> Vec<Dynamics> {
 
 /// A derivative by branches, its coefficient a curve of a form, or a polynomial of some degree in temperature.
 fn follows(derivative: &str, effect: fn(Branch) -> Effect, degree: usize, form: Form) -> Dynamics {
-    let name = match form {
-        Form::OverTemperature => format!("{derivative}±"),
-        Form::Parabola => format!("{derivative}± by a parabola over it"),
-        Form::Lines => format!("{derivative}± by lines over it"),
-        Form::Spline => format!("{derivative}± by a spline over it"),
-    };
+    let over = ["", " by a parabola over it", " by lines over it", " by a spline over it"][form as usize];
     let of_branch = |branch| match form {
         Form::OverTemperature => effect(branch).powers(0..=degree).collect(),
         _ => effect(branch).knots(form).collect::<Vec<_>>(),
     };
-    Dynamics { name, terms: BRANCHES.into_iter().flat_map(of_branch).collect() }
+    Dynamics {
+        name: format!("{derivative}±{over}"),
+        terms: BRANCHES.into_iter().flat_map(of_branch).collect(),
+    }
 }
 
 /// What follows the plateaus of one sensor: the smallest of what may that leaves hardly more than the best on parts that it did not see.

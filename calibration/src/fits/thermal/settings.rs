@@ -20,11 +20,7 @@ pub enum Method {
 impl Method {
     /// Its name, in documents and reports.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sequential => "sequential",
-            Self::Rate => "rate",
-            Self::Joint => "joint",
-        }
+        ["sequential", "rate", "joint"][self as usize]
     }
 
     /// Whether static bias and what follows the change are found one after the other.

@@ -69,12 +69,6 @@ pub struct Stand {
     pub turning: Option<Turning>,
 }
 
-impl From<Site> for Stand {
-    fn from(site: Site) -> Self {
-        Self { site, turning: None }
-    }
-}
-
 impl Stand {
     /// The shortest windows that are no shorter than so many seconds (s): of a turning run whole turns, over which the horizontal
     /// part of the Earth's rate is nothing.

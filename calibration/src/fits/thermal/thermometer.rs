@@ -39,12 +39,14 @@ struct Local {
 }
 
 /// Readings of a thermometer (as it has them: V, counts or °C) at times (s), without their noise. What is no number stays none;
-/// spikes, and readings that come again or too late, stay as they are.
-pub fn without_noise(time_s: &[f64], readings: &[f64]) -> Vec<f64> {
+/// spikes, and readings that come again or too late, stay as they are. Beside them the standard deviation of the white noise of a reading,
+/// zero for too few.
+pub fn without_noise(time_s: &[f64], readings: &[f64]) -> (Vec<f64>, f64) {
     let rows = sound(time_s, readings);
     let bins = bins(&rows, time_s, readings);
     let good: Vec<f64> = rows.iter().map(|&row| readings[row]).collect();
-    let Some(sigma) = sigma(&bins, &good) else { return readings.to_vec() };
+    let Some(sigma) = sigma(&bins, &good) else { return (readings.to_vec(), 0.0) };
+    let in_a_bin = real(rows.len()) / real(bins.len().max(1));
     let locals: Vec<Option<Local>> = (0..bins.len()).map(|bin| local(&bins, bin, sigma)).collect();
     let mut smoothed = readings.to_vec();
     let mut behind = 0;
@@ -61,16 +63,7 @@ pub fn without_noise(time_s: &[f64], readings: &[f64]) -> Vec<f64> {
         let share = if length > 0.0 { ((time - bins[before].time_s) / length).clamp(0.0, 1.0) } else { 0.0 };
         smoothed[row] = (1.0 - share) * of(before) + share * of(after);
     }
-    smoothed
-}
-
-/// Standard deviation of the white noise of a reading; zero for too few.
-pub fn noise_of(time_s: &[f64], readings: &[f64]) -> f64 {
-    let rows = sound(time_s, readings);
-    let bins = bins(&rows, time_s, readings);
-    let good: Vec<f64> = rows.iter().map(|&row| readings[row]).collect();
-    let in_a_bin = real(rows.len()) / real(bins.len().max(1));
-    sigma(&bins, &good).map_or(0.0, |sigma| sigma * in_a_bin.sqrt())
+    (smoothed, sigma * in_a_bin.sqrt())
 }
 
 /// Rows of readings that are neither spikes nor repeated.
@@ -215,13 +208,9 @@ mod tests {
     fn noise_goes_and_the_corners_stay() {
         for (noise, resolution) in [(0.004, 0.0), (0.004, 0.01), (0.05, 0.0)] {
             let (time, truth, shown) = chamber(noise, resolution);
-            let smoothed = without_noise(&time, &shown);
+            let (smoothed, found) = without_noise(&time, &shown);
             let (before, after) = (rms(&shown, &truth), rms(&smoothed, &truth));
-            assert!(
-                (noise_of(&time, &shown) / before - 1.0).abs() < 0.2,
-                "{} {before}",
-                noise_of(&time, &shown)
-            );
+            assert!((found / before - 1.0).abs() < 0.2, "{found} {before}");
             assert!(after < 0.4 * before, "{noise} {resolution}: {before} → {after}");
             let corner = |of: &[f64]| rms(&of[1180..1220], &truth[1180..1220]);
             assert!(corner(&smoothed) < 2.0 * corner(&shown), "{noise}: {}", corner(&smoothed));
@@ -232,7 +221,7 @@ mod tests {
     fn what_has_no_noise_or_steps_of_its_own_hardly_changes() {
         for resolution in [0.0, 0.0625] {
             let (time, truth, shown) = chamber(0.0, resolution);
-            let smoothed = without_noise(&time, &shown);
+            let (smoothed, _) = without_noise(&time, &shown);
             let (before, after) = (rms(&shown, &truth), rms(&smoothed, &truth));
             assert!(after < before + 1e-3, "{resolution}: {before} → {after}");
         }
@@ -241,18 +230,18 @@ mod tests {
     #[test]
     fn spikes_repeats_and_what_is_no_number_stay_and_spoil_nothing() {
         let (mut time, _, mut shown) = chamber(0.004, 0.0);
-        let sound = without_noise(&time, &shown);
+        let (sound, _) = without_noise(&time, &shown);
         (shown[700], shown[900]) = (85.0, f64::NAN);
-        let smoothed = without_noise(&time, &shown);
+        let (smoothed, _) = without_noise(&time, &shown);
         assert!((smoothed[700] - 85.0).abs() < 1e-12 && smoothed[900].is_nan());
         assert!((smoothed[703] - sound[703]).abs() < 0.003, "{} {}", smoothed[703], sound[703]);
         // The same reading once more.
         (shown, time) = (chamber(0.004, 0.0).2, time);
         shown.insert(2001, shown[2000]);
         time.insert(2001, time[2000]);
-        let mut smoothed = without_noise(&time, &shown);
+        let (mut smoothed, _) = without_noise(&time, &shown);
         smoothed.remove(2001);
         assert_eq!(smoothed, sound);
-        assert_eq!(without_noise(&[0.0, 1.0], &[20.0, 20.1]), [20.0, 20.1], "too few");
+        assert_eq!(without_noise(&[0.0, 1.0], &[20.0, 20.1]).0, [20.0, 20.1], "too few");
     }
 }

@@ -34,13 +34,7 @@ fn autocovariance(law: PowerLaw, smooth: bool, t: f64) -> f64 {
     let a = t.abs();
     let logarithm = || if a > 0.0 { libm::log(a) } else { 0.0 };
     match (law, smooth) {
-        (PowerLaw::Quantization, false) => {
-            if a < 1e-9 {
-                1.0
-            } else {
-                0.0
-            }
-        }
+        (PowerLaw::Quantization, false) => f64::from(u8::from(a < 1e-9)),
         (PowerLaw::White, false) | (PowerLaw::Quantization, true) => -a,
         (PowerLaw::Flicker, false) => a * a * logarithm(),
         (PowerLaw::RandomWalk, false) | (PowerLaw::White, true) => a * a * a,

@@ -78,7 +78,8 @@ impl Term {
 }
 
 /// What the fit says of a coefficient, in readings and seconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(untagged)]
 pub enum Coefficient {
     /// The log shows it.
     Observed {

@@ -50,6 +50,7 @@ impl Sums {
 }
 
 /// Cuts one run.
+#[derive(Default)]
 pub(super) struct Cutter {
     cut: Cut,
     axes: Option<OrientationThermal>,
@@ -70,14 +71,9 @@ impl Cutter {
             cut,
             axes: bare.gyro.orientation.thermal.clone(),
             begin_s,
-            first_ns: None,
-            signs: None,
-            switched_ns: None,
             stretch,
-            joined: false,
-            cell: Sums::default(),
-            second: Sums::default(),
             axes_deg_c: f64::NAN,
+            ..Self::default()
         }
     }
 
