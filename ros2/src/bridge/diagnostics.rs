@@ -110,10 +110,7 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
         let words = format!("stamps jitter by {:.0} us, stated are {:.0} us", jitter * 1e6, stated * 1e6);
         found.push((Level::Warn, words));
     }
-    let running = status.map_or_else(
-        || "running".to_owned(),
-        |status| isotherm_correction::operation::State::from(status.state).name().to_owned(),
-    );
+    let running = status.map_or_else(|| "running".to_owned(), |status| status.state.name().to_owned());
     let worst = found.iter().map(|(level, _)| *level).max();
     match worst {
         None => (Level::Ok, running),
@@ -126,7 +123,7 @@ fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
     let mut say = |key: &str, value: String| values.push(KeyValue { key: key.to_owned(), value });
     let Look { totals, status, jitter_s, .. } = look;
     if let Some((status, _)) = status {
-        say("state", isotherm_correction::operation::State::from(status.state).name().to_owned());
+        say("state", status.state.name().to_owned());
         if let Some(calibration) = &status.calibration {
             say("calibration revision", calibration.revision.counter.to_string());
             say("calibration digest", Digits(&calibration.revision.digest).to_string());

@@ -287,7 +287,6 @@ fn journal_details(text: &mut String, journal: &JournalInfo) {
 
 fn states(text: &mut String, status: &StatusInfo, begin_ns: i64) {
     for StateInfo { last_tick_ns, state, .. } in status.states.iter().take(LISTED) {
-        let state = isotherm_correction::operation::State::from(*state);
         let when = last_tick_ns.map_or_else(|| "before the first tick".to_owned(), |ns| after(ns, begin_ns));
         let _ = writeln!(text, "state {state}: {when}");
     }
