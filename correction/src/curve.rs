@@ -173,7 +173,8 @@ fn overflow(near: f64) -> Defect {
 /// Compiles a polynomial.
 fn polynomial(reference: f64, stated: &[f64], range: [f64; 2]) -> Result<Curve, Defect> {
     let mut checker = Checker::default();
-    checker.count("coefficients", stated.len(), 1, MAX_COEFFICIENTS);
+    // Of the curve as a whole: the list may be one that a document lacks.
+    checker.count("", stated.len(), 1, MAX_COEFFICIENTS);
     checker.finite("reference", reference);
     for &coefficient in stated {
         checker.finite("coefficients", coefficient);
@@ -190,7 +191,7 @@ fn polynomial(reference: f64, stated: &[f64], range: [f64; 2]) -> Result<Curve, 
 /// Compiles a table or spline; `second` gives the second derivatives at the knots, empty for straight lines.
 fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Curve, Defect> {
     let mut checker = Checker::default();
-    checker.count("knots", knots.len(), MIN_KNOTS, MAX_KNOTS);
+    checker.count("", knots.len(), MIN_KNOTS, MAX_KNOTS);
     checker.finite_rows("knots", knots);
     let stretches = || knots.iter().zip(knots.iter().skip(1)).enumerate();
     for (index, ([previous, _], [got, _])) in stretches().filter(|(_, (a, b))| b[0] <= a[0]) {

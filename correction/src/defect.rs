@@ -17,7 +17,8 @@ use crate::stated::{AtDegC, Shown};
 pub(crate) const HUGE: f64 = 1e100;
 
 /// One thing that is wrong with a set of parts.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{path}: {kind}")]
 pub struct Defect {
     /// Path of its key in a calibration document, but for the unit that keys end with: `gyro.sensor[1].static_bias.knots[2]`.
     /// Of a part that is looked at by itself, the path within the part.
