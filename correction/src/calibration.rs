@@ -8,7 +8,6 @@
 //! **scale factor** divides (output per m/s²), a **bias** is subtracted.
 
 mod check;
-mod defect;
 mod parts;
 mod range;
 mod steady;
@@ -22,12 +21,13 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 pub use check::MAX_SELF_TEST_READINGS;
-pub use defect::{Defect, DefectKind, Section};
 pub use parts::{
     AccelParts, BranchArgument, BranchedParts, CalibrationParts, CoefficientParts, EVERYWHERE_DEG_C,
     GyroParts, NO_LIMIT, RegressorParts, Source, TermParts, TrendParts,
 };
 pub use steady::{Jump, Steady};
+
+pub use crate::defect::{Defect, DefectKind};
 
 use crate::channel::{Channel, ThermalFilter};
 use crate::drift::DriftModel;

@@ -4,13 +4,14 @@
 //! A curve is never extrapolated: outside its fitted range the argument is clamped to the range and the
 //! result says so (models §2). The unit of argument and value is that of the term that owns the curve.
 
-use alloc::borrow::ToOwned;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
+
+use crate::defect::{Checker, Defect, DefectKind};
 
 /// Most coefficients of a polynomial: degree 9.
 pub const MAX_COEFFICIENTS: usize = 10;
@@ -80,75 +81,6 @@ impl CurveParts {
     }
 }
 
-/// What is wrong with a stated curve.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CurveError {
-    /// The polynomial has no coefficients, or too many.
-    #[error("{got} coefficients; from 1 to {max} are allowed")]
-    CoefficientCount {
-        /// Coefficients stated.
-        got: usize,
-        /// Most that are allowed.
-        max: usize,
-    },
-    /// The table or spline has too few or too many knots.
-    #[error("{got} knots; from {min} to {max} are allowed")]
-    KnotCount {
-        /// Knots stated.
-        got: usize,
-        /// Fewest that are allowed.
-        min: usize,
-        /// Most that are allowed.
-        max: usize,
-    },
-    /// A number is NaN or infinite.
-    #[error("{name} {index} is {got}; a finite number is needed")]
-    NotFinite {
-        /// What the number is.
-        name: &'static str,
-        /// Its index in its list, from 0.
-        index: usize,
-        /// The number.
-        got: f64,
-    },
-    /// The knots' arguments do not increase.
-    #[error("knot {index} is at {got}, not above the one before it at {previous}")]
-    KnotsNotIncreasing {
-        /// Index of the offending knot, from 0.
-        index: usize,
-        /// Argument of the knot before it.
-        previous: f64,
-        /// Argument of the knot.
-        got: f64,
-    },
-    /// The fitted range is empty or reversed.
-    #[error("range from {first} to {last}; the first must be below the last")]
-    EmptyRange {
-        /// Stated first argument.
-        first: f64,
-        /// Stated last argument.
-        last: f64,
-    },
-    /// Somewhere in its range the curve is too large for a number of 64 bits.
-    #[error("values near argument {near} overflow")]
-    Overflow {
-        /// Where: first argument of the offending stretch.
-        near: f64,
-    },
-}
-
-impl CurveError {
-    /// Where in the curve it lies, as a path below that of the curve.
-    pub(crate) fn place(&self) -> String {
-        match self {
-            Self::KnotsNotIncreasing { index, .. } => format!(".knots[{index}]"),
-            Self::EmptyRange { .. } => ".range".to_owned(),
-            _ => String::new(),
-        }
-    }
-}
-
 /// A curve's value at one argument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluated {
@@ -180,7 +112,7 @@ impl Curve {
     /// # Errors
     ///
     /// The first thing that is wrong with it.
-    pub fn new(parts: &CurveParts) -> Result<Self, CurveError> {
+    pub fn new(parts: &CurveParts) -> Result<Self, Defect> {
         match parts {
             CurveParts::Constant { value } => polynomial(0.0, &[*value], ANYWHERE),
             CurveParts::Polynomial { reference, coefficients, range } => {
@@ -233,47 +165,41 @@ fn is_bounded(coefficients: &[f64], x: f64) -> bool {
     bound.is_finite()
 }
 
-/// Checks numbers of one kind, the first of which has this index.
-fn finite(name: &'static str, first: usize, numbers: &[f64]) -> Result<(), CurveError> {
-    let broken = numbers.iter().enumerate().find(|(_, got)| !got.is_finite());
-    broken.map_or(Ok(()), |(index, got)| Err(CurveError::NotFinite { name, index: first + index, got: *got }))
+/// Somewhere beyond `near` the values cannot be represented.
+fn overflow(near: f64) -> Defect {
+    Defect { path: String::new(), kind: DefectKind::Overflow { near } }
 }
 
 /// Compiles a polynomial.
-fn polynomial(reference: f64, stated: &[f64], range: [f64; 2]) -> Result<Curve, CurveError> {
-    let mut coefficients = ArrayVec::new();
-    if stated.is_empty() || coefficients.try_extend_from_slice(stated).is_err() {
-        return Err(CurveError::CoefficientCount { got: stated.len(), max: MAX_COEFFICIENTS });
+fn polynomial(reference: f64, stated: &[f64], range: [f64; 2]) -> Result<Curve, Defect> {
+    let mut checker = Checker::default();
+    // Of the curve as a whole: the list may be one that a document lacks.
+    checker.count("", stated.len(), 1, MAX_COEFFICIENTS);
+    checker.finite("reference", reference);
+    for &coefficient in stated {
+        checker.finite("coefficients", coefficient);
     }
-    finite("reference", 0, &[reference])?;
-    finite("coefficient", 0, stated)?;
-    finite("range limit", 0, &range)?;
-    let [first, last] = range;
-    if first >= last {
-        return Err(CurveError::EmptyRange { first, last });
-    }
+    checker.range("range", range, f64::MIN, f64::MAX);
+    checker.first()?;
     if let Some(near) = range.into_iter().find(|end| !is_bounded(stated, end - reference)) {
-        return Err(CurveError::Overflow { near });
+        return Err(overflow(near));
     }
+    let coefficients = stated.iter().copied().take(MAX_COEFFICIENTS).collect();
     Ok(Curve { pieces: [Piece { origin: reference, coefficients }].into(), range })
 }
 
 /// Compiles a table or spline; `second` gives the second derivatives at the knots, empty for straight lines.
-fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Curve, CurveError> {
-    let ([first, ..], [.., last], MIN_KNOTS..=MAX_KNOTS) = (knots, knots, knots.len()) else {
-        return Err(CurveError::KnotCount { got: knots.len(), min: MIN_KNOTS, max: MAX_KNOTS });
-    };
-    for (index, [x, y]) in knots.iter().enumerate() {
-        finite("argument of knot", index, &[*x])?;
-        finite("value of knot", index, &[*y])?;
-    }
+fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Curve, Defect> {
+    let mut checker = Checker::default();
+    checker.count("", knots.len(), MIN_KNOTS, MAX_KNOTS);
+    checker.finite_rows("knots", knots);
     let stretches = || knots.iter().zip(knots.iter().skip(1)).enumerate();
-    for (index, ([previous, _], [got, _])) in stretches() {
-        if got <= previous {
-            return Err(CurveError::KnotsNotIncreasing { index: index + 1, previous: *previous, got: *got });
-        }
+    for (index, ([previous, _], [got, _])) in stretches().filter(|(_, (a, b))| b[0] <= a[0]) {
+        let (index, previous, got) = (index + 1, *previous, *got);
+        let kind = DefectKind::KnotsNotIncreasing { index, previous, got };
+        checker.push(&format!("knots[{index}]"), kind);
     }
-
+    checker.first()?;
     let second = second(knots);
     let second_at = |index: usize| second.get(index).copied().unwrap_or(0.0);
     let mut pieces = Vec::with_capacity(knots.len());
@@ -283,12 +209,14 @@ fn pieces(knots: &[[f64; 2]], second: fn(&[[f64; 2]]) -> Vec<f64>) -> Result<Cur
         let slope = (b[1] - a[1]) / width - width * (2.0 * m + n) / 6.0;
         let coefficients = [a[1], slope, m / 2.0, (n - m) / (6.0 * width)];
         if !is_bounded(&coefficients, width) {
-            return Err(CurveError::Overflow { near: a[0] });
+            return Err(overflow(a[0]));
         }
         pieces.push(Piece { origin: a[0], coefficients: coefficients.into_iter().collect() });
     }
-    pieces.push(Piece { origin: last[0], coefficients: [last[1], 0.0, 0.0, 0.0].into_iter().collect() });
-    Ok(Curve { pieces, range: [first[0], last[0]] })
+    let ends = [knots.first(), knots.last()].map(|knot| knot.copied().unwrap_or_default());
+    let [[from, _], [to, value]] = ends;
+    pieces.push(Piece { origin: to, coefficients: [value, 0.0, 0.0, 0.0].into_iter().collect() });
+    Ok(Curve { pieces, range: [from, to] })
 }
 
 /// Second derivatives of the natural cubic spline at its knots.

@@ -43,6 +43,7 @@ pub mod calibration;
 pub mod channel;
 mod counting;
 pub mod curve;
+mod defect;
 pub mod drift;
 pub mod earth;
 pub mod lanes;

@@ -28,17 +28,23 @@ use crate::earth::Place;
 use crate::prelaunch::{PreLaunchError, PreLaunchSettings};
 
 /// What a unit is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum State {
     /// Nothing goes out.
+    #[serde(rename = "standby")]
     Standby,
     /// The instrument is looked over; nothing goes out.
+    #[serde(rename = "self-test")]
     SelfTest,
     /// C0 and B0 are determined at rest; nothing goes out.
+    #[serde(rename = "pre-launch calibration")]
     PreLaunchCalibration,
     /// Corrected increments go out; the producer reverses the lasing mode.
+    #[serde(rename = "running with mode reversal")]
     RunningWithReversal,
     /// Corrected increments go out; the lasing mode is to stay as it is.
+    #[default]
+    #[serde(rename = "running without mode reversal")]
     RunningWithoutReversal,
 }
 
@@ -62,12 +68,6 @@ impl State {
             Self::RunningWithReversal => "running with mode reversal",
             Self::RunningWithoutReversal => "running without mode reversal",
         }
-    }
-
-    /// The state of a name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|state| state.name() == name)
     }
 
     /// Whether increments go out.

@@ -25,10 +25,9 @@ use linear::{condition_number, is_conditioned, orthonormal_columns};
 use parts::norm;
 
 pub use parity::{ISOLATION_RATIO, ParityCheck, ParityVerdict};
-pub use parts::{
-    AxesPlay, CONDITION_LIMIT, OrientationError, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT,
-};
+pub use parts::{AxesPlay, CONDITION_LIMIT, OrientationParts, ROW_NORM_TOLERANCE, WEIGHT_RATIO_LIMIT};
 
+use crate::defect::{Checker, Defect, DefectKind};
 use crate::lanes::{Lanes, Readings};
 use crate::sample::{MAX_SENSORS, MIN_SENSORS, Sensors};
 use crate::thermal::MAX_PLAYS;
@@ -107,13 +106,12 @@ impl Orientation {
     /// # Errors
     ///
     /// Everything that is wrong with it.
-    pub fn new(parts: &OrientationParts) -> Result<Self, Vec<OrientationError>> {
-        let mut errors = Vec::new();
-        parts.check_counts(&mut errors);
-        parts.check_numbers(&mut errors);
+    pub fn new(parts: &OrientationParts) -> Result<Self, Vec<Defect>> {
+        let mut checker = Checker::default();
+        parts.check(&mut checker);
         // The matrix checks below would only repeat what is already known of broken numbers.
-        if !errors.is_empty() {
-            return Err(errors);
+        if !checker.defects.is_empty() {
+            return Err(checker.defects);
         }
 
         let mut rows = Rows::default();
@@ -149,18 +147,16 @@ impl Orientation {
         for (temperature_deg_c, got) in stated.into_iter().skip(same) {
             // NaN comes from slopes that overflow.
             if got.is_nan() || got > CONDITION_LIMIT {
-                let limit = CONDITION_LIMIT;
-                errors.push(OrientationError::Condition { temperature_deg_c, got, limit });
+                checker.push("rows", DefectKind::Condition { temperature_deg_c, got });
             }
         }
-        if errors.is_empty()
+        if checker.defects.is_empty()
             && let Some((temperature_deg_c, got)) =
                 orientation.ill_conditioned(SensorMask::all(MAX_SENSORS), [first, last])
         {
-            let limit = CONDITION_LIMIT;
-            errors.push(OrientationError::ConditionInside { temperature_deg_c, got, limit });
+            checker.push("thermal.slopes", DefectKind::ConditionInside { temperature_deg_c, got });
         }
-        if errors.is_empty() { Ok(orientation) } else { Err(errors) }
+        checker.finish(orientation)
     }
 
     /// Number of sensors N (3…8).

@@ -26,7 +26,7 @@ use history::{History, Reading, mid_time_s};
 
 pub use parts::{
     FitWindow, MAX_FIT_DEGREE, MAX_FIT_READINGS, MAX_PREDICT_DEGREE, MAX_TRANSITION_TICKS, Reversal,
-    ReversalError, ReversalParts, TRANSITION_RANGE_S, Transition,
+    ReversalParts, TRANSITION_RANGE_S, Transition,
 };
 pub(crate) use restoration::{Gain, Restoration};
 pub use window::MIN_ADAPTIVE_READINGS;

@@ -34,8 +34,7 @@ use serde::{Deserialize, Serialize};
 use decay::Decay;
 
 pub use parts::{
-    DEFAULT_SETTLE_TIME_CONSTANTS, SETTLE_RANGE, Servo, ServoError, ServoForm, ServoParts,
-    TIME_CONSTANT_RANGE_S,
+    DEFAULT_SETTLE_TIME_CONSTANTS, SETTLE_RANGE, Servo, ServoForm, ServoParts, TIME_CONSTANT_RANGE_S,
 };
 
 use crate::lanes::Lanes;

@@ -5,6 +5,7 @@ use core::fmt;
 use thiserror::Error;
 
 use crate::calibration::EVERYWHERE_DEG_C;
+use crate::defect::{Defect, DefectKind};
 
 /// A number in words to people: with an exponent where it would be a row of zeros. Read back, it is the same number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,31 +35,31 @@ impl fmt::Display for AtDegC {
 }
 
 /// A stated number that is outside its range, or not a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("{name} is {got}; from {min} to {max} is allowed")]
-pub struct OutOfRange<T = f64> {
+pub struct OutOfRange {
     /// Field of what was stated; its end says the unit of measure.
     pub name: &'static str,
     /// The number.
-    pub got: T,
+    pub got: f64,
     /// Smallest allowed.
-    pub min: T,
+    pub min: f64,
     /// Largest allowed.
-    pub max: T,
+    pub max: f64,
 }
 
-impl<T> OutOfRange<T> {
-    /// Its name without the unit of measure.
-    pub(crate) fn quantity(&self) -> &'static str {
-        let end = self.name.find("_rad").unwrap_or(self.name.len());
-        self.name.get(..end).unwrap_or_default().trim_end_matches("_s")
+/// At its name without the unit of measure.
+impl From<OutOfRange> for Defect {
+    fn from(OutOfRange { name, got, min, max }: OutOfRange) -> Self {
+        let quantity = name.split("_rad").next().unwrap_or(name).trim_end_matches("_s");
+        Self { path: quantity.into(), kind: DefectKind::OutOfRange { value: got, low: min, high: max } }
     }
 }
 
 /// Those of the stated numbers, each with its name and its range, that are outside it; what is no number is outside any.
-pub(crate) fn outside<T: PartialOrd + Copy, const N: usize>(
-    stated: [(&'static str, T, [T; 2]); N],
-) -> impl Iterator<Item = OutOfRange<T>> {
+pub(crate) fn outside<const N: usize>(
+    stated: [(&'static str, f64, [f64; 2]); N],
+) -> impl Iterator<Item = OutOfRange> {
     let wrong = stated.into_iter().filter(|(_, got, [min, max])| !(min..=max).contains(&got));
     wrong.map(|(name, got, [min, max])| OutOfRange { name, got, min, max })
 }

@@ -12,10 +12,10 @@ mod terms;
 mod trail;
 
 pub use accel::AccelModel;
-pub(crate) use bank::{Bank, MotionBanks, Pace, Paces, Ramp, Shares};
+pub(crate) use bank::{Bank, Follows, MotionBanks, Pace, Paces, Ramp, Shares};
 pub use declared::{ACCEL_TERMS, Feature, GYRO_TERMS, Makes, Parameter, Per, Term, TermForm};
 pub(crate) use gyro::Trends;
-pub use gyro::{GyroModel, GyroTerms, TrendModel};
+pub use gyro::{GyroModel, TrendModel};
 pub(crate) use motion::{Motion, MotionTerms};
 pub use terms::MAX_REGRESSORS;
 pub(crate) use terms::Others;

@@ -8,7 +8,7 @@ use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec::Message;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
-use isotherm_protocol::journal::{JoinError, Joiner, JournalEntry, JournalEvent, JournalPart, split};
+use isotherm_protocol::journal::{JoinFault, Joiner, JournalEntry, JournalEvent, JournalPart, split};
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 
@@ -105,7 +105,7 @@ pub fn joiner(input: &[u8]) {
             Err(error) => {
                 in_few_words(&error);
                 let says_so =
-                    matches!(error, JoinError::Malformed { .. } | JoinError::Other { .. }) && continues;
+                    matches!(error.fault, JoinFault::Malformed | JoinFault::Other { .. }) && continues;
                 assert!(
                     !waited || given_up == 1 || says_so,
                     "one that was waited for is lost uncounted: {error}"

@@ -14,9 +14,9 @@ mod writer;
 
 use std::fmt;
 use std::marker::PhantomData;
+use std::mem;
 use std::sync::LazyLock;
 
-use postcard::ser_flavors::Flavor;
 use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use thiserror::Error;
@@ -124,7 +124,8 @@ impl<M: PlainMessage> Message for M {
     }
 
     fn write_body(&self, frame: &mut Vec<u8>) -> Result<(), CodecError> {
-        postcard::serialize_with_flavor(self, Room(frame)).map_err(|_| CodecError::Malformed)
+        *frame = postcard::to_extend(self, mem::take(frame)).map_err(|_| CodecError::Malformed)?;
+        Ok(())
     }
 
     fn read_body(version: u8, body: &[u8]) -> Result<Self, CodecError> {
@@ -258,27 +259,6 @@ fn checksum(bytes: &[u8]) -> u32 {
 pub(crate) fn seal(frame: &mut Vec<u8>) {
     let checksum = checksum(frame);
     frame.extend(checksum.to_le_bytes());
-}
-
-/// A frame that is being written: whole slices at once, where postcard's own flavour takes byte after byte.
-struct Room<'a>(&'a mut Vec<u8>);
-
-impl Flavor for Room<'_> {
-    type Output = ();
-
-    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        self.0.push(byte);
-        Ok(())
-    }
-
-    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        self.0.extend_from_slice(bytes);
-        Ok(())
-    }
-
-    fn finalize(self) -> postcard::Result<()> {
-        Ok(())
-    }
 }
 
 /// Encodes a message.

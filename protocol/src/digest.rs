@@ -3,7 +3,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::de::{Error as _, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use thiserror::Error;
@@ -72,7 +71,7 @@ impl fmt::Display for Digits<'_> {
 }
 
 /// Hexadecimal digits as N bytes; `None` for any other text.
-fn bytes<const N: usize>(text: &str) -> Option<[u8; N]> {
+pub(crate) fn bytes<const N: usize>(text: &str) -> Option<[u8; N]> {
     let (pairs, []) = text.as_bytes().as_chunks::<2>() else { return None };
     if pairs.len() != N {
         return None;
@@ -87,54 +86,34 @@ fn bytes<const N: usize>(text: &str) -> Option<[u8; N]> {
 
 /// Serde form of bytes that are a digest or the head of one: digits where people read, else N plain bytes.
 pub(crate) mod hex {
-    use serde::ser::SerializeTuple;
-    use serde::{Deserializer, Serializer};
+    use serde::de::{Error, Unexpected};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    use super::{Digits, Form};
+    use super::{Digits, bytes};
 
-    pub(crate) fn serialize<S: Serializer, const N: usize>(
-        bytes: &[u8; N],
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S, const N: usize>(bytes: &[u8; N], serializer: S) -> Result<S::Ok, S::Error>
+    where
+        S: Serializer,
+        [u8; N]: Serialize,
+    {
         if serializer.is_human_readable() {
-            return serializer.collect_str(&Digits(bytes));
-        }
-        let mut tuple = serializer.serialize_tuple(N)?;
-        bytes.iter().try_for_each(|byte| tuple.serialize_element(byte))?;
-        tuple.end()
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>, const N: usize>(
-        deserializer: D,
-    ) -> Result<[u8; N], D::Error> {
-        if deserializer.is_human_readable() {
-            deserializer.deserialize_str(Form::<N>)
+            serializer.collect_str(&Digits(bytes))
         } else {
-            deserializer.deserialize_tuple(N, Form::<N>)
+            bytes.serialize(serializer)
         }
     }
-}
 
-/// Reads either form.
-struct Form<const N: usize>;
-
-impl<'de, const N: usize> Visitor<'de> for Form<N> {
-    type Value = [u8; N];
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{N} bytes, or {} hexadecimal digits", 2 * N)
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Self::Value, E> {
-        bytes(text).ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
-        let mut bytes = [0; N];
-        for (index, byte) in bytes.iter_mut().enumerate() {
-            *byte = seq.next_element()?.ok_or_else(|| A::Error::invalid_length(index, &self))?;
+    pub(crate) fn deserialize<'de, D, const N: usize>(deserializer: D) -> Result<[u8; N], D::Error>
+    where
+        D: Deserializer<'de>,
+        [u8; N]: Deserialize<'de>,
+    {
+        if !deserializer.is_human_readable() {
+            return Deserialize::deserialize(deserializer);
         }
-        Ok(bytes)
+        let text = String::deserialize(deserializer)?;
+        let must_be = format!("{} hexadecimal digits", 2 * N);
+        bytes(&text).ok_or_else(|| D::Error::invalid_value(Unexpected::Str(&text), &must_be.as_str()))
     }
 }
 

@@ -27,7 +27,7 @@ use isotherm_correction::operation::Command;
 use isotherm_correction::unit::UnitSettings;
 use serde::{Deserialize, Serialize};
 
-pub use joiner::{JoinError, Joiner, MAX_OPEN_BYTES, MAX_OPEN_ENTRIES};
+pub use joiner::{JoinError, JoinFault, Joiner, MAX_OPEN_BYTES, MAX_OPEN_ENTRIES};
 pub use part::{JournalPart, MAX_PART_BYTES, MAX_PARTS, split};
 
 use crate::control::Schedule;

@@ -218,34 +218,42 @@ pub fn raw(unit: &UnitId, stream: RawStream) -> String {
     input(unit, stream.into())
 }
 
-/// Declares the keys `imu/{unit}/{topic}` once, so that building and parsing cannot drift apart.
-macro_rules! topics {
-    ($($what:literal, $topic:literal, $build:ident, $parse:ident;)+) => {
+/// Declares keys of a unit or of a service instance once, so that building and parsing cannot drift apart.
+macro_rules! keys {
+    ($($what:literal, $root:ident $of:ident: $type:ty, $topic:literal, $build:ident $($parse:ident)?;)+) => {
         $(
-            #[doc = concat!("Key of ", $what, ": `imu/{unit}/", $topic, "`.")]
+            #[doc = concat!("Key of ", $what, ": `", $topic, "` of a ", stringify!($of), ".")]
             #[must_use]
-            pub fn $build(unit: &UnitId) -> String {
-                format!(concat!("{}/{}/", $topic), ROOT, unit)
+            pub fn $build($of: &$type) -> String {
+                format!(concat!("{}/{}/", $topic), $root, $of)
             }
 
-            #[doc = concat!("Reads the unit of a key of ", $what, " back; `None` where it is none.")]
-            #[must_use]
-            pub fn $parse(key: &str) -> Option<&str> {
-                parse(ROOT, key).filter(|(_, rest)| *rest == $topic).map(|(unit, _)| unit)
-            }
+            $(
+                #[doc = concat!("Reads the ", stringify!($of), " of a key of ", $what, " back; `None` where it is none.")]
+                #[must_use]
+                pub fn $parse(key: &str) -> Option<&str> {
+                    parse($root, key).filter(|(_, rest)| *rest == $topic).map(|($of, _)| $of)
+                }
+            )?
         )+
     };
 }
 
-topics! {
-    "the corrected increments", "corrected", corrected, parse_corrected;
-    "a unit's status", "status", status, parse_status;
-    "the calibration document", "calibration", calibration, parse_calibration;
-    "commands", "command", command, parse_command;
-    "a unit's history", "history", history, parse_history;
-    "a unit's journal", "journal", journal, parse_journal;
-    "rate references", "reference", reference, parse_reference;
-    "a unit's liveliness token", "alive", unit_alive, parse_unit_alive;
+// An instance is named by its Zenoh id as text.
+keys! {
+    "the corrected increments", ROOT unit: UnitId, "corrected", corrected parse_corrected;
+    "a unit's status", ROOT unit: UnitId, "status", status parse_status;
+    "the calibration document", ROOT unit: UnitId, "calibration", calibration parse_calibration;
+    "commands", ROOT unit: UnitId, "command", command parse_command;
+    "a unit's history", ROOT unit: UnitId, "history", history parse_history;
+    "a unit's journal", ROOT unit: UnitId, "journal", journal parse_journal;
+    "rate references", ROOT unit: UnitId, "reference", reference parse_reference;
+    "a unit's liveliness token", ROOT unit: UnitId, "alive", unit_alive parse_unit_alive;
+    "a service's status", SERVICE_ROOT instance: str, "status", service_status parse_service_status;
+    "a service's effective configuration", SERVICE_ROOT instance: str, "configuration", configuration parse_configuration;
+    "a service's liveliness token", SERVICE_ROOT instance: str, "alive", service_alive parse_service_alive;
+    "what a service says of itself and its units", SERVICE_ROOT instance: str, "pair", pair;
+    "the receipt of a session that subscribes", SERVICE_ROOT session: str, "receipt", receipt;
 }
 
 /// Key of an order that ends in the name of who asks: access control can say who may use which; `None` for a name that no key can
@@ -271,30 +279,6 @@ fn is_name(name: &str) -> bool {
     (1..=MAX_BY).contains(&name.chars().count()) && !name.contains(unfit)
 }
 
-/// Key of a service instance's status: `isotherm/{instance}/status`; the instance is its Zenoh id as text.
-#[must_use]
-pub fn service_status(instance: &str) -> String {
-    format!("{SERVICE_ROOT}/{instance}/status")
-}
-
-/// Key of a service instance's effective configuration: `isotherm/{instance}/configuration`.
-#[must_use]
-pub fn configuration(instance: &str) -> String {
-    format!("{SERVICE_ROOT}/{instance}/configuration")
-}
-
-/// Key of a service instance's liveliness token: `isotherm/{instance}/alive`.
-#[must_use]
-pub fn service_alive(instance: &str) -> String {
-    format!("{SERVICE_ROOT}/{instance}/alive")
-}
-
-/// Key of what a service instance says of itself and its units: `isotherm/{instance}/pair`.
-#[must_use]
-pub fn pair(instance: &str) -> String {
-    format!("{SERVICE_ROOT}/{instance}/pair")
-}
-
 /// Key of a document or an overlay in a service instance's state folder: `isotherm/{instance}/kept/{digest}`.
 #[must_use]
 pub fn kept(instance: &str, digest: &Digest) -> String {
@@ -305,30 +289,6 @@ pub fn kept(instance: &str, digest: &Digest) -> String {
 #[must_use]
 pub fn parse_kept(key: &str) -> Option<Digest> {
     parse(SERVICE_ROOT, key)?.1.strip_prefix("kept/")?.parse().ok()
-}
-
-/// Key of the receipt of a session that subscribes: `isotherm/{session}/receipt`; the session is its Zenoh id as text.
-#[must_use]
-pub fn receipt(session: &str) -> String {
-    format!("{SERVICE_ROOT}/{session}/receipt")
-}
-
-/// Reads the instance of a service's status key back; `None` where it is none.
-#[must_use]
-pub fn parse_service_status(key: &str) -> Option<&str> {
-    parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "status").map(|(instance, _)| instance)
-}
-
-/// Reads the instance of the key of a service's configuration back; `None` where it is none.
-#[must_use]
-pub fn parse_configuration(key: &str) -> Option<&str> {
-    parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "configuration").map(|(instance, _)| instance)
-}
-
-/// Reads the instance of a service's liveliness token back; `None` where it is none.
-#[must_use]
-pub fn parse_service_alive(key: &str) -> Option<&str> {
-    parse(SERVICE_ROOT, key).filter(|(_, rest)| *rest == "alive").map(|(instance, _)| instance)
 }
 
 /// Reads the unit of any key of a unit back; `None` where it is none.

@@ -12,12 +12,12 @@ mod sensor;
 mod traffic;
 pub mod v1;
 
-use isotherm_correction::operation;
 use serde::{Deserialize, Serialize};
 
 pub use calibration::{ActiveCalibration, AppliedCorrection, PendingChange, Swaps};
 pub use channel::{ChannelStatus, Place};
 pub use drift::{DriftStatus, Rest};
+pub use isotherm_correction::operation::State;
 pub use pre_launch::{
     ConstantsChange, PreLaunchGyro, PreLaunchMode, PreLaunchOutcome, PreLaunchProgress, PreLaunchVerdict,
 };
@@ -37,51 +37,6 @@ pub const MAX_FAULTS: usize = 32;
 pub const UNKNOWN_CHANNEL: &str = "unknown_temperature_channel";
 /// Most sensors of both kinds together.
 const MAX_ALL_SENSORS: usize = 2 * isotherm_correction::sample::MAX_SENSORS;
-
-/// What a unit is doing; see [`operation::State`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-pub enum State {
-    /// Nothing goes out.
-    #[serde(rename = "standby")]
-    Standby,
-    /// The instrument is looked over; nothing goes out.
-    #[serde(rename = "self-test")]
-    SelfTest,
-    /// C0 and B0 are determined at rest; nothing goes out.
-    #[serde(rename = "pre-launch calibration")]
-    PreLaunchCalibration,
-    /// Increments go out; the producer reverses the lasing mode.
-    #[serde(rename = "running with mode reversal")]
-    RunningWithReversal,
-    /// Increments go out; the lasing mode is to stay as it is.
-    #[default]
-    #[serde(rename = "running without mode reversal")]
-    RunningWithoutReversal,
-}
-
-impl From<operation::State> for State {
-    fn from(state: operation::State) -> Self {
-        match state {
-            operation::State::Standby => Self::Standby,
-            operation::State::SelfTest => Self::SelfTest,
-            operation::State::PreLaunchCalibration => Self::PreLaunchCalibration,
-            operation::State::RunningWithReversal => Self::RunningWithReversal,
-            operation::State::RunningWithoutReversal => Self::RunningWithoutReversal,
-        }
-    }
-}
-
-impl From<State> for operation::State {
-    fn from(state: State) -> Self {
-        match state {
-            State::Standby => Self::Standby,
-            State::SelfTest => Self::SelfTest,
-            State::PreLaunchCalibration => Self::PreLaunchCalibration,
-            State::RunningWithReversal => Self::RunningWithReversal,
-            State::RunningWithoutReversal => Self::RunningWithoutReversal,
-        }
-    }
-}
 
 /// What becomes of ticks in a running state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -193,10 +148,8 @@ mod tests {
 
     #[test]
     fn states_have_the_names_that_they_have_everywhere() {
-        for state in operation::State::ALL {
-            let wire = State::from(state);
-            assert_eq!(serde_json::to_value(wire).unwrap(), state.name());
-            assert_eq!(operation::State::from(wire), state);
+        for state in State::ALL {
+            assert_eq!(serde_json::to_value(state).unwrap(), state.name());
         }
     }
 }

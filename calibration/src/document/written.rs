@@ -43,8 +43,7 @@ impl Written {
     /// # Errors
     /// [`Error::Document`] with everything that is wrong with it.
     pub fn compiled(document: &Document) -> Result<Loaded, Error> {
-        let defects =
-            |found: Vec<Defect>| Error::Document(found.iter().map(|defect| format!("{defect:?}")).collect());
+        let defects = |found: Vec<Defect>| Error::Document(found.iter().map(Defect::to_string).collect());
         let calibration = Calibration::new(&document.to_parts()).map_err(defects)?;
         Ok(Loaded {
             calibration: Arc::new(calibration),

@@ -7,7 +7,7 @@ use crate::channel::ThermalState;
 use crate::earth::EARTH_RATE;
 use crate::orientation::{Inverse, Orientation, SensorMask};
 use crate::sample::{ChannelName, LasingMode, OutputKind, Sensors};
-use crate::thermal::{Motion, MotionTerms, TrendModel};
+use crate::thermal::{Follows, Motion, MotionTerms, TrendModel};
 use crate::units::STANDARD_GRAVITY_M_PER_S2;
 
 /// What a calibration does to a unit that has been on for long and whose temperatures move steadily.
@@ -82,21 +82,22 @@ impl Calibration {
         let sign = mode.map_or(1.0, LasingMode::sign);
 
         let gyros = self.gyros.iter().map(|gyro| {
-            let terms = gyro.steady(&state(gyro.channel), (&self.filter, &others));
+            let [weight, bias, magnetic, meander] = gyro.steady(&state(gyro.channel), &self.filter, &others);
             let trend = gyro.trend.as_ref().map_or(0.0, TrendModel::last);
-            (terms.bias + trend + sign * terms.magnetic + terms.meander, terms.increment_weight)
+            (bias + trend + sign * magnetic + meander, weight)
         });
         let (gyro_bias, gyro_weight): (Sensors<_>, Sensors<_>) = gyros.unzip();
         let accels = self.accels.iter().map(|accel| {
-            let (bias, scale_factor) = accel.steady(&state(accel.channel), (&self.filter, &others));
+            let thermal = state(accel.channel);
+            let [bias, _] = accel.steady(&thermal, &self.filter, &others);
             let ratio = accel.board_ratio.at(state(accel.board_channel).temperature).value;
-            let scale = scale_factor / ratio;
+            let scale = accel.scale_factor.at(thermal.temperature).value / ratio;
             (bias / scale, scale)
         });
         let (accel_bias, accel_scale): (Sensors<_>, Sensors<_>) = accels.unzip();
         let in_motion = |sensors: fn(&Motion) -> &Vec<MotionTerms>| {
             let sensors = self.motion.as_deref().map_or(&[][..], |motion| sensors(motion));
-            let lines = move |sensor: &MotionTerms| sensor.at(&state(sensor.channel), &self.filter);
+            let lines = |sensor: &MotionTerms| sensor.steady(&state(sensor.channel), &self.filter, &others);
             sensors.iter().map(lines).collect::<Sensors<[f64; 4]>>()
         };
         let gyros_in_motion = in_motion(|motion| &motion.gyros);

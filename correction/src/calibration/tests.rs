@@ -337,15 +337,15 @@ fn limits_of_the_self_test_and_numbers_of_the_drift_are_checked_at_once() {
         angle_random_walk_rad_per_sqrt_s: 1e-7,
     });
     let defects = Calibration::new(&broken).unwrap_err();
-    let found = |section, field| defects.iter().filter(|d| d.section == section && d.field == field).count();
-    assert_eq!(found(Section::SelfTestVoltage(0), "range_v"), 1);
-    assert_eq!(found(Section::SelfTestVoltage(1), "range_v"), 1);
-    assert_eq!(found(Section::SelfTestVoltage(1), "name"), 1);
-    assert_eq!(found(Section::SelfTestVoltage(2), "name"), 1);
-    assert_eq!(found(Section::SelfTest, "counter"), 1);
-    assert_eq!(found(Section::SelfTestCounter(0), "name"), 1);
-    assert_eq!(found(Section::SelfTestCounter(32), "max_increase"), 1);
-    assert_eq!(found(Section::Gyro(2), "drift.sigma"), 1);
-    assert_eq!(found(Section::Gyro(2), "drift.trend_correlation_time"), 1);
+    let found = |path| defects.iter().filter(|defect| defect.path == path).count();
+    assert_eq!(found("self_test.voltage[0].range_v"), 1);
+    assert_eq!(found("self_test.voltage[1].range_v"), 1);
+    assert_eq!(found("self_test.voltage[1].name"), 1);
+    assert_eq!(found("self_test.voltage[2].name"), 1);
+    assert_eq!(found("self_test.counter"), 1);
+    assert_eq!(found("self_test.counter[0].name"), 1);
+    assert_eq!(found("self_test.counter[32].max_increase"), 1);
+    assert_eq!(found("gyro.sensor[2].drift.sigma"), 1);
+    assert_eq!(found("gyro.sensor[2].drift.trend_correlation_time"), 1);
     assert_eq!(defects.len(), 5 + 33 + 33 + 2);
 }

@@ -80,28 +80,34 @@ fn the_spline_approaches_a_smooth_function() {
 
 #[test]
 fn each_kind_of_wrong_curve_has_its_error() {
+    let count = |count, low, high| DefectKind::Count { count, low, high };
+    let number = |value| DefectKind::OutOfRange { value, low: f64::MIN, high: f64::MAX };
     let table = [
-        (polynomial(0.0, &[], [0.0, 1.0]), CurveError::CoefficientCount { got: 0, max: 10 }),
-        (polynomial(0.0, &[1.0; 11], [0.0, 1.0]), CurveError::CoefficientCount { got: 11, max: 10 }),
-        (polynomial(0.0, &[1.0], [1.0, 1.0]), CurveError::EmptyRange { first: 1.0, last: 1.0 }),
-        (polynomial(0.0, &[0.0, 0.0, 1e300], [-1.0, 1e9]), CurveError::Overflow { near: 1e9 }),
+        (polynomial(0.0, &[], [0.0, 1.0]), "", count(0, 1, 10)),
+        (polynomial(0.0, &[1.0; 11], [0.0, 1.0]), "", count(11, 1, 10)),
+        (polynomial(0.0, &[1.0], [1.0, 1.0]), "range", DefectKind::InvertedRange { low: 1.0, high: 1.0 }),
+        (polynomial(0.0, &[0.0, 0.0, 1e300], [-1.0, 1e9]), "", DefectKind::Overflow { near: 1e9 }),
+        (polynomial(0.0, &[1.0, f64::INFINITY], [0.0, 1.0]), "coefficients", number(f64::INFINITY)),
+        (CurveParts::Spline { knots: vec![[0.0, 0.0]] }, "", count(1, 2, 64)),
+        (CurveParts::Spline { knots: vec![] }, "", count(0, 2, 64)),
         (
-            polynomial(0.0, &[1.0, f64::INFINITY], [0.0, 1.0]),
-            CurveError::NotFinite { name: "coefficient", index: 1, got: f64::INFINITY },
+            CurveParts::Spline { knots: vec![[0.0, 0.0], [1.0, f64::INFINITY]] },
+            "knots[1]",
+            number(f64::INFINITY),
         ),
-        (CurveParts::Spline { knots: vec![[0.0, 0.0]] }, CurveError::KnotCount { got: 1, min: 2, max: 64 }),
-        (CurveParts::Spline { knots: vec![] }, CurveError::KnotCount { got: 0, min: 2, max: 64 }),
         (
             CurveParts::PiecewiseLinear { knots: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]] },
-            CurveError::KnotsNotIncreasing { index: 2, previous: 1.0, got: 1.0 },
+            "knots[2]",
+            DefectKind::KnotsNotIncreasing { index: 2, previous: 1.0, got: 1.0 },
         ),
         (
             CurveParts::PiecewiseLinear { knots: vec![[0.0, -1e308], [1.0, 1e308]] },
-            CurveError::Overflow { near: 0.0 },
+            "",
+            DefectKind::Overflow { near: 0.0 },
         ),
     ];
-    for (parts, expected) in table {
-        assert_eq!(Curve::new(&parts), Err(expected));
+    for (parts, path, kind) in table {
+        assert_eq!(Curve::new(&parts), Err(Defect { path: path.into(), kind }));
     }
 }
 

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::window::MIN_ADAPTIVE_READINGS;
-use crate::stated::{OutOfRange, outside};
+use crate::defect::{Checker, Defect, DefectKind};
 use crate::units::Span;
 
 /// Most ticks of one transition.
@@ -104,51 +104,6 @@ impl Default for ReversalParts {
     }
 }
 
-/// What is wrong with a stated substitution.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReversalError {
-    /// A number is outside its range.
-    #[error(transparent)]
-    OutOfRange(#[from] OutOfRange<u8>),
-    /// A time is outside its range, or not a number.
-    #[error(transparent)]
-    Time(#[from] OutOfRange),
-    /// Too few readings to tell noise from motion.
-    #[error(
-        "\"adaptive\" has {readings} readings before and after a switch to choose from, at least {least} are needed: raise \
-         fit_readings_before and fit_readings_after"
-    )]
-    AdaptiveNeedsReadings {
-        /// Readings on both sides.
-        readings: u8,
-        /// Fewest that are needed.
-        least: u8,
-    },
-    /// A polynomial has more coefficients than readings to fit them to.
-    #[error("{name} is {got} with {readings} readings; it must be below their number")]
-    DegreeNeedsReadings {
-        /// Field of [`ReversalParts`].
-        name: &'static str,
-        /// The degree.
-        got: u8,
-        /// Readings of that fit.
-        readings: u8,
-    },
-}
-
-impl ReversalError {
-    /// Field of [`ReversalParts`] that it speaks of.
-    pub(crate) fn field(&self) -> &'static str {
-        match self {
-            Self::OutOfRange(OutOfRange { name, .. })
-            | Self::Time(OutOfRange { name, .. })
-            | Self::DegreeNeedsReadings { name, .. } => name,
-            Self::AdaptiveNeedsReadings { .. } => "fit_window",
-        }
-    }
-}
-
 /// A validated substitution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reversal {
@@ -161,35 +116,39 @@ impl Reversal {
     /// # Errors
     ///
     /// Everything that is wrong with it.
-    pub fn new(parts: &ReversalParts) -> Result<Self, Vec<ReversalError>> {
-        let (ticks, time_s) = match parts.transition {
-            Transition::Ticks(ticks) => (ticks, TRANSITION_RANGE_S[0]),
-            Transition::Time(time_s) => (1, time_s),
-        };
-        let out_of_range = outside([
-            ("transition_ticks", ticks, [1, MAX_TRANSITION_TICKS]),
+    pub fn new(parts: &ReversalParts) -> Result<Self, Vec<Defect>> {
+        let mut checker = Checker::default();
+        match parts.transition {
+            Transition::Ticks(ticks) => {
+                checker.within("transition_ticks", ticks.into(), 1.0, MAX_TRANSITION_TICKS.into());
+            }
+            Transition::Time(time_s) => {
+                let [shortest, longest] = TRANSITION_RANGE_S;
+                checker.within("transition_s", time_s, shortest, longest);
+            }
+        }
+        for (field, got, [least, most]) in [
             ("predict_readings", parts.predict_readings, [1, MAX_FIT_READINGS]),
             ("predict_degree", parts.predict_degree, [0, MAX_PREDICT_DEGREE]),
             ("fit_readings_before", parts.fit_readings_before, [1, MAX_FIT_READINGS]),
             ("fit_readings_after", parts.fit_readings_after, [1, MAX_FIT_READINGS]),
             ("fit_degree", parts.fit_degree, [0, MAX_FIT_DEGREE]),
-        ]);
-        let mut errors: Vec<ReversalError> = out_of_range.map(Into::into).collect();
-        errors.extend(outside([("transition_s", time_s, TRANSITION_RANGE_S)]).map(ReversalError::from));
+        ] {
+            checker.within(field, got.into(), least.into(), most.into());
+        }
         let fit_readings = parts.fit_readings_before.saturating_add(parts.fit_readings_after);
-        for (name, got, readings) in [
+        for (field, got, readings) in [
             ("predict_degree", parts.predict_degree, parts.predict_readings),
             ("fit_degree", parts.fit_degree, fit_readings),
         ] {
             if got >= readings {
-                errors.push(ReversalError::DegreeNeedsReadings { name, got, readings });
+                checker.push(field, DefectKind::DegreeNeedsReadings { got, readings });
             }
         }
         if parts.fit_window == FitWindow::Adaptive && fit_readings < MIN_ADAPTIVE_READINGS {
-            let (readings, least) = (fit_readings, MIN_ADAPTIVE_READINGS);
-            errors.push(ReversalError::AdaptiveNeedsReadings { readings, least });
+            checker.push("fit_window", DefectKind::AdaptiveNeedsReadings { readings: fit_readings });
         }
-        if errors.is_empty() { Ok(Self { parts: *parts }) } else { Err(errors) }
+        checker.finish(Self { parts: *parts })
     }
 
     /// n at ticks of a duration: see [`Transition::ticks`].

@@ -4,8 +4,8 @@ use core::f64::consts::{PI, TAU};
 use proptest::prelude::*;
 
 use super::*;
+use crate::defect::{Defect, DefectKind};
 use crate::sample::Sensors;
-use crate::stated::OutOfRange;
 
 const ARCSEC: f64 = PI / 180.0 / 3600.0;
 const TICK_NS: i64 = 5_000_000;
@@ -420,25 +420,23 @@ fn every_error_is_reported_at_once() {
         fit_window: FitWindow::Adaptive,
     };
     let errors = Reversal::new(&parts).unwrap_err();
-    let out = |name, got, min, max| ReversalError::OutOfRange(OutOfRange { name, got, min, max });
-    let degree = |name, got, readings| ReversalError::DegreeNeedsReadings { name, got, readings };
+    let out = |path: &str, value, low, high| (path.into(), DefectKind::OutOfRange { value, low, high });
+    let degree = |path: &str, got, readings| (path.into(), DefectKind::DegreeNeedsReadings { got, readings });
+    let found: Vec<_> = errors.into_iter().map(|Defect { path, kind }| (path, kind)).collect();
     assert_eq!(
-        errors,
+        found,
         [
-            out("transition_ticks", 33, 1, 32),
-            out("fit_readings_after", 0, 1, 8),
+            out("transition_ticks", 33.0, 1.0, 32.0),
+            out("fit_readings_after", 0.0, 1.0, 8.0),
             degree("predict_degree", 2, 2),
             degree("fit_degree", 3, 1),
-            ReversalError::AdaptiveNeedsReadings { readings: 1, least: 12 },
+            ("fit_window".into(), DefectKind::AdaptiveNeedsReadings { readings: 1 }),
         ]
     );
     for time_s in [0.0, 1.1, f64::NAN] {
         let parts = ReversalParts { transition: Transition::Time(time_s), ..ReversalParts::default() };
         let errors = Reversal::new(&parts).unwrap_err();
-        assert!(
-            matches!(errors[..], [ReversalError::Time(OutOfRange { name: "transition_s", .. })]),
-            "{errors:?}"
-        );
+        assert!(errors.iter().map(|defect| &*defect.path).eq(["transition_s"]), "{errors:?}");
     }
 }
 

@@ -1,14 +1,11 @@
 //! The servo as a calibration states it, and its checks.
 
-use alloc::borrow::ToOwned;
-use alloc::format;
-use alloc::string::String;
 use alloc::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
-use crate::curve::{Curve, CurveError, CurveParts};
-use crate::stated::{OutOfRange, outside};
+use crate::curve::{Curve, CurveParts};
+use crate::defect::{Checker, Defect};
 use crate::units::Span;
 
 /// Shortest and longest time constant of a servo (s).
@@ -43,28 +40,6 @@ pub struct ServoParts {
     pub settle_time_constants: f64,
 }
 
-/// What is wrong with a stated servo.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ServoError {
-    /// A number is outside its range, or not a number.
-    #[error(transparent)]
-    OutOfRange(OutOfRange),
-    /// The rest frequency is not a valid curve.
-    #[error(transparent)]
-    RestFrequency(CurveError),
-}
-
-impl ServoError {
-    /// Field that it speaks of, and where in it.
-    pub(crate) fn field(&self) -> String {
-        match self {
-            Self::OutOfRange(OutOfRange { name, .. }) => (*name).to_owned(),
-            Self::RestFrequency(error) => format!("rest_frequency{}", error.place()),
-        }
-    }
-}
-
 /// A validated servo of one gyro.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Servo {
@@ -80,25 +55,16 @@ impl Servo {
     /// # Errors
     ///
     /// Everything that is wrong with it.
-    pub fn new(parts: &ServoParts) -> Result<Self, Vec<ServoError>> {
-        let stated = outside([
-            ("time_constant_s", parts.time_constant_s, TIME_CONSTANT_RANGE_S),
-            ("settle_time_constants", parts.settle_time_constants, SETTLE_RANGE),
-        ]);
-        let mut errors: Vec<_> = stated.map(ServoError::OutOfRange).collect();
-        match Curve::new(&parts.rest_frequency) {
-            Ok(rest_frequency_hz) if errors.is_empty() => Ok(Self {
-                form: parts.form,
-                time_constant_s: parts.time_constant_s,
-                rest_frequency_hz,
-                settle_time_constants: parts.settle_time_constants,
-            }),
-            Ok(_) => Err(errors),
-            Err(error) => {
-                errors.push(ServoError::RestFrequency(error));
-                Err(errors)
-            }
-        }
+    pub fn new(parts: &ServoParts) -> Result<Self, Vec<Defect>> {
+        let &ServoParts { form, time_constant_s, ref rest_frequency, settle_time_constants } = parts;
+        let mut checker = Checker::default();
+        let ([shortest, longest], [fewest, most]) = (TIME_CONSTANT_RANGE_S, SETTLE_RANGE);
+        checker.within("time_constant_s", time_constant_s, shortest, longest);
+        checker.within("settle_time_constants", settle_time_constants, fewest, most);
+        // Refused where it is none.
+        let rest_frequency = checker.curve("rest_frequency", rest_frequency);
+        let rest_frequency_hz = rest_frequency.unwrap_or_else(|| Curve::constant(f64::NAN));
+        checker.finish(Self { form, time_constant_s, rest_frequency_hz, settle_time_constants })
     }
 
     /// Share by which the halves of a tick of a duration do not cancel: tanh(Δt/2τ).

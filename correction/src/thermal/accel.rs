@@ -4,11 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
 use super::declared::ACCEL_TERMS;
-use super::terms::{Others, SensorState, Terms};
-use super::trail::{Trail, settled};
+use super::terms::{SensorState, Terms};
+use super::trail::Trail;
 use crate::calibration::{AccelParts, RegressorParts};
-use crate::channel::{ThermalFilter, ThermalState};
-use crate::curve::{Curve, CurveError, CurveParts};
+use crate::channel::ThermalFilter;
+use crate::curve::Curve;
+use crate::defect::Checker;
 
 /// An accelerometer, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,23 +24,14 @@ pub struct AccelModel {
 }
 
 impl AccelModel {
-    /// Compiles an accelerometer; `report` hears of every curve that is wrong.
-    pub(crate) fn new(
-        parts: &AccelParts,
-        filter: &ThermalFilter,
-        report: &mut dyn FnMut(&str, CurveError),
-    ) -> Option<Self> {
-        let mut curve = |field, parts: Option<&CurveParts>, absent| match parts.map(Curve::new) {
-            None => Some(Curve::constant(absent)),
-            Some(Ok(curve)) => Some(curve),
-            Some(Err(error)) => {
-                report(field, error);
-                None
-            }
+    /// Compiles an accelerometer.
+    pub(crate) fn new(parts: &AccelParts, filter: &ThermalFilter, checker: &mut Checker) -> Option<Self> {
+        let scale_factor = checker.curve("scale_factor", &parts.scale_factor);
+        let board_ratio = match &parts.board_ratio {
+            Some(ratio) => checker.curve("board_ratio_error", ratio),
+            None => Some(Curve::constant(1.0)),
         };
-        let scale_factor = curve("scale_factor", Some(&parts.scale_factor), 1.0);
-        let board_ratio = curve("board_ratio_error", parts.board_ratio.as_ref(), 1.0);
-        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, false, filter, report);
+        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, false, filter, checker);
         Some(Self {
             channel: parts.channel,
             board_channel: parts.board_channel,
@@ -48,18 +40,6 @@ impl AccelModel {
             board_ratio: board_ratio?,
             input_limit: parts.input_limit,
         })
-    }
-
-    /// S (output units) and K on a ramp that has lasted for long, so that everything that trails has settled on it.
-    pub(crate) fn steady(
-        &self,
-        thermal: &ThermalState,
-        (filter, others): (&ThermalFilter, Others<'_>),
-    ) -> (f64, f64) {
-        let trailed = settled(self.terms.trails(), thermal, filter);
-        let state = SensorState { thermal, trailed: &trailed, others };
-        let ([bias, _], _) = Follows::<2>::terms(self, &state, filter);
-        (bias, self.scale_factor.at(thermal.temperature).value)
     }
 
     /// Every curve over the sensor's own temperature.
@@ -94,14 +74,6 @@ impl Follows<1> for AccelModel {
     #[expect(clippy::misnamed_getters, reason = "the channel that the board follows")]
     fn channel(&self) -> Option<usize> {
         self.board_channel
-    }
-
-    fn trails(&self) -> &[Trail] {
-        &[]
-    }
-
-    fn regressors(&self) -> &[RegressorParts] {
-        &[]
     }
 
     fn terms(&self, state: &SensorState<'_>, _: &ThermalFilter) -> ([f64; 1], bool) {

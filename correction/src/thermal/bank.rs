@@ -8,7 +8,7 @@ use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::terms::{Others, SensorState};
-use super::trail::{MAX_TRAILS, Trail, Trailed, advance, resume};
+use super::trail::{MAX_TRAILS, Trail, Trailed, advance, resume, settled};
 use crate::calibration::RegressorParts;
 use crate::channel::{ThermalFilter, ThermalState};
 use crate::lanes::Line;
@@ -21,11 +21,20 @@ pub(crate) trait Follows<const T: usize> {
     /// The channel, by index; `None` for a sensor that stands at the assumed temperature.
     fn channel(&self) -> Option<usize>;
     /// What trails behind the temperature and enters the terms.
-    fn trails(&self) -> &[Trail];
+    fn trails(&self) -> &[Trail] {
+        &[]
+    }
     /// What other channels say and enters the terms.
-    fn regressors(&self) -> &[RegressorParts];
+    fn regressors(&self) -> &[RegressorParts] {
+        &[]
+    }
     /// Every term in a state, and whether an argument was clamped to its fitted range.
     fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool);
+    /// Every term on a ramp that has lasted for long, so that everything that trails has settled on it.
+    fn steady(&self, thermal: &ThermalState, filter: &ThermalFilter, others: Others<'_>) -> [f64; T] {
+        let trailed = settled(self.trails(), thermal, filter);
+        self.terms(&SensorState { thermal, trailed: &trailed, others }, filter).0
+    }
 }
 
 /// Most channels that all sensors of a unit follow: one for each gyro, each accelerometer and each accelerometer's board.

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
 use super::declared::GYRO_TERMS;
-use super::terms::{Others, SensorState, Terms};
-use super::trail::{Trail, settled};
+use super::terms::{SensorState, Terms};
+use super::trail::Trail;
 use crate::calibration::{GyroParts, RegressorParts};
-use crate::channel::{ThermalFilter, ThermalState};
-use crate::curve::CurveError;
+use crate::channel::ThermalFilter;
+use crate::defect::Checker;
 use crate::lanes::Lanes;
 use crate::sample::MAX_SENSORS;
 use crate::servo::Servo;
@@ -28,38 +28,24 @@ pub struct GyroModel {
 }
 
 impl GyroModel {
-    /// Compiles a gyro and its `servo`; `report` hears of every term that is wrong. Plain numbers are checked by the caller.
+    /// Compiles a gyro and its `servo`. Plain numbers are checked by the caller.
     pub(crate) fn new(
         parts: &GyroParts,
         servo: Option<Servo>,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&str, CurveError),
+        checker: &mut Checker,
     ) -> Option<Self> {
         Some(Self {
             channel: parts.channel,
             increment_weight: parts.increment_weight,
             input_limit: parts.input_limit,
-            terms: Terms::new(&GYRO_TERMS, &parts.terms, false, filter, report)?,
+            terms: Terms::new(&GYRO_TERMS, &parts.terms, false, filter, checker)?,
             trend: parts.trend.as_ref().map(|trend| TrendModel {
                 coefficients: trend.coefficients.iter().copied().take(3).collect(),
                 interval_s: trend.interval_s,
             }),
             servo,
         })
-    }
-}
-
-impl GyroModel {
-    /// The terms on a ramp that has lasted for long, so that everything that trails has settled on it.
-    pub(crate) fn steady(
-        &self,
-        thermal: &ThermalState,
-        (filter, others): (&ThermalFilter, Others<'_>),
-    ) -> GyroTerms {
-        let trailed = settled(self.terms.trails(), thermal, filter);
-        let state = SensorState { thermal, trailed: &trailed, others };
-        let ([increment_weight, bias, magnetic, meander], _) = Follows::terms(self, &state, filter);
-        GyroTerms { increment_weight, bias, magnetic, meander }
     }
 }
 
@@ -122,19 +108,6 @@ impl Trends {
     }
 }
 
-/// Values of a gyro's thermal terms.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GyroTerms {
-    /// K(T): angle per count (rad), or rad per rad.
-    pub increment_weight: f64,
-    /// Sum of the terms that no mode or meander changes (rad/s).
-    pub bias: f64,
-    /// Magnetic term for mode sign +1 (rad/s).
-    pub magnetic: f64,
-    /// Slow-meander term for phase +1 (rad/s).
-    pub meander: f64,
-}
-
 impl Follows<4> for GyroModel {
     fn channel(&self) -> Option<usize> {
         self.channel
@@ -148,7 +121,8 @@ impl Follows<4> for GyroModel {
         self.terms.regressors()
     }
 
-    /// In the order of [`GyroTerms`].
+    /// K(T) (rad per count, or rad per rad); the sum of the terms that no mode or meander changes, the magnetic term for mode sign +1, the
+    /// slow-meander term for phase +1 (rad/s).
     fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 4], bool) {
         let ([error, bias, magnetic, meander], clamped) = self.terms.lines(state, filter);
         // A bias of −0 becomes 0, so that a tick need not add the zeros of terms that there are not.

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::bank::Follows;
 use super::declared::{ACCEL_TERMS, GYRO_TERMS};
 use super::terms::{SensorState, Terms};
-use super::trail::{MAX_TRAILS, Trail};
-use crate::calibration::{AccelParts, GyroParts, RegressorParts};
-use crate::channel::{ThermalFilter, ThermalState};
-use crate::curve::{Curve, CurveError};
+use crate::calibration::{AccelParts, GyroParts};
+use crate::channel::ThermalFilter;
+use crate::curve::Curve;
+use crate::defect::Checker;
 use crate::lanes::Lanes;
 use crate::sample::{MAX_SENSORS, Sensors};
 
@@ -25,38 +25,22 @@ pub(crate) struct MotionTerms {
 }
 
 impl MotionTerms {
-    /// Compiles those of a gyro; `report` hears of every one that is wrong, by its path.
-    pub(crate) fn of_gyro(
-        parts: &GyroParts,
-        filter: &ThermalFilter,
-        report: &mut dyn FnMut(&str, CurveError),
-    ) -> Option<Self> {
-        let terms = Terms::new(&GYRO_TERMS, &parts.terms, true, filter, report);
-        let over_rate = match parts.increment_weight_over_rate.as_ref().map(Curve::new) {
-            None => None,
-            Some(Ok(curve)) => Some(curve),
-            Some(Err(error)) => {
-                report("increment_weight_over_rate", error);
-                return None;
-            }
-        };
+    /// Compiles those of a gyro.
+    pub(crate) fn of_gyro(parts: &GyroParts, filter: &ThermalFilter, checker: &mut Checker) -> Option<Self> {
+        let terms = Terms::new(&GYRO_TERMS, &parts.terms, true, filter, checker);
+        let over_rate = parts.increment_weight_over_rate.as_ref();
+        let over_rate = over_rate.and_then(|curve| checker.curve("increment_weight_over_rate", curve));
         Some(Self { channel: parts.channel, terms: terms?, over_rate })
     }
 
-    /// Compiles those of an accelerometer; `report` hears of every one that is wrong, by its path.
+    /// Compiles those of an accelerometer.
     pub(crate) fn of_accel(
         parts: &AccelParts,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&str, CurveError),
+        checker: &mut Checker,
     ) -> Option<Self> {
-        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, true, filter, report);
-        Some(Self { channel: parts.channel, terms: terms?, over_rate: None })
-    }
-
-    /// Its lines at a thermal state.
-    pub(crate) fn at(&self, thermal: &ThermalState, filter: &ThermalFilter) -> [f64; 4] {
-        let state = SensorState { thermal, trailed: &[0.0; MAX_TRAILS], others: &|_| None };
-        self.terms.lines(&state, filter).0
+        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, true, filter, checker)?;
+        Some(Self { channel: parts.channel, terms, over_rate: None })
     }
 
     fn is_empty(&self) -> bool {
@@ -67,14 +51,6 @@ impl MotionTerms {
 impl<const T: usize> Follows<T> for MotionTerms {
     fn channel(&self) -> Option<usize> {
         self.channel
-    }
-
-    fn trails(&self) -> &[Trail] {
-        &[]
-    }
-
-    fn regressors(&self) -> &[RegressorParts] {
-        &[]
     }
 
     fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool) {

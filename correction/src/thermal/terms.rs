@@ -12,7 +12,8 @@ use super::declared::{Feature, Term};
 use super::trail::{Trail, Trailed};
 use crate::calibration::{BranchArgument, CoefficientParts, RegressorParts, Source, TermParts};
 use crate::channel::{ThermalFilter, ThermalState};
-use crate::curve::{Curve, CurveError, CurveParts};
+use crate::curve::{Curve, CurveParts};
+use crate::defect::Checker;
 
 /// A coefficient, compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,14 +87,13 @@ pub(crate) struct SensorState<'a> {
 }
 
 impl Terms {
-    /// Compiles the terms whose features follow motion, or the others, in the order of the features; `report` hears of every one that
-    /// is wrong, by its path.
+    /// Compiles the terms whose features follow motion, or the others, in the order of the features.
     pub(crate) fn new(
         declared: &[Term],
         parts: &[TermParts],
         follow_motion: bool,
         filter: &ThermalFilter,
-        report: &mut dyn FnMut(&str, CurveError),
+        checker: &mut Checker,
     ) -> Option<Self> {
         let mut compiled = Self::default();
         let mut sound = true;
@@ -107,13 +107,11 @@ impl Terms {
             last = Some(part.feature);
             let mut keys = term.form.curves().iter();
             let mut curve = |parts: &CurveParts| {
-                let key = keys.next();
-                let made = Curve::new(parts).map_err(|error| {
-                    let path = term.path(index);
-                    report(&key.map_or(path.clone(), |key| format!("{path}.{key}")), error);
-                });
-                sound &= made.is_ok();
-                made.ok()
+                let path = term.path(index);
+                let made =
+                    checker.curve(&keys.next().map_or(path.clone(), |key| format!("{path}.{key}")), parts);
+                sound &= made.is_some();
+                made
             };
             let coefficient = match &part.coefficient {
                 CoefficientParts::Curve(parts) => curve(parts).map(Coefficient::Curve),

@@ -120,7 +120,7 @@ async fn the_page_says_what_came_in_and_what_went_out() {
     }
     let state = |state| page.value("isotherm_unit_state", &[of_unit[0], ("state", state)]);
     assert_eq!(state("standby"), Some(0.0));
-    assert_eq!(state(isotherm_correction::operation::State::from(status.state).name()), Some(1.0));
+    assert_eq!(state(status.state.name()), Some(1.0));
     assert_eq!(page.value("isotherm_unit_output", &[of_unit[0], ("output", "pass-through")]), Some(1.0));
     assert_eq!(
         page.value("isotherm_unit_faults_total", &[of_unit[0], ("kind", "bad_frames_kind")]),

@@ -212,7 +212,7 @@ impl UnitPlot {
             Output::PassThrough => ", uncalibrated",
             Output::Held => ", held: no calibration",
         };
-        let state = isotherm_correction::operation::State::from(status.state);
+        let state = status.state;
         let label = format!("{state}{output}");
         let known = self.states.last().is_some_and(|last| last.label == label);
         if !known && self.states.len() < MAX_LISTED {

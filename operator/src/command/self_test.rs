@@ -23,7 +23,7 @@ pub(super) async fn follow(
     begun: &CommandReply,
     json: bool,
 ) -> Result<Exit, ConsoleError> {
-    let report = if begun.state == State::SelfTest.into() {
+    let report = if begun.state == State::SelfTest {
         let before = follow.first.as_ref().and_then(|status| status.self_test.clone());
         let mut seen = false;
         let ended = follow.until(LONGEST, |status| {

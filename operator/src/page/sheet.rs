@@ -162,7 +162,7 @@ fn title(unit: &Unit<'_>, columns: usize) -> Vec<Line<'static>> {
 
 /// What the unit is doing, in full.
 fn operation(status: &Status) -> &'static str {
-    isotherm_correction::operation::State::from(status.state).name()
+    status.state.name()
 }
 
 /// Where it comes from, what comes in, how far it is.

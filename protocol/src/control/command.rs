@@ -120,7 +120,6 @@ pub struct CommandReply {
     /// Serial of the unit.
     pub unit: String,
     /// The unit's state afterwards.
-    #[serde(with = "state")]
     pub state: State,
     /// Why it was refused.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -130,49 +129,4 @@ pub struct CommandReply {
     /// What became of a rollback.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub swap: Option<SwapReply>,
-}
-
-/// A state by its name.
-mod state {
-    use isotherm_correction::operation::State;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
-    pub(super) fn serialize<S: Serializer>(state: &State, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(state.name())
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<State, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        State::from_name(&name).ok_or_else(|| D::Error::custom(format!("{name:?} is not a state of a unit")))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn orders_are_plain_json() {
-        let place = PlaceOrder { latitude_deg: 55.0, heading_deg: 30.0, pitch_roll_deg: None };
-        let cases = [
-            (r#"{"by":"ann","command":"run","reversal":true}"#, Order::Run { reversal: Some(true) }),
-            (r#"{"command":"standby"}"#, Order::Standby),
-            (
-                r#"{"command":"pre-launch","latitude_deg":55,"heading_deg":30}"#,
-                Order::PreLaunch(PreLaunchOrder { place, duration_s: None, install: true }),
-            ),
-        ];
-        for (json, order) in cases {
-            let read = CommandOrder::read(json.as_bytes()).unwrap_or_else(|e| panic!("{json}: {e}"));
-            assert_eq!(read.order, order);
-            let again = serde_json::from_str(&serde_json::to_string(&read).unwrap_or_default());
-            assert_eq!(again.ok(), Some(read));
-        }
-        assert!(CommandOrder::read(br#"{"command":"explode"}"#).is_err());
-        insta::assert_snapshot!(CommandOrder::read(br#"{"command":3}"#).unwrap_err());
-        assert!(CommandOrder::read(br#"{"command":"run","by":"a\nb"}"#).is_err());
-        let unknown = format!(r#"{{"command":"{}"}}"#, "x".repeat(4000));
-        assert!(CommandOrder::read(unknown.as_bytes()).is_err_and(|words| words.len() < 400));
-    }
 }

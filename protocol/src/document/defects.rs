@@ -2,16 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use isotherm_correction::calibration::{Defect, DefectKind, Section};
-use isotherm_correction::orientation::OrientationError;
-use isotherm_correction::reversal::ReversalError;
+use isotherm_correction::calibration::{Defect, DefectKind};
 use isotherm_document::Reader;
 
 /// Reports what the core found, but for what follows from a value that was replaced.
 pub(super) fn report(r: &mut Reader<'_>, defects: &[Defect]) {
     let mut told = BTreeSet::new();
     for defect in defects {
-        let path = r.spelled(&defect.path());
+        let path = r.spelled(&defect.path);
         let of_sensors = sensors(defect).is_some_and(|sensors| r.is_marked(sensors));
         if is_told(&defect.kind)
             || of_sensors
@@ -37,42 +35,34 @@ fn is_told(kind: &DefectKind) -> bool {
 
 /// The list that a defect compares the length of another one with.
 fn sensors(defect: &Defect) -> Option<&'static str> {
-    match (&defect.kind, defect.section) {
-        (DefectKind::Orientation(OrientationError::ListCount { .. }), Section::GyroOrientation) => {
-            Some("gyro.sensor")
-        }
-        (DefectKind::Orientation(OrientationError::ListCount { .. }), _) => Some("accel.sensor"),
-        _ => None,
-    }
+    let of_gyros = defect.path.starts_with("gyro.");
+    matches!(defect.kind, DefectKind::ListCount { .. }).then_some(if of_gyros {
+        "gyro.sensor"
+    } else {
+        "accel.sensor"
+    })
 }
 
 /// Paths whose values a defect is worked out from: where one of them is a stand-in, the defect says nothing.
 fn rests_on(defect: &Defect, path: &str) -> Vec<String> {
-    let mut paths = vec![path.to_owned()];
-    match (&defect.section, &defect.kind) {
-        (Section::Filter, _) if defect.field != "assumed_deg_c" => {
-            paths.push("temperature.filter.grid_step_s".into());
+    const FIT_READINGS: [&str; 2] = ["mode_reversal.fit_readings_before", "mode_reversal.fit_readings_after"];
+    let under = |table: &str| defect.path.starts_with(table);
+    let field = defect.path.split_once("].").map_or("", |(_, field)| field);
+    let others: &[&str] = match &defect.kind {
+        DefectKind::BelowGridStep { .. } => &["temperature.filter.grid_step_s"],
+        DefectKind::RowNorm { .. } | DefectKind::ListCount { .. } => &[],
+        _ if under("temperature.filter.") => &["temperature.filter.grid_step_s"],
+        _ if under("gyro.orientation") => &["gyro.orientation"],
+        _ if under("accel.orientation") => &["accel.orientation"],
+        _ if under("gyro.sensor[") && (field.starts_with("increment_weight_") || field == "input_limit") => {
+            &["gyro.output"]
         }
-        (_, DefectKind::BelowGridStep { .. }) => paths.push("temperature.filter.grid_step_s".into()),
-        (
-            _,
-            DefectKind::Orientation(OrientationError::RowNorm { .. } | OrientationError::ListCount { .. }),
-        ) => {}
-        (Section::GyroOrientation, _) => paths.push("gyro.orientation".into()),
-        (Section::AccelOrientation, _) => paths.push("accel.orientation".into()),
-        (Section::Gyro(_), _)
-            if defect.field.starts_with("increment_weight_") || defect.field == "input_limit" =>
-        {
-            paths.push("gyro.output".into());
+        _ if under("accel.sensor[") && field == "input_limit" => &["accel.output"],
+        DefectKind::DegreeNeedsReadings { .. } if defect.path == "mode_reversal.predict_degree" => {
+            &["mode_reversal.predict_readings"]
         }
-        (Section::Accel(_), _) if defect.field == "input_limit" => paths.push("accel.output".into()),
-        (_, DefectKind::Reversal(ReversalError::DegreeNeedsReadings { name: "predict_degree", .. })) => {
-            paths.push("mode_reversal.predict_readings".into());
-        }
-        (_, DefectKind::Reversal(_)) => {
-            paths.extend(["before", "after"].map(|side| format!("mode_reversal.fit_readings_{side}")));
-        }
-        _ => {}
-    }
-    paths
+        _ if under("mode_reversal.") => &FIT_READINGS,
+        _ => &[],
+    };
+    std::iter::once(path).chain(others.iter().copied()).map(str::to_owned).collect()
 }

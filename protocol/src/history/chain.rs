@@ -10,15 +10,13 @@
 use serde::Deserialize;
 use thiserror::Error;
 
-use super::line::{LineError, checked, sealed};
+use super::line::{LineError, checked, sealed, with_last, without_last};
 use super::{AuditEntry, Digest};
 
 /// What stands before the digits of an entry's digest, which is the last field before the checksum.
 const CHAIN: &str = ",\"chain\":\"";
 /// What stands before the digits of the digest that it carries on from.
 const PREVIOUS: &str = ",\"previous\":\"";
-/// What stands behind the digits.
-const BEHIND: &str = "\"}";
 /// Before the first entry of all.
 const NOTHING: Digest = Digest([0; 32]);
 
@@ -57,19 +55,13 @@ impl Chain {
         let mut json = entry.to_json()?;
         let previous = self.last.unwrap_or(NOTHING);
         if self.names_previous || !self.begun {
-            json = with(json, PREVIOUS, previous);
+            json = with_last(json, PREVIOUS, previous);
         }
         let digest = digest(previous, &json);
-        let line = sealed(with(json, CHAIN, digest))?;
+        let line = sealed(with_last(json, CHAIN, digest))?;
         *self = Self { last: Some(digest), begun: true, names_previous: false };
         Ok(line)
     }
-}
-
-/// A JSON object with one more field.
-fn with(mut json: String, before: &str, digest: Digest) -> String {
-    json.pop();
-    json + before + &digest.to_string() + BEHIND
 }
 
 fn digest(previous: Digest, json: &str) -> Digest {
@@ -87,13 +79,9 @@ struct Link {
 impl Link {
     /// `None` for a line of a version that wrote no digests.
     fn of(json: &str) -> Option<Self> {
-        let field = |json: &str, before: &str| {
-            let (rest, digits) = json.strip_suffix(BEHIND)?.rsplit_once(before)?;
-            Some((format!("{rest}}}"), digits.parse().ok()?))
-        };
-        let (json, digest) = field(json, CHAIN)?;
-        let previous = field(&json, PREVIOUS).map(|(_, previous)| previous);
-        Some(Self { json, digest, previous })
+        let (json, digits) = without_last(json, CHAIN)?;
+        let previous = without_last(&json, PREVIOUS).and_then(|(_, digits)| digits.parse().ok());
+        Some(Self { digest: digits.parse().ok()?, previous, json })
     }
 }
 

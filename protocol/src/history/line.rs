@@ -3,7 +3,7 @@
 //! The last field of a line is `crc`: the CRC-32 (of zlib and gzip) of the line as it would be without that field, in eight
 //! hexadecimal digits. So a line cut off in mid-write, or with a byte turned over, is known for what it is.
 
-use std::fmt::Write;
+use std::fmt::Display;
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -94,14 +94,22 @@ impl AuditEntry {
     }
 }
 
+/// A JSON object with one more field, a text.
+pub(super) fn with_last(mut json: String, before: &str, text: impl Display) -> String {
+    json.pop();
+    format!("{json}{before}{text}{BEHIND}")
+}
+
+/// A JSON object without its last field, and the text that this is.
+pub(super) fn without_last<'j>(json: &'j str, before: &str) -> Option<(String, &'j str)> {
+    let (rest, text) = json.strip_suffix(BEHIND)?.rsplit_once(before)?;
+    Some((format!("{rest}}}"), text))
+}
+
 /// JSON as a line, with its checksum.
 pub(super) fn sealed(json: String) -> Result<String, LineError> {
     let crc = crc32fast::hash(json.as_bytes());
-    let mut line = json;
-    // The closing brace comes back behind the checksum.
-    line.pop();
-    // Writing to a string cannot fail.
-    let _ = writeln!(line, "{BEFORE}{crc:08x}{BEHIND}");
+    let line = with_last(json, BEFORE, format_args!("{crc:08x}")) + "\n";
     if line.len() > MAX_LINE_BYTES { Err(LineError::Length { bytes: line.len() }) } else { Ok(line) }
 }
 
@@ -112,9 +120,7 @@ pub(super) fn checked(line: &[u8]) -> Result<String, LineError> {
     }
     let line = str::from_utf8(line).map_err(|_| LineError::Form)?;
     let line = line.strip_suffix('\n').unwrap_or(line);
-    let (body, digits) =
-        line.strip_suffix(BEHIND).and_then(|line| line.rsplit_once(BEFORE)).ok_or(LineError::Form)?;
-    let json = format!("{body}}}");
+    let (json, digits) = without_last(line, BEFORE).ok_or(LineError::Form)?;
     let need = crc32fast::hash(json.as_bytes());
     if format!("{need:08x}") == digits {
         Ok(json)

@@ -16,28 +16,26 @@ pub const MAX_OPEN_BYTES: usize = 64 << 20;
 
 /// Why a part does not become an entry; nothing of its entry is kept.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("journal of unit {}, entry {number}: {fault}", shown(.unit))]
+pub struct JoinError {
+    /// Serial of the unit, as the parts say.
+    pub unit: String,
+    /// Number of the entry, likewise.
+    pub number: u64,
+    /// What is wrong.
+    pub fault: JoinFault,
+}
+
+/// What is wrong with a part, or with the entry that it was to complete.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-pub enum JoinError {
+pub enum JoinFault {
     /// The part is none by itself.
-    #[error("journal of unit {}, entry {number}: {error}", shown(.unit))]
-    Part {
-        /// Serial of the unit.
-        unit: String,
-        /// Number of the entry.
-        number: u64,
-        /// What is wrong with it.
-        error: CodecError,
-    },
+    #[error(transparent)]
+    Part(CodecError),
     /// The part before it did not come.
-    #[error(
-        "journal of unit {}, entry {number}: received part {got} of {parts} instead of part {need}: the entry is lost",
-        shown(.unit)
-    )]
+    #[error("received part {got} of {parts} instead of part {need}: the entry is lost")]
     Missing {
-        /// Serial of the unit.
-        unit: String,
-        /// Number of the entry.
-        number: u64,
         /// The part that has come, from 0.
         got: u32,
         /// The part that was to come.
@@ -46,40 +44,18 @@ pub enum JoinError {
         parts: u32,
     },
     /// Too many entries are incomplete.
-    #[error(
-        "journal of unit {}, entry {number}: more than {MAX_OPEN_ENTRIES} incomplete entries, or {MAX_OPEN_BYTES} \
-         bytes of them",
-        shown(.unit)
-    )]
-    TooMuch {
-        /// Serial of the unit.
-        unit: String,
-        /// Number of the entry.
-        number: u64,
-    },
+    #[error("more than {MAX_OPEN_ENTRIES} incomplete entries, or {MAX_OPEN_BYTES} bytes of them")]
+    TooMuch,
     /// The parts together are no entry.
-    #[error("journal of unit {}, entry {number}: the parts do not make an entry", shown(.unit))]
-    Malformed {
-        /// Serial of the unit.
-        unit: String,
-        /// Number of the entry.
-        number: u64,
-    },
+    #[error("the parts do not make an entry")]
+    Malformed,
     /// The entry is another one than its parts say.
-    #[error(
-        "journal of unit {}, entry {number}: the parts are entry {got_number} of unit {}",
-        shown(.unit),
-        shown(.got_unit)
-    )]
+    #[error("the parts are entry {number} of unit {}", shown(.unit))]
     Other {
-        /// Serial of the unit, as the parts say.
+        /// Serial of the unit, as the entry says.
         unit: String,
         /// Number of the entry, likewise.
         number: u64,
-        /// Serial of the unit, as the entry says.
-        got_unit: String,
-        /// Number of the entry, likewise.
-        got_number: u64,
     },
 }
 
@@ -130,11 +106,11 @@ impl Joiner {
         let checked = part.check();
         let JournalPart { unit, instance, number, part: got, parts, bytes: more } = part;
         let place = (instance, unit);
-        let unit = || place.1.clone();
+        let refused = |fault| Err(JoinError { unit: place.1.clone(), number, fault });
         let open = self.close(&place);
         if let Err(error) = checked {
             self.given_up += u64::from(open.is_some());
-            return Err(JoinError::Part { unit: unit(), number, error });
+            return refused(JoinFault::Part(error));
         }
         let open = match open {
             Some(open) if (open.number, open.parts, open.next) == (number, parts, got) => open,
@@ -144,7 +120,7 @@ impl Joiner {
                     let need = before
                         .filter(|open| (open.number, open.parts) == (number, parts))
                         .map_or(0, |open| open.next);
-                    return Err(JoinError::Missing { unit: unit(), number, got, need, parts });
+                    return refused(JoinFault::Missing { got, need, parts });
                 }
                 Open { number, parts, next: 0, bytes: Vec::new() }
             }
@@ -156,18 +132,17 @@ impl Joiner {
             let size = size(&place, &open);
             if self.open.len() >= MAX_OPEN_ENTRIES || self.bytes + size > MAX_OPEN_BYTES {
                 self.given_up += 1;
-                return Err(JoinError::TooMuch { unit: unit(), number });
+                return refused(JoinFault::TooMuch);
             }
             self.bytes += size;
             self.open.insert(place, open);
             return Ok(None);
         }
         let Ok((entry, [])) = postcard::take_from_bytes::<JournalEntry>(&bytes) else {
-            return Err(JoinError::Malformed { unit: unit(), number });
+            return refused(JoinFault::Malformed);
         };
         if (&entry.instance, &entry.unit, entry.number) != (&place.0, &place.1, number) {
-            let (got_unit, got_number) = (entry.unit, entry.number);
-            return Err(JoinError::Other { unit: unit(), number, got_unit, got_number });
+            return refused(JoinFault::Other { unit: entry.unit, number: entry.number });
         }
         Ok(Some(entry))
     }

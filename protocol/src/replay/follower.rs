@@ -132,9 +132,7 @@ impl Follower {
     /// Gives the oldest frame up; `false` where there is none.
     fn give_up_oldest(&mut self) -> bool {
         let Some(Frame { input, bytes, .. }) = self.frames.pop_front() else { return false };
-        if let Some(before) = self.before.get_mut(input.index()) {
-            before.note(&bytes);
-        }
+        self.before[input.index()].note(&bytes);
         self.gone += 1;
         true
     }
@@ -274,13 +272,12 @@ impl Follower {
     }
 
     fn has_last_gyro_frame(&self, memory: &JournalEntry) -> bool {
-        let heard = memory.heard.get(GYRO.index());
-        heard.is_none_or(|heard| heard.frames == 0) || self.last_heard(memory, GYRO).is_some()
+        memory.heard[GYRO.index()].frames == 0 || self.last_heard(memory, GYRO).is_some()
     }
 
     /// Place of the last frame of an input that a memory has heard.
     fn last_heard(&self, memory: &JournalEntry, input: Input) -> Option<usize> {
-        let heard = memory.heard.get(input.index()).filter(|heard| heard.frames > 0)?;
+        let heard = Some(memory.heard[input.index()]).filter(|heard| heard.frames > 0)?;
         self.frames.iter().rposition(|frame| {
             let mut own = Heard::default();
             own.note(&frame.bytes);
@@ -293,7 +290,7 @@ impl Follower {
     fn older(&self, memory: &JournalEntry) -> [usize; Input::ALL.len()] {
         let gyro = self.last_heard(memory, GYRO).unwrap_or(0);
         Input::ALL.map(|input| {
-            let heard = memory.heard.get(input.index()).is_some_and(|heard| heard.frames > 0);
+            let heard = memory.heard[input.index()].frames > 0;
             if heard && self.last_heard(memory, input).is_none() { gyro } else { 0 }
         })
     }
@@ -332,7 +329,7 @@ impl Follower {
         // The stream's own memories have heard what came before them.
         let older = if at_once { [0; Input::ALL.len()] } else { self.older(&anchor.entry) };
         for (place, Frame { input, at_ns, bytes }) in self.frames.iter().enumerate().skip(skipped) {
-            if older.get(input.index()).is_some_and(|older| place < *older) {
+            if place < older[input.index()] {
                 continue;
             }
             sequencer.frame(*input, *at_ns, bytes.to_vec());

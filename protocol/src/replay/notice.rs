@@ -1,16 +1,21 @@
 //! What is to be said of a recording that is not, or not surely, what the service heard.
 
-use std::fmt;
 use std::sync::Arc;
 
-use crate::key::{Input, RawStream};
 use serde::{Serialize, Serializer};
+use thiserror::Error;
+
+use crate::key::{Input, RawStream};
 
 /// Where recorder and service did not have the same, or what could not be done.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Notice {
     /// The service heard frames that the recording does not have.
+    #[error(
+        "{} that the service received before entry {entry} of its journal are not in the recording",
+        counted(*.frames, *.input)
+    )]
     NotRecorded {
         /// Of which input.
         input: Input,
@@ -20,6 +25,10 @@ pub enum Notice {
         entry: u64,
     },
     /// The recording has frames that the service did not hear.
+    #[error(
+        "{} of the recording before entry {entry} of the journal did not reach the service",
+        counted(*.frames, *.input)
+    )]
     NotHeard {
         /// Of which input.
         input: Input,
@@ -29,6 +38,11 @@ pub enum Notice {
         entry: u64,
     },
     /// Frames were given to the unit before an entry that they came behind.
+    #[error(
+        "{} reached the unit before entry {entry} of the journal, in the service after it: earlier frames are missing in \
+        the recording",
+        counted(*.frames, *.input)
+    )]
     TooEarly {
         /// Of which input.
         input: Input,
@@ -38,6 +52,11 @@ pub enum Notice {
         entry: u64,
     },
     /// The last frame before an entry is not in the recording: its place is guessed from the times of reception.
+    #[error(
+        "the last {} frame that the service received before entry {entry} of its journal is not in the recording: its \
+        place is estimated from times of reception",
+        input_name(*.input)
+    )]
     PlaceUnknown {
         /// Of which input.
         input: Input,
@@ -45,6 +64,7 @@ pub enum Notice {
         entry: u64,
     },
     /// Entries of the journal are missing.
+    #[error("{} of the journal {} not in the recording", entries(*.from, *.to), if from == to { "is" } else { "are" })]
     EntriesMissing {
         /// Number of the first.
         from: u64,
@@ -52,21 +72,30 @@ pub enum Notice {
         to: u64,
     },
     /// Entries that no stream can begin with stand before the first that one can begin with.
+    #[error(
+        "the journal has {entries} entries before the first that a stream can begin with: ticks of that time are left out"
+    )]
     WithoutBeginning {
         /// How many.
         entries: u64,
     },
     /// A part of an entry that cannot be used.
+    #[error("{words}")]
     Damaged {
         /// Why.
         words: String,
     },
     /// Two services had the unit at once.
+    #[error(
+        "two services had the unit at once: the journal of instance {instance} is left out, and it is unknown which of \
+        them published a corrected tick"
+    )]
     Beside {
         /// The instance whose entries are left out.
         instance: Arc<str>,
     },
     /// An event that could not be carried out as the service did.
+    #[error("entry {entry} of the journal: {words}")]
     NotCarriedOut {
         /// Number of the entry.
         entry: u64,
@@ -74,6 +103,10 @@ pub enum Notice {
         words: String,
     },
     /// The service's memory is another one than the replica's; it is gone on with.
+    #[error(
+        "after entry {entry} of the journal the service's memory differs from that of the recording ({words}); from there \
+        on the service's is used"
+    )]
     OtherMemory {
         /// Number of the entry before it.
         entry: u64,
@@ -113,63 +146,12 @@ pub const fn input_name(input: Input) -> &'static str {
     }
 }
 
-fn frames(count: u64) -> String {
-    format!("{count} frame{}", if count == 1 { "" } else { "s" })
+fn counted(frames: u64, input: Input) -> String {
+    format!("{frames} frame{} {}", if frames == 1 { "" } else { "s" }, input_name(input))
 }
 
-impl fmt::Display for Notice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotRecorded { input, frames: count, entry } => write!(
-                f,
-                "{} {} that the service received before entry {entry} of its journal are not in the recording",
-                frames(*count),
-                input_name(*input)
-            ),
-            Self::NotHeard { input, frames: count, entry } => write!(
-                f,
-                "{} {} of the recording before entry {entry} of the journal did not reach the service",
-                frames(*count),
-                input_name(*input)
-            ),
-            Self::TooEarly { input, frames: count, entry } => write!(
-                f,
-                "{} {} reached the unit before entry {entry} of the journal, in the service after it: earlier frames \
-                 are missing in the recording",
-                frames(*count),
-                input_name(*input)
-            ),
-            Self::PlaceUnknown { input, entry } => write!(
-                f,
-                "the last {} frame that the service received before entry {entry} of its journal is not in the \
-                 recording: its place is estimated from times of reception",
-                input_name(*input)
-            ),
-            Self::EntriesMissing { from, to } if from == to => {
-                write!(f, "entry {from} of the journal is not in the recording")
-            }
-            Self::EntriesMissing { from, to } => {
-                write!(f, "entries {from} to {to} of the journal are not in the recording")
-            }
-            Self::WithoutBeginning { entries } => write!(
-                f,
-                "the journal has {entries} entries before the first that a stream can begin with: ticks of that time \
-                 are left out"
-            ),
-            Self::Damaged { words } => f.write_str(words),
-            Self::Beside { instance } => write!(
-                f,
-                "two services had the unit at once: the journal of instance {instance} is left out, and it is \
-                 unknown which of them published a corrected tick"
-            ),
-            Self::NotCarriedOut { entry, words } => write!(f, "entry {entry} of the journal: {words}"),
-            Self::OtherMemory { entry, words } => write!(
-                f,
-                "after entry {entry} of the journal the service's memory differs from that of the recording \
-                 ({words}); from there on the service's is used"
-            ),
-        }
-    }
+fn entries(from: u64, to: u64) -> String {
+    if from == to { format!("entry {from}") } else { format!("entries {from} to {to}") }
 }
 
 /// As words.

@@ -166,10 +166,7 @@ impl Sequencer {
         self.now_ns = self.now_ns.max(received_ns);
         self.order += 1;
         let frame = Frame { order: self.order, received_ns, bytes };
-        let frame = self.copies.keep(input.index(), frame);
-        if let Some((waiting, frame)) = self.waiting.get_mut(input.index()).zip(frame) {
-            waiting.push_back(frame);
-        }
+        self.waiting[input.index()].extend(self.copies.keep(input.index(), frame));
     }
 
     /// Takes an entry of the journal, whenever it was recorded.
@@ -247,25 +244,23 @@ impl Sequencer {
 
     /// Gives the next frame of an input, or drops it where there is no stream.
     fn give(&mut self, index: usize) -> bool {
-        let Some(frame) = self.waiting.get_mut(index).and_then(VecDeque::pop_front) else { return false };
-        let (Some(standing), Some(&input)) = (&mut self.standing, Input::ALL.get(index)) else {
+        let Some(Frame { received_ns, bytes, .. }) = self.waiting[index].pop_front() else { return false };
+        let Some(standing) = &mut self.standing else {
             self.unheard += 1;
             return true;
         };
-        if let (Some(heard), Some(given)) = (standing.heard.get_mut(index), self.given.get_mut(index)) {
-            heard.note(&frame.bytes);
-            if !self.marks.is_empty() {
-                given.push_back(heard.crc);
-                if given.len() > REMEMBERED {
-                    given.pop_front();
-                }
+        let (heard, given) = (&mut standing.heard[index], &mut self.given[index]);
+        heard.note(&bytes);
+        if !self.marks.is_empty() {
+            given.push_back(heard.crc);
+            if given.len() > REMEMBERED {
+                given.pop_front();
             }
         }
-        if let Some(Some(to_go)) = self.to_go.get_mut(index) {
+        if let Some(to_go) = &mut self.to_go[index] {
             *to_go = to_go.saturating_sub(1);
         }
-        let Frame { received_ns, bytes, .. } = frame;
-        self.out.push_back(Deed::Frame { input, received_ns, frame: bytes });
+        self.out.push_back(Deed::Frame { input: Input::ALL[index], received_ns, frame: bytes });
         true
     }
 
@@ -286,9 +281,9 @@ impl Sequencer {
         // service was as far behind; then their number decides.
         let early_ns = mark.received_ns.saturating_sub(NEAR_NS);
         let too_many = self.waiting.iter().map(VecDeque::len).sum::<usize>() > MOST_WAITING;
-        let oldest = self.oldest(|index| self.to_go.get(index) != Some(&Some(0)));
+        let oldest = self.oldest(|index| self.to_go[index] != Some(0));
         let may = oldest.filter(|(index, frame)| {
-            let known = too_many || self.to_go.get(*index).is_some_and(Option::is_some);
+            let known = too_many || self.to_go[*index].is_some();
             known || (frame.received_ns < early_ns && self.distance(*index).is_some_and(|frames| frames > 0))
         });
         may.map(|(index, _)| index).is_some_and(|index| self.give(index))
@@ -296,39 +291,34 @@ impl Sequencer {
 
     /// How many frames the service was given more, by its count, before the next entry; `None` where it was fewer.
     fn distance(&self, index: usize) -> Option<u64> {
-        let want = self.marks.front()?.heard.get(index)?;
-        want.frames.checked_sub(self.standing.as_ref()?.heard.get(index)?.frames)
+        self.marks.front()?.heard[index].frames.checked_sub(self.standing.as_ref()?.heard[index].frames)
     }
 
     /// Whether nothing that is still to come can be near the next entry.
     fn seen_enough(&self, index: usize) -> bool {
         let Some(mark) = self.marks.front() else { return true };
-        let waiting = self.waiting.get(index).map_or(0, VecDeque::len) as u64;
+        let waiting = self.waiting[index].len() as u64;
         let behind = waiting.saturating_sub(self.distance(index).unwrap_or(0));
         self.over || self.now_ns > mark.received_ns.saturating_add(NEAR_NS) || behind > MOST_BEHIND
     }
 
     /// Finds out how many frames of an input come before the next entry, as far as it can be known already.
     fn look_for_place(&mut self, input: Input) {
-        let index = input.index();
-        if self.to_go.get(index).is_none_or(Option::is_some) {
+        if self.to_go[input.index()].is_some() {
             return;
         }
-        let place = self.place(input);
-        if let Some((frames, notice)) = place {
+        if let Some((frames, notice)) = self.place(input) {
             let notice = notice.filter(|notice| !self.gives_copies(notice));
             self.out.extend(notice.map(Deed::Notice));
-            if let Some(to_go) = self.to_go.get_mut(index) {
-                *to_go = Some(frames);
-            }
+            self.to_go[input.index()] = Some(frames);
         }
     }
 
     fn place(&self, input: Input) -> Option<(u64, Option<Notice>)> {
         let index = input.index();
         let mark = self.marks.front()?;
-        let (want, have) = (mark.heard.get(index)?, self.standing.as_ref()?.heard.get(index)?);
-        let (waiting, distance) = (self.waiting.get(index)?, self.distance(index));
+        let (want, have) = (mark.heard[index], self.standing.as_ref()?.heard[index]);
+        let (waiting, distance) = (&self.waiting[index], self.distance(index));
         let at = |frames: u64| waiting.get(usize::try_from(frames.checked_sub(1)?).ok()?);
         let as_counted = match distance {
             Some(0) => (want.crc == have.crc || want.frames == 0).then_some(0),
@@ -364,8 +354,7 @@ impl Sequencer {
         if !self.seen_enough(index) {
             return None;
         }
-        let given = self.given.get(index)?;
-        if let Some(passed) = given.iter().rev().position(|crc| *crc == want.crc) {
+        if let Some(passed) = self.given[index].iter().rev().position(|crc| *crc == want.crc) {
             return Some((0, Some(Notice::TooEarly { input, frames: passed as u64, entry })));
         }
         let before = waiting.iter().filter(|frame| frame.received_ns <= mark.received_ns).count() as u64;

@@ -12,6 +12,8 @@ use serde::{Serialize, Serializer};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
+use crate::digest::{self, Digits};
+
 /// What a key is called in a signature: the first eight bytes of the SHA-256 of the raw public key, written as 16
 /// hexadecimal digits in lower case.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,7 +21,7 @@ pub struct KeyId([u8; 8]);
 
 impl fmt::Display for KeyId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+        Digits(&self.0).fmt(f)
     }
 }
 
@@ -34,11 +36,7 @@ impl FromStr for KeyId {
 
     /// Reads exactly the form that is written.
     fn from_str(text: &str) -> Result<Self, ()> {
-        let is_digit = |byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f');
-        if text.len() != 16 || !text.bytes().all(is_digit) {
-            return Err(());
-        }
-        u64::from_str_radix(text, 16).map(|id| Self(id.to_be_bytes())).map_err(|_| ())
+        digest::bytes(text).map(Self).filter(|id| id.to_string() == text).ok_or(())
     }
 }
 
@@ -166,7 +164,7 @@ impl PublicKey {
     /// SHA-256 of the 32 raw bytes, as 64 hexadecimal digits: what two people compare over the telephone.
     #[must_use]
     pub fn fingerprint(&self) -> String {
-        self.digest().iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+        Digits(&self.digest()).to_string()
     }
 
     /// The head of the fingerprint.

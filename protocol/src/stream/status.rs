@@ -4,12 +4,11 @@ use isotherm_correction::operation::{CheckItem, CheckResult};
 use isotherm_correction::prelaunch::{self, ByMode, ModeTotals, Outcome};
 use isotherm_correction::rest;
 use isotherm_correction::sample::LasingMode;
-use isotherm_correction::unit::{At, PreLaunchView, SensorHealth, Uncalibrated};
+use isotherm_correction::unit::{PreLaunchView, SensorHealth, Uncalibrated};
 use isotherm_correction::units::Timestamp;
 
 use super::revisions::Given;
 use super::{Edge, Label, UnitStream};
-use crate::control::Schedule;
 use crate::status::{
     ActiveCalibration, AppliedCorrection, ChannelStatus, ConstantsChange, DriftStatus, MAX_FAULTS, Output,
     PendingChange, Place, PreLaunchGyro, PreLaunchMode, PreLaunchOutcome, PreLaunchProgress,
@@ -24,11 +23,6 @@ impl UnitStream {
         let given = unit.calibration().and_then(|(_, counter)| self.revisions.find(counter));
         let unnamed = Label::default();
         let label = given.map_or(&unnamed, |given| &given.label);
-        let output = match (unit.calibration(), unit.settings().uncalibrated) {
-            (Some(_), _) => Output::Calibrated,
-            (None, Uncalibrated::PassThrough) => Output::PassThrough,
-            (None, Uncalibrated::Hold) => Output::Held,
-        };
         let (pre_launch, pre_launch_outcome) = self.pre_launch(label, &edge);
         let mut faults = edge.faults;
         faults.truncate(MAX_FAULTS);
@@ -36,8 +30,8 @@ impl UnitStream {
             unit: self.id.to_string(),
             instance: edge.instance.to_owned(),
             version: edge.version.to_owned(),
-            state: unit.state().into(),
-            output,
+            state: unit.state(),
+            output: self.output(),
             calibration: given.map(|given| active(given, edge.now_unix_s)),
             pending: self.pending(),
             swaps: edge.swaps,
@@ -70,20 +64,25 @@ impl UnitStream {
         }
     }
 
+    /// What becomes of the unit's ticks.
+    #[must_use]
+    pub fn output(&self) -> Output {
+        match (self.unit.calibration(), self.unit.settings().uncalibrated) {
+            (Some(_), _) => Output::Calibrated,
+            (None, Uncalibrated::PassThrough) => Output::PassThrough,
+            (None, Uncalibrated::Hold) => Output::Held,
+        }
+    }
+
     /// The change that waits for its tick.
     fn pending(&self) -> Option<PendingChange> {
         let (counter, at) = self.unit.pending()?;
         let given = self.revisions.find(counter)?;
-        let schedule = match at {
-            At::NextTick => Schedule::NextTick,
-            At::Sequence(sequence) => Schedule::Sequence(sequence),
-            At::Time(time) => Schedule::TimeNs(time.as_ns()),
-        };
         Some(PendingChange {
             revision: given.revision,
             digest: given.label.digest,
             source: given.label.source.clone(),
-            schedule,
+            schedule: at.into(),
             slew_s: given.slew.as_s(),
         })
     }

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use isotherm_bus::outlet::UnderWay;
 use isotherm_bus::presence;
-use isotherm_correction::operation;
 use isotherm_correction::sample::ChannelName;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::{Output, Status, UNKNOWN_CHANNEL};
@@ -92,7 +91,7 @@ fn words(unit: &UnitId, ticks: u64, waited: Duration, status: Option<&Status>) -
     let Some(status) = status else {
         return format!("{quiet}; the service has no status of the unit: see isotherm status");
     };
-    let state = operation::State::from(status.state);
+    let state = status.state;
     if !state.is_running() {
         return format!(
             "{quiet}: the unit is in {state}, where nothing is published; run it with `isotherm command {unit} run`, or \

@@ -111,13 +111,9 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
         found.push((Level::Warn, words));
     }
     match found.iter().map(|(level, _)| *level).max() {
-        None => (Level::Ok, status.map_or("running", state).to_owned()),
+        None => (Level::Ok, status.map_or("running", |status| status.state.name()).to_owned()),
         Some(level) => (level, found.into_iter().map(|(_, words)| words).collect::<Vec<_>>().join("; ")),
     }
-}
-
-fn state(status: &Status) -> &'static str {
-    isotherm_correction::operation::State::from(status.state).name()
 }
 
 fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
@@ -125,7 +121,7 @@ fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
     let mut say = |key: &str, value: String| values.push(KeyValue { key: key.to_owned(), value });
     let Look { totals, status, jitter_s, .. } = look;
     if let Some((status, _)) = status {
-        say("state", state(status).to_owned());
+        say("state", status.state.name().to_owned());
         if let Some(calibration) = &status.calibration {
             say("calibration revision", calibration.revision.counter.to_string());
             say("calibration digest", Digits(&calibration.revision.digest).to_string());

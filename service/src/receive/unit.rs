@@ -13,11 +13,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use isotherm_correction::operation::{Command, Refusal, State};
-use isotherm_correction::unit::{self, Uncalibrated, UnitSettings};
+use isotherm_correction::unit::{self, UnitSettings};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
-use isotherm_protocol::status::{self, Counter, Output};
+use isotherm_protocol::status::{Counter, Output};
 use isotherm_protocol::stream::UnitStream;
 
 use crate::control::change::Change;
@@ -321,14 +321,8 @@ impl UnitActor {
     }
 
     /// What the unit is doing, and what becomes of its ticks.
-    pub(crate) fn doing(&self) -> (status::State, Output) {
-        let unit = self.stream.unit();
-        let output = match (unit.calibration(), unit.settings().uncalibrated) {
-            (Some(_), _) => Output::Calibrated,
-            (None, Uncalibrated::PassThrough) => Output::PassThrough,
-            (None, Uncalibrated::Hold) => Output::Held,
-        };
-        (unit.state().into(), output)
+    pub(crate) fn doing(&self) -> (State, Output) {
+        (self.stream.unit().state(), self.stream.output())
     }
 
     /// How long no good frame has come.

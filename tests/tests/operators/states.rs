@@ -79,7 +79,7 @@ impl Scene {
         let reply = self.stand.operator.command(BASE_UNIT, order.clone()).await.unwrap();
         assert!(reply.accepted, "{order}: {reply:?}");
         assert_eq!(reply.state, state, "{order}");
-        assert_eq!(self.status().await.state, state.into(), "{order}");
+        assert_eq!(self.status().await.state, state, "{order}");
     }
 
     /// Gives a command that is refused; the reason.
@@ -88,7 +88,7 @@ impl Scene {
         assert!(!reply.accepted, "{order} in {state}: {reply:?}");
         assert_eq!(reply.state, state, "{order}");
         assert_eq!(reply.allowed, state.allowed(), "{order}");
-        assert_eq!(self.status().await.state, state.into(), "{order}");
+        assert_eq!(self.status().await.state, state, "{order}");
         reply.reason.expect("a reason")
     }
 
@@ -161,7 +161,7 @@ async fn a_self_test_has_its_report_in_time_with_ticks_and_without() {
         ] {
             assert!(names.contains(&name), "{name} in {names:?}");
         }
-        assert_eq!(scene.status().await.state, status::State::Standby);
+        assert_eq!(scene.status().await.state, State::Standby);
     }
     let begun = Instant::now();
     scene.command(json!({"command": "self-test"}), State::SelfTest).await;
@@ -313,10 +313,7 @@ async fn a_pre_launch_calibration_finds_the_constants_and_a_rollback_gives_the_o
     // An overlay on the document as it was, in force under a new revision.
     let status = scene.status().await;
     let active = status.calibration.unwrap();
-    assert_eq!(
-        (active.revision.counter, active.overlay, status.state),
-        (2, outcome.overlay, status::State::Standby)
-    );
+    assert_eq!((active.revision.counter, active.overlay, status.state), (2, outcome.overlay, State::Standby));
     let file = scene.folders.state.join("overlays").join(format!("{}.toml", outcome.overlay.unwrap()));
     let overlay = Overlay::parse(&std::fs::read_to_string(file).unwrap(), None).unwrap().overlay;
     let digest = isotherm_protocol::digest::Digest::of(base.as_bytes());
@@ -375,7 +372,7 @@ async fn a_pre_launch_calibration_that_is_given_up_changes_nothing() {
             assert_eq!(scene.stand.operator.active(BASE_UNIT).await.unwrap(), base);
         }
         let status = scene.status().await;
-        assert_eq!((status.state, status.pre_launch), (status::State::Standby, None));
+        assert_eq!((status.state, status.pre_launch), (State::Standby, None));
         let outcome = status.pre_launch_outcome.unwrap();
         let expected = if by_swap {
             PreLaunchVerdict::Refused(vec!["given up: a swap of the calibration (revision 2)".to_owned()])

@@ -214,11 +214,7 @@ impl Basis {
             self.channel.to_parts(),
             terms.iter().map(|term| self.parts(*term)),
         );
-        let defects = |found: Vec<Defect>| {
-            Error::Document(
-                found.iter().map(|defect| format!("{}: {}", defect.path(), defect.kind)).collect(),
-            )
-        };
+        let defects = |found: Vec<Defect>| Error::Document(found.iter().map(Defect::to_string).collect());
         let calibration = Arc::new(Calibration::new(&parts).map_err(defects)?);
         Ok(Loaded { calibration, digest: [0; 8], unit: unit_id("COLUMNS")?, warnings: Vec::new() })
     }

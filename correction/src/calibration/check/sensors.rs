@@ -2,17 +2,17 @@
 
 use alloc::format;
 
-use super::super::defect::{DefectKind, Section};
-use super::super::parts::{AccelParts, CalibrationParts, GyroParts, TermParts, TrendParts};
-use super::checker::{Checker, HUGE};
+use super::super::parts::{AccelParts, CalibrationParts, GyroParts, Source, TermParts, TrendParts};
 use crate::channel::ThermalFilter;
 use crate::curve::Curve;
-use crate::orientation::{Orientation, OrientationError, OrientationParts};
+use crate::defect::{Checker, Defect, DefectKind, HUGE};
+use crate::orientation::{Orientation, OrientationParts};
 use crate::sample::OutputKind;
 use crate::servo::Servo;
 use crate::sigma::{MAX_BIAS_TERMS, SigmaParts};
 use crate::thermal::{
-    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_PLAYS, Parameter, Term, TermForm,
+    ACCEL_TERMS, AccelModel, Feature, GYRO_TERMS, GyroModel, MAX_PLAYS, MotionTerms, Parameter, Term,
+    TermForm,
 };
 
 /// Farthest that an accelerometer may sit from the reference point along an axis (m).
@@ -24,8 +24,9 @@ pub(super) fn gyro_model(
     gyro: &GyroParts,
     filter: &ThermalFilter,
     parts: &CalibrationParts,
-) -> Option<GyroModel> {
-    checker.at(Section::Gyro(index)).channel("channel", gyro.channel);
+) -> Option<(GyroModel, MotionTerms)> {
+    checker.element("gyro.sensor", index);
+    channel(checker, "channel", gyro.channel, parts);
     let counts = parts.gyro_output == OutputKind::Counts;
     let weight = if counts { "increment_weight_arcsec" } else { "increment_weight_rad" };
     checker.positive(weight, gyro.increment_weight.abs());
@@ -37,19 +38,16 @@ pub(super) fn gyro_model(
         checker.range("trend.interval", *interval_s, 0.0, 1e9);
     }
     if gyro.servo.is_some() && parts.reversal.is_none() {
-        let needed_by = "the gyros' servo term";
-        checker.at(Section::Reversal).push("", DefectKind::Missing { needed_by });
+        let kind = DefectKind::Missing { needed_by: "the gyros' servo term" };
+        checker.defects.push(Defect { path: "mode_reversal".into(), kind });
     }
-    checker.at(Section::Gyro(index));
     if gyro.servo.is_some() && !counts {
         checker.push("servo", DefectKind::NeedsCounts);
     }
     sigma(checker, gyro.sigma.as_ref());
-    let servo = gyro
-        .servo
-        .as_ref()
-        .and_then(|servo| checker.compiled(Servo::new(servo), |error| format!("servo.{}", error.field())));
-    GyroModel::new(gyro, servo, filter, &mut |field, error| checker.curve(field, error))
+    let servo = gyro.servo.as_ref().and_then(|servo| checker.compiled("servo", Servo::new(servo)));
+    let model = GyroModel::new(gyro, servo, filter, checker);
+    model.zip(MotionTerms::of_gyro(gyro, filter, checker))
 }
 
 pub(super) fn accel_model(
@@ -58,9 +56,10 @@ pub(super) fn accel_model(
     accel: &AccelParts,
     filter: &ThermalFilter,
     parts: &CalibrationParts,
-) -> Option<AccelModel> {
-    checker.at(Section::Accel(index)).channel("channel", accel.channel);
-    checker.channel("board_channel", accel.board_channel);
+) -> Option<(AccelModel, MotionTerms)> {
+    checker.element("accel.sensor", index);
+    channel(checker, "channel", accel.channel, parts);
+    channel(checker, "board_channel", accel.board_channel, parts);
     if accel.board_channel.is_none() && accel.board_ratio.is_some() {
         checker.push("board_channel", DefectKind::Missing { needed_by: "board_ratio_error" });
     }
@@ -71,11 +70,11 @@ pub(super) fn accel_model(
     checker.within("delay_ticks", accel.delay_ticks, 0.0, 1.0);
     terms(checker, (accel.channel, &accel.terms), &ACCEL_TERMS, parts);
     sigma(checker, accel.sigma.as_ref());
-    let model = AccelModel::new(accel, filter, &mut |field, error| checker.curve(field, error))?;
-    if let Some(at) = sign_change(&model.scale_factor) {
+    let model = AccelModel::new(accel, filter, checker);
+    if let Some(at) = model.as_ref().and_then(|model| sign_change(&model.scale_factor)) {
         checker.push("scale_factor", DefectKind::Zero { at });
     }
-    Some(model)
+    model.zip(MotionTerms::of_accel(accel, filter, checker))
 }
 
 /// Standard errors are numbers from 0 on, and correlations those of a covariance.
@@ -127,7 +126,9 @@ fn terms(
                 }
                 TermForm::Regressors(_) => match regressor {
                     Some(regressor) => {
-                        regressor.channels().for_each(|source| checker.source(&path, source));
+                        for stated in regressor.channels() {
+                            source(checker, &path, stated, parts);
+                        }
                         checker.within(&format!("{path}.reference"), regressor.reference, -HUGE, HUGE);
                         if channel.is_none() {
                             checker.push("channel", DefectKind::Missing { needed_by: "regressor" });
@@ -151,25 +152,44 @@ fn sign_change(curve: &Curve) -> Option<f64> {
     })
 }
 
+/// A channel that is named by its index.
+fn channel(checker: &mut Checker, field: &str, index: Option<usize>, parts: &CalibrationParts) {
+    if let Some(index) = index {
+        source(checker, field, Source::Temperature(index), parts);
+    }
+}
+
+/// A channel of either kind.
+fn source(checker: &mut Checker, field: &str, source: Source, parts: &CalibrationParts) {
+    let (index, channels) = match source {
+        Source::Temperature(index) => (index, parts.channels.len()),
+        Source::Auxiliary(index) => (index, parts.auxiliaries.len()),
+    };
+    if index >= channels {
+        checker.push(field, DefectKind::NoSuchChannel { index, channels });
+    }
+}
+
+/// An orientation of so many sensors that follows channels.
 pub(super) fn orientation(
     checker: &mut Checker,
-    parts: &OrientationParts,
-    following: &[usize],
+    (stated, following): (&OrientationParts, &[usize]),
     sensors: usize,
+    parts: &CalibrationParts,
 ) -> Option<Orientation> {
-    checker.count("thermal.hysteresis", parts.plays.len(), 0, MAX_PLAYS);
+    checker.count("thermal.hysteresis", stated.plays.len(), 0, MAX_PLAYS);
     for &index in following {
-        checker.channel("thermal.channels", Some(index));
+        channel(checker, "thermal.channels", Some(index), parts);
     }
     // As many of everything as there are sensors, not as there are rows.
-    let (name, got) = ("rows", parts.rows.len());
-    let rows = (got != sensors).then_some(OrientationError::ListCount { name, got, sensors });
-    for error in rows.into_iter().chain(parts.check_lists(sensors)) {
-        checker.push(&error.field(), error);
+    let got = stated.rows.len();
+    if got != sensors {
+        checker.push("rows", DefectKind::ListCount { got, sensors });
     }
-    let compiled = Orientation::new(parts).map_err(|mut errors| {
-        errors.retain(|error| !matches!(error, OrientationError::ListCount { .. }));
-        errors
+    stated.check_lists(sensors, checker);
+    let compiled = Orientation::new(stated).map_err(|mut defects| {
+        defects.retain(|defect| !matches!(defect.kind, DefectKind::ListCount { .. }));
+        defects
     });
-    checker.compiled(compiled, OrientationError::field)
+    checker.compiled("", compiled)
 }

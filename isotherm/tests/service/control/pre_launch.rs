@@ -79,7 +79,7 @@ async fn the_result_is_an_overlay_that_takes_the_bias_away_and_can_be_taken_back
     let record = ended(&stand, 0).await;
     assert!(record.accepted, "{record:#?}");
     assert!(record.reason.unwrap().contains("revision 2"));
-    assert_eq!(stand.status(UNIT).state, isotherm_protocol::status::State::Standby);
+    assert_eq!(stand.status(UNIT).state, State::Standby);
 
     let status = stand.status(UNIT);
     let outcome = status.pre_launch_outcome.expect("an outcome");
@@ -174,7 +174,7 @@ async fn a_swap_gives_it_up_and_status_log_and_audit_file_say_so() {
         told.extend(reply.warnings.into_iter().map(|warning| warning.message + "\n"));
         let reason = format!("given up: a swap of the calibration (revision {revision})");
         let status = stand.status(UNIT);
-        assert_eq!(status.state, isotherm_protocol::status::State::Standby);
+        assert_eq!(status.state, State::Standby);
         let outcome = status.pre_launch_outcome.unwrap();
         assert_eq!(outcome.verdict, PreLaunchVerdict::Refused(vec![reason.clone()]));
         let record = ended(&stand, usize::from(by_rollback)).await;

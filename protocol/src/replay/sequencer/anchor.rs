@@ -100,8 +100,7 @@ impl Sequencer {
             for ((found, heard), before) in search.found.iter_mut().zip(&mark.heard).zip(before) {
                 *found = heard.frames == 0 || (before.frames > 0 && before.crc == heard.crc);
             }
-            search.in_time =
-                search.found.get(GYRO.index()).is_some_and(|found| *found) || gyro(mark).frames == 0;
+            search.in_time = search.found[GYRO.index()] || gyro(mark).frames == 0;
         }
         let counting = self.counting(mark).map(gyro);
         let inputs = search.found.iter_mut().zip(&mark.heard).zip(&self.waiting).enumerate();
@@ -155,7 +154,7 @@ impl Sequencer {
     ///
     /// Of equal frames the last one before the entry came: a producer that repeats itself does so at once.
     fn last_like(&self, index: usize, heard: Heard, received_ns: u64) -> Option<usize> {
-        let frames = self.waiting.get(index).filter(|_| heard.frames > 0)?;
+        let frames = (heard.frames > 0).then_some(&self.waiting[index])?;
         let in_time = |frame: &Frame| frame.received_ns <= received_ns && frame.crc() == heard.crc;
         let late = |frame: &Frame| {
             (received_ns..=received_ns.saturating_add(NEAR_NS)).contains(&frame.received_ns)
@@ -166,10 +165,8 @@ impl Sequencer {
 
     /// The input whose next frame was recorded first, of those whose next frame is before their cut.
     fn first_before(&self, cuts: &Cuts) -> Option<usize> {
-        let before = |index: usize| {
-            let front = self.waiting.get(index).and_then(VecDeque::front);
-            front.zip(cuts.get(index)).is_some_and(|(frame, cut)| frame.order < *cut)
-        };
+        let before =
+            |index: usize| self.waiting[index].front().is_some_and(|frame| frame.order < cuts[index]);
         self.oldest(before).map(|(index, _)| index)
     }
 
@@ -179,7 +176,7 @@ impl Sequencer {
         let mut cuts = [0; Input::ALL.len()];
         for (index, ((cut, heard), more)) in cuts.iter_mut().zip(&mark.heard).zip(&counting.heard).enumerate()
         {
-            let frames = self.waiting.get(index)?;
+            let frames = &self.waiting[index];
             if more.frames == heard.frames {
                 // What came of it before the memory did, this has heard.
                 let before = frames.iter().rfind(|frame| frame.received_ns <= mark.received_ns);
@@ -200,8 +197,7 @@ impl Sequencer {
     /// The cuts by the last frames that the memory has heard.
     fn behind_memory(&self, mark: &Mark) -> Cuts {
         let found: [Option<&Frame>; Input::ALL.len()] = std::array::from_fn(|index| {
-            let place = self.last_like(index, *mark.heard.get(index)?, mark.received_ns)?;
-            self.waiting.get(index)?.get(place)
+            self.waiting[index].get(self.last_like(index, mark.heard[index], mark.received_ns)?)
         });
         let last = found.iter().flatten().max_by_key(|frame| frame.order);
         // Had the memory heard any frame of the other inputs in the recording, it would name it; only what is much older
@@ -233,7 +229,7 @@ impl Sequencer {
 
     /// The first frame near the entry that has the tick which the new unit published first, or a later one.
     fn first_gyro_frame(&self, mark: &Mark, sequence: u64) -> Option<u64> {
-        let frames = self.waiting.get(GYRO.index())?;
+        let frames = &self.waiting[GYRO.index()];
         let near =
             frames.iter().filter(|frame| frame.received_ns.saturating_add(NEAR_NS) >= mark.received_ns);
         let gyro = near.filter_map(|frame| {
@@ -259,12 +255,10 @@ impl Sequencer {
         let last = self.marks.front().filter(|mark| mark.kind == MarkKind::Memory && self.marks.len() == 1);
         let Some(mark) = last.filter(|_| self.over) else { return false };
         let behind = |index: usize| {
-            let (Some(want), Some(waiting)) = (mark.heard.get(index), self.waiting.get(index)) else {
-                return false;
-            };
-            let open = self.to_go.get(index).is_some_and(Option::is_none);
+            let waiting = &self.waiting[index];
+            let open = self.to_go[index].is_none();
             let more = open && self.distance(index).is_some_and(|frames| frames > waiting.len() as u64);
-            more && waiting.iter().all(|frame| frame.crc() != want.crc)
+            more && waiting.iter().all(|frame| frame.crc() != mark.heard[index].crc)
         };
         (0..Input::ALL.len()).any(behind)
     }
@@ -272,5 +266,5 @@ impl Sequencer {
 
 /// What an entry says of the gyros.
 fn gyro(mark: &Mark) -> Heard {
-    mark.heard.get(GYRO.index()).copied().unwrap_or_default()
+    mark.heard[GYRO.index()]
 }

@@ -21,17 +21,15 @@ pub(super) struct Copies {
 impl Copies {
     /// Sets a frame aside where it is a copy; gives it back where it is not.
     pub(super) fn keep(&mut self, input: usize, frame: Frame) -> Option<Frame> {
-        let heard = self.of.as_ref().and_then(|mark| mark.heard.get(input).zip(Some(mark.received_ns)));
-        let is_copy = heard.is_some_and(|(heard, received_ns)| {
-            heard.frames > 0 && frame.received_ns.abs_diff(received_ns) <= NEAR_NS && frame.crc() == heard.crc
+        let is_copy = self.of.as_ref().is_some_and(|mark| {
+            let (heard, apart_ns) = (mark.heard[input], frame.received_ns.abs_diff(mark.received_ns));
+            heard.frames > 0 && apart_ns <= NEAR_NS && frame.crc() == heard.crc
         });
-        match self.frames.get_mut(input).filter(|_| is_copy) {
-            Some(frames) => {
-                frames.push_back(frame);
-                None
-            }
-            None => Some(frame),
+        if !is_copy {
+            return Some(frame);
         }
+        self.frames[input].push_back(frame);
+        None
     }
 }
 
@@ -52,7 +50,7 @@ impl Sequencer {
     pub(super) fn gives_copies(&mut self, notice: &Notice) -> bool {
         let Notice::NotRecorded { input, frames, .. } = notice else { return false };
         let index = input.index();
-        let Some(copies) = self.copies.frames.get_mut(index) else { return false };
+        let copies = &mut self.copies.frames[index];
         let Some(count) = usize::try_from(*frames).ok().filter(|count| *count <= copies.len()) else {
             return false;
         };
@@ -62,8 +60,8 @@ impl Sequencer {
             received_ns: frame.received_ns,
             frame: frame.bytes,
         }));
-        if let Some(heard) = self.standing.as_mut().and_then(|standing| standing.heard.get_mut(index)) {
-            heard.frames += frames;
+        if let Some(standing) = &mut self.standing {
+            standing.heard[index].frames += frames;
         }
         true
     }

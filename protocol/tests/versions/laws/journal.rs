@@ -3,8 +3,8 @@
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::codec::{decode, encode};
 use isotherm_protocol::journal::{
-    JoinError, Joiner, JournalEntry, JournalEvent, JournalPart, MAX_OPEN_ENTRIES, MAX_PART_BYTES, MAX_PARTS,
-    split,
+    JoinError, JoinFault, Joiner, JournalEntry, JournalEvent, JournalPart, MAX_OPEN_ENTRIES, MAX_PART_BYTES,
+    MAX_PARTS, split,
 };
 use isotherm_protocol::stream::Heard;
 use proptest::prelude::*;
@@ -75,7 +75,7 @@ fn a_lost_part_loses_its_entry_and_no_other() {
     let mut joiner = Joiner::new();
     assert_eq!(joiner.join(parts[0].clone()), Ok(None));
     let lost = joiner.join(parts[2].clone()).unwrap_err();
-    assert!(matches!(lost, JoinError::Missing { got: 2, need: 1, parts: 3, .. }), "{lost}");
+    assert!(matches!(lost.fault, JoinFault::Missing { got: 2, need: 1, parts: 3 }), "{lost}");
     assert_eq!(joiner.join(sent(&second).remove(0)), Ok(Some(second.clone())));
     // The end of an entry never comes.
     assert_eq!(joiner.join(parts[0].clone()), Ok(None));
@@ -83,7 +83,7 @@ fn a_lost_part_loses_its_entry_and_no_other() {
     assert_eq!(joiner.given_up(), 2);
     // Its end is the first that is heard of it.
     let late = joiner.join(parts[1].clone()).unwrap_err();
-    assert!(matches!(late, JoinError::Missing { got: 1, need: 0, .. }), "{late}");
+    assert!(matches!(late.fault, JoinFault::Missing { got: 1, need: 0, .. }), "{late}");
 }
 
 #[test]
@@ -95,13 +95,13 @@ fn parts_that_hold_another_entry_or_none_are_refused() {
         JournalPart { number: 2, ..good.clone() },
         JournalPart { instance: "b2".to_owned(), ..good.clone() },
     ] {
-        assert!(matches!(joiner.join(other), Err(JoinError::Other { .. })));
+        assert!(matches!(joiner.join(other), Err(JoinError { fault: JoinFault::Other { .. }, .. })));
     }
     let mut more = good.clone();
     more.bytes.push(0);
     let fewer = JournalPart { bytes: good.bytes[..20].to_vec(), ..good.clone() };
     for other in [more, fewer] {
-        assert!(matches!(joiner.join(other), Err(JoinError::Malformed { .. })));
+        assert!(matches!(joiner.join(other), Err(JoinError { fault: JoinFault::Malformed, .. })));
     }
     for other in [
         JournalPart { parts: 0, ..good.clone() },
@@ -111,7 +111,7 @@ fn parts_that_hold_another_entry_or_none_are_refused() {
         JournalPart { bytes: vec![0; MAX_PART_BYTES + 1], ..good.clone() },
     ] {
         assert!(encode(&other).is_err());
-        assert!(matches!(joiner.join(other), Err(JoinError::Part { .. })));
+        assert!(matches!(joiner.join(other), Err(JoinError { fault: JoinFault::Part(_), .. })));
     }
     let nameless = JournalPart { unit: "x\n".repeat(1000), parts: 0, ..good.clone() };
     let words = joiner.join(nameless).expect_err("no parts").to_string();

@@ -18,7 +18,7 @@ use proptest::option::of;
 use super::*;
 
 fn state() -> impl Strategy<Value = State> {
-    select(isotherm_correction::operation::State::ALL.map(State::from).to_vec())
+    select(State::ALL.to_vec())
 }
 
 fn output() -> impl Strategy<Value = Output> {

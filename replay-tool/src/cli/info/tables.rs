@@ -253,7 +253,6 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
     }
     if let Some(status) = &unit.status {
         list(text, &status.states, |StateInfo { last_tick_ns, state, .. }| {
-            let state = isotherm_correction::operation::State::from(*state);
             let first = || "before the first tick".to_owned();
             format!("state {state}: {}", last_tick_ns.map_or_else(first, |ns| after(ns, begin_ns)))
         });

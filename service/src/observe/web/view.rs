@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use isotherm_correction::operation;
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{PairReport, UnitRole};
 use isotherm_protocol::service_status::ServiceStatus;
@@ -230,7 +229,7 @@ impl Web {
             level: unit.level(),
             remarks: unit.remarks(),
             gone_s: unit.gone.map(|gone| gone.as_secs()),
-            allowed: operation::State::from(unit.status.state).allowed(),
+            allowed: unit.status.state.allowed(),
             past: past.collect(),
             status: unit.status,
         }

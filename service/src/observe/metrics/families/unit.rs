@@ -14,7 +14,7 @@ const OUTPUTS: [(&str, Output); 3] =
 
 families! { Unit "isotherm_unit_":
     Gauge "state" "" ["state"] "1 for the present state"
-        |look| each(State::ALL.iter().map(|state| (state.name(), *state == State::from(look.status.state))));
+        |look| each(State::ALL.iter().map(|state| (state.name(), *state == look.status.state)));
     Gauge "output" "" ["output"] "1 for what happens to ticks in a running state"
         |look| each(OUTPUTS.map(|(name, output)| (name, output == look.status.output)));
     Gauge "speaking" "" [] "1 if this instance publishes the unit's ticks, 0 if it stands by for another"
