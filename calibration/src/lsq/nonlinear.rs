@@ -34,8 +34,8 @@ pub struct Solution {
 pub enum NoSolution {
     /// The parameter with the largest part in a direction that the residuals do not depend on.
     NotDetermined(usize),
-    /// The search ended without a minimum, in the library's words.
-    NoMinimum(String),
+    /// The search ended without a minimum.
+    NoMinimum,
 }
 
 impl NoSolution {
@@ -44,8 +44,7 @@ impl NoSolution {
     pub fn words(&self, of: &str, name: impl Fn(usize) -> String, more: &str, look: &str) -> String {
         match self {
             Self::NotDetermined(index) => format!("{of} do not determine {}: {more}", name(*index)),
-            // The library's words are about its search.
-            Self::NoMinimum(_) => look.to_owned(),
+            Self::NoMinimum => look.to_owned(),
         }
     }
 }
@@ -71,10 +70,7 @@ pub fn solve(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<So
     let (problem, report) = LevenbergMarquardt::new().with_patience(100).minimize(problem);
     let good = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
-    if !good {
-        return Err(NoSolution::NoMinimum(format!("{:?}", report.termination)));
-    }
-    solution(&problem)
+    if good { solution(&problem) } else { Err(NoSolution::NoMinimum) }
 }
 
 /// The solution where it is known beforehand: what residuals of variance one will make of its covariance.

@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn what_was_not_found_is_said_in_plain_words() {
-        let patience = NoSolution::NoMinimum("LostPatience".to_owned());
+        let patience = NoSolution::NoMinimum;
         // What no document may state is refused before it is written, without the numbers of a matrix.
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let of =
