@@ -11,7 +11,7 @@ use super::pose::Pose;
 use super::track::Track;
 use crate::numbers::{ends, real};
 use crate::report::{counted, fixed};
-use crate::runs::swapped::{ORDERS, moved};
+use crate::runs::swapped::{AS_LOGGED, ORDERS, moved};
 
 /// Largest angle between the direction found and that of the plan (rad): 20°.
 const DIRECTION_RAD: f64 = 0.35;
@@ -21,8 +21,6 @@ const ROTATION_RAD: f64 = 0.52;
 const AGREEMENT: f64 = 0.8;
 /// Fewest ways that tell an order of columns from chance.
 const TELLING_WAYS: usize = 3;
-/// The order of the log's columns.
-const AS_LOGGED: [usize; 3] = [0, 1, 2];
 
 /// Plan positions of a run's poses.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
