@@ -78,18 +78,16 @@ impl Tumble {
 /// Every reason why it cannot be, with what to do.
 pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>> {
     faults(track)?;
-    let factors: &[f64] = if settings.search { &FACTORS } else { &[] };
+    let factors = if settings.search { &FACTORS[..] } else { &[settings.limits.factor][..] };
     let mut best: Option<(f64, Vec<Pose>, AccelFit)> = None;
     let mut reasons = Vec::new();
-    let single = [settings.limits.factor];
-    for factor in if factors.is_empty() { &single[..] } else { factors } {
+    for factor in factors {
         let limits = StillLimits { factor: *factor, ..settings.limits };
-        let intervals = still(track, &limits, Some(settings.start_s));
-        let poses = Pose::of(track, 0, &intervals);
-        match found(track, &poses, settings).and_then(|()| {
-            accel::fit(&outputs(&poses), settings.gravity)
-                .map_err(|why| vec![doubts::no_accelerometers(&why)])
-        }) {
+        let poses = Pose::of(track, 0, &still(track, &limits, Some(settings.start_s)));
+        let fit = || accel::fit(&outputs(&poses), settings.gravity);
+        let fitted = found(track, &poses, settings)
+            .and_then(|()| fit().map_err(|why| vec![doubts::no_accelerometers(&why)]));
+        match fitted {
             Ok(fit) => {
                 let rms = Size::of(&fit.residual).rms;
                 if best.as_ref().is_none_or(|(_, _, other)| rms < Size::of(&other.residual).rms) {
@@ -169,7 +167,7 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
         ));
         reasons.extend(track.gaps());
     }
-    reasons.extend(faults::clipped(std::slice::from_ref(track), poses));
+    reasons.extend(faults::clipped(std::slice::from_ref(track), &poses.iter().collect::<Vec<_>>()));
     if poses.len() < FEWEST_POSES {
         reasons.push(format!(
             "{} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
