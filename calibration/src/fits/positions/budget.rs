@@ -107,7 +107,7 @@ impl Budget {
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
         let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights };
         let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
-        let covariance = found.axes_covariance(plan, 0);
+        let covariance = found.axes_covariance(0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / real(sigma.len())).sqrt();
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])

@@ -4,7 +4,7 @@ use isotherm_protocol::document::Document;
 
 use super::document::held_twice;
 use super::doubts::{
-    ACCIDENT, few, measures, no_solution, quadratic_terms, sound, spread, survival, turned, widening,
+    ACCIDENT, few, no_solution, not_as_stated, quadratic_terms, sound, spread, survival, widening,
 };
 use super::faults;
 use super::hysteresis::{Return, returns};
@@ -135,7 +135,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let found = all.fit(degrees).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
     let quadratic =
         (most >= 2).then(|| all.fit(Degrees { axes: 2, ..degrees }).ok()).flatten().map(|quadratic| {
-            let (chi_square, terms) = quadratic_terms(&quadratic, stand);
+            let (chi_square, terms) = quadratic_terms(&quadratic);
             let accident = survival(chi_square, terms);
             (quadratic, chi_square, terms, accident)
         });
@@ -150,8 +150,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         );
     }
     few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
-    turned(best, document, settings.gravity, &mut warnings);
-    warnings.extend(measures(best, document, settings, &own));
+    warnings.extend(not_as_stated(best, document, settings.gravity, &own));
     let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
     let returns = returns(&all, &plain, &found, &levels_deg_c);
     let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
@@ -235,7 +234,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             if others.is_empty() { String::new() } else { format!(". Likewise {}", faults::logs(&others)) };
         reasons.push(format!("{first}: {words}{likewise}"));
     }
-    let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
+    let poses: Vec<&Pose> = found.iter().map(|(pose, _)| pose).collect();
     reasons.extend(faults::clipped(tracks, &poses));
     if reasons.is_empty() && found.is_empty() {
         let runs: Vec<&str> = tracks.iter().map(|track| track.run.as_str()).collect();

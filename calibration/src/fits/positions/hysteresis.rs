@@ -71,14 +71,13 @@ pub(super) fn returns(all: &Positions<'_>, poses: &[Pose], fit: &Fit, levels_deg
     let after = |at: usize| {
         let (visit, fit_after) = &found[at];
         let before = found[..at].iter().rev().find(|(other, _)| other.level == visit.level)?;
-        compare(all, fit, [(before.0, &before.1), (visit, fit_after)], levels_deg_c)
+        compare(fit, [(before.0, &before.1), (visit, fit_after)], levels_deg_c)
     };
     (0..found.len()).filter_map(after).collect()
 }
 
 /// The turn from one visit to another, less what the line over temperature says of the small difference of theirs.
 fn compare(
-    all: &Positions<'_>,
     fit: &Fit,
     [(first, before), (second, after)]: [(&Visit, &Fit); 2],
     levels_deg_c: &[f64],
@@ -86,23 +85,22 @@ fn compare(
     let scaled =
         |visit: &Visit| visit.taken.iter().map(|taken| taken.axes_t).sum::<f64>() / real(visit.taken.len());
     let away = scaled(second) - scaled(first);
-    let [level, line] = [before, fit].map(|fit| fit.model(all.plan));
     let angle = |sensor: usize, which: usize| {
-        let at = level.axis_index(sensor, which, 0);
+        let at = before.degrees.axis_index(sensor, which, 0);
         let slope = if fit.degrees.axes > 0 {
-            fit.solution.parameters[line.axis_index(sensor, which, 1)]
+            fit.solution.parameters[fit.degrees.axis_index(sensor, which, 1)]
         } else {
             0.0
         };
         (after.solution.parameters[at] - before.solution.parameters[at] - slope * away) * SMALL
     };
-    let count = all.guess.len();
+    let count = fit.guess.len();
     let angles = DVector::from_iterator(
         2 * count,
         (0..count).flat_map(|sensor| [0, 1].map(|which| angle(sensor, which))),
     );
-    let covariance: DMatrix<f64> = (before.axes_covariance(all.plan, 0) + after.axes_covariance(all.plan, 0))
-        * widening([before, after]);
+    let covariance: DMatrix<f64> =
+        (before.axes_covariance(0) + after.axes_covariance(0)) * widening([before, after]);
     let accident = survival(linear::chi_square(&angles, &covariance)?, 2 * count);
     let turn = |sensor: usize| {
         let own = angles.rows(2 * sensor, 2);
