@@ -1,13 +1,13 @@
 //! Where the numbers of the document come from, and what "before" means.
 
-use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_protocol::document::Document;
 use serde_json::{Value, json};
 
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::model::SMALL;
 use crate::axes::main_axis;
-use crate::document::{rows, tidy};
+use crate::document::{constant, rows, tidy};
 use crate::numbers::{ARCSEC_PER_RAD, real};
 use crate::report::Sigmas;
 
@@ -22,8 +22,7 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
             let unit = sensor.scale_factor.unit();
             // An accelerometer that is mounted the other way round is no error of its scale factor.
             let sign = guess.axis[main_axis(&guess.axis)].signum();
-            let shape = Shape::Constant { value: tidy(sign * mean) };
-            sensor.scale_factor = Curve::new(shape).in_unit(unit);
+            sensor.scale_factor = constant(sign * mean).in_unit(unit);
         }
     }
     document
