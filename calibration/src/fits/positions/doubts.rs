@@ -39,13 +39,16 @@ pub(super) fn survival(chi_square: f64, degrees: usize) -> f64 {
     ChiSquared::new(real(degrees)).map_or(1.0, |law| law.sf(chi_square))
 }
 
+/// χ² per degree of freedom where it is larger than by accident.
+pub(super) fn excess(chi_square: f64, degrees: usize) -> Option<f64> {
+    let per_degree = chi_square / real(degrees);
+    (degrees > 0 && per_degree > 1.0 && survival(chi_square, degrees) < ACCIDENT).then_some(per_degree)
+}
+
 /// Factor by which standard errors are widened where the positions scatter more than they should.
 pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
     let (chi_square, degrees) = (fit.solution.chi_square, fit.solution.degrees);
-    let Some(per_degree) = fit.solution.per_degree() else { return 1.0 };
-    if survival(chi_square, degrees) >= ACCIDENT || per_degree <= 1.0 {
-        return 1.0;
-    }
+    let Some(per_degree) = excess(chi_square, degrees) else { return 1.0 };
     let factor = per_degree.sqrt();
     warnings.push(format!(
         "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² \

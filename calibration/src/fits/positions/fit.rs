@@ -8,14 +8,14 @@ use super::doubts::{
 };
 use super::faults;
 use super::hysteresis::{Return, returns};
-use super::matching::{Matched, matched};
+use super::matching::matched;
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::solve::{Fit, Positions, Weights, guesses};
 use super::still::{StillLimits, still};
 use super::temperature::{
-    Followed, Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
+    Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
 };
 use super::times::Times;
 use super::track::Track;
@@ -93,7 +93,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     }
     let (poses, mut warnings) = positions(tracks, settings)?;
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
-    let Followed { channels, deg_c: axes } = followed(document, settings, &poses, &mut warnings)?;
+    let (channels, axes) = followed(document, settings, &poses, &mut warnings)?;
     let (level_of, levels_deg_c) = levels(&axes);
     let own = own_deg_c(document, &poses, &axes, sensors);
     let blind = blind(document, &own, levels_deg_c.len());
@@ -209,7 +209,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             continue;
         }
         match matched(&settings.plan, track, &poses) {
-            Ok(Matched { positions, doubt }) => {
+            Ok((positions, doubt)) => {
                 warnings.extend(doubt.map(|words| format!("{}: {words}", track.run)));
                 let others = positions.iter().filter(|position| position.is_none()).count();
                 if others > 0 {
