@@ -9,7 +9,6 @@ use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::linear::{self, Undetermined};
-use crate::numbers::real;
 
 /// Step of the differences.
 const STEP: f64 = 1e-6;
@@ -53,11 +52,6 @@ impl Solution {
     /// Standard error of a parameter.
     pub fn sigma(&self, index: usize) -> f64 {
         self.covariance.get((index, index)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
-    }
-
-    /// χ² per degree of freedom; `None` without any.
-    pub fn per_degree(&self) -> Option<f64> {
-        (self.degrees > 0).then(|| self.chi_square / real(self.degrees))
     }
 }
 
