@@ -109,30 +109,23 @@ pub(super) fn not_as_stated(fit: &Fit, document: &Document, gravity: f64, own: &
     elsewhere.map(|words| format!("{words}. {mounted}")).into_iter().chain(measure).collect()
 }
 
-/// Axes that no position of some shows up or down, such as "x up".
-pub(super) fn unseen(plan: &Plan, positions: &[usize]) -> Vec<String> {
+/// Axes that none of some positions shows up or down, such as "none has x up", or what to say where there are none.
+pub(super) fn unseen(plan: &Plan, positions: &[usize], none: &str, otherwise: &str) -> String {
     let seen = |axis: usize, sign: f64| {
-        positions
-            .iter()
-            .filter_map(|position| plan.positions.get(*position))
-            .any(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
+        let mut positions = positions.iter().filter_map(|position| plan.positions.get(*position));
+        positions.any(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
     };
-    (0..3)
-        .flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")])
-        .filter(|(axis, sign, _)| !seen(*axis, *sign))
-        .map(|(axis, _, way)| format!("{} {way}", AXES[axis]))
-        .collect()
+    let ways = (0..3).flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")]);
+    let unseen = ways.filter(|(axis, sign, _)| !seen(*axis, *sign));
+    let unseen: Vec<String> = unseen.map(|(axis, _, way)| format!("{} {way}", AXES[axis])).collect();
+    if unseen.is_empty() { otherwise.to_owned() } else { format!("{none} has {}", unseen.join(", ")) }
 }
 
 /// Sensors whose positions do not spread, in words.
 pub(super) fn spread(plan: &Plan, taken: &[Taken], (bad, sensors): (&[usize], usize)) -> Vec<String> {
     let positions: Vec<usize> = taken.iter().map(|taken| taken.position).collect();
-    let lacking = unseen(plan, &positions);
-    let lacking = if lacking.is_empty() {
-        "the outputs do not follow the positions: check the plan and the columns of the mapping".to_owned()
-    } else {
-        format!("no position has {}", lacking.join(", "))
-    };
+    let otherwise = "the outputs do not follow the positions: check the plan and the columns of the mapping";
+    let lacking = unseen(plan, &positions, "no position", otherwise);
     vec![format!(
         "{} not determine scale factor, bias and axis of {}: {lacking}",
         counted(taken.len(), "position does", "positions do"),

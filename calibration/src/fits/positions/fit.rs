@@ -139,10 +139,10 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
             let accident = survival(chi_square, terms);
             (quadratic, chi_square, terms, accident)
         });
-    let best = quadratic.as_ref().filter(|found| found.3 < ACCIDENT).map_or(&found, |found| &found.0);
+    let curved = quadratic.as_ref().filter(|found| found.3 < ACCIDENT);
+    let best = curved.map_or(&found, |found| &found.0);
     let widened = widening(best, &mut warnings);
-    let curved = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
-    if curved {
+    if curved.is_some() {
         warnings.push(
             "C bends with temperature: the quadratic terms are significant. The document has the best straight line; \
              the report has both, and the remainder"
@@ -267,7 +267,5 @@ fn intensity(tracks: &[Track], poses: &[Pose]) -> Result<Vec<f64>, Vec<String>> 
 /// A temperature by itself, where it has enough positions.
 fn one_level(all: &Positions<'_>, level: usize) -> Option<Fit> {
     let own: Vec<Taken> = all.taken.iter().filter(|taken| taken.level == level).cloned().collect();
-    let enough = guesses(all.plan, &own, all.guess.len()).is_ok();
-    let alone = Positions { taken: &own, ..*all };
-    enough.then(|| alone.fit(Degrees { sensor: 0, axes: 0 }).ok()).flatten()
+    guesses(all.plan, &own, all.guess.len()).ok().and_then(|_| all.alone(&own))
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::doubts::{ACCIDENT, excess, survival};
-use super::model::{Degrees, SMALL, Taken};
+use super::model::{SMALL, Taken};
 use super::pose::Pose;
 use super::solve::{Fit, Positions};
 use crate::finding::AccelKind;
@@ -24,19 +24,10 @@ pub struct Return {
 }
 
 impl Return {
-    /// Whether some axis moved, beyond chance.
-    pub fn moved(&self) -> bool {
-        self.accident < ACCIDENT
-    }
-
-    /// The accelerometer whose axis turned most.
-    pub fn largest(&self) -> Option<(usize, [f64; 2])> {
-        self.turns.iter().copied().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
-    }
-
-    /// As a finding, where an axis moved: the accelerometer and the kind.
+    /// As a finding, where an axis moved beyond chance: the accelerometer whose axis turned most, and the kind.
     pub fn finding(&self, runs: &[String]) -> Option<(usize, AccelKind)> {
-        let (sensor, turn) = self.largest().filter(|_| self.moved())?;
+        let turns = self.turns.iter().copied().enumerate().filter(|_| self.accident < ACCIDENT);
+        let (sensor, turn) = turns.max_by(|a, b| a.1[0].total_cmp(&b.1[0]))?;
         let logs = self.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
         Some((sensor, AccelKind::AxisMoved { deg_c: self.deg_c, logs, turn }))
     }
@@ -57,7 +48,7 @@ pub(super) fn returns(all: &Positions<'_>, poses: &[Pose], fit: &Fit, levels_deg
     order.sort_by_key(|index| (poses[*index].run, poses[*index].interval.first));
     let visit = |visit: &[usize]| {
         let taken: Vec<Taken> = visit.iter().map(|index| all.taken[*index].clone()).collect();
-        let fit = Positions { taken: &taken, ..*all }.fit(Degrees { sensor: 0, axes: 0 }).ok()?;
+        let fit = all.alone(&taken)?;
         let axes_t: Vec<f64> = taken.iter().map(|taken| taken.axes_t).collect();
         Some(Visit { run: poses[visit[0]].run, level: taken[0].level, axes_t: mean(&axes_t), fit })
     };

@@ -106,7 +106,7 @@ impl Positions<'_> {
     /// # Errors
     /// Where they do not determine it.
     pub fn fit(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
-        self.found(degrees, |start, residuals| solve(start, residuals))
+        self.found(degrees, false)
     }
 
     /// What [`Positions::fit`] will find of positions that are only planned, so that the first guess is the truth: nothing is
@@ -115,14 +115,15 @@ impl Positions<'_> {
     /// # Errors
     /// Where they do not determine it.
     pub fn planned(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
-        self.found(degrees, |start, residuals| known(start, residuals))
+        self.found(degrees, true)
     }
 
-    fn found(
-        &self,
-        degrees: Degrees,
-        solve: impl Fn(&[f64], &dyn Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution>,
-    ) -> Result<Fit, NoSolution> {
+    /// What some of them say by themselves, at one temperature; `None` where they do not determine it.
+    pub(super) fn alone(&self, taken: &[Taken]) -> Option<Fit> {
+        Positions { taken, ..*self }.fit(Degrees { sensor: 0, axes: 0 }).ok()
+    }
+
+    fn found(&self, degrees: Degrees, is_planned: bool) -> Result<Fit, NoSolution> {
         let Self { plan, taken, guess, weights } = *self;
         let model = Model { plan, guess, degrees };
         let start = vec![0.0; model.count()];
@@ -142,7 +143,7 @@ impl Positions<'_> {
             all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
             all
         };
-        let solution = solve(&start, &residuals)?;
+        let solution = if is_planned { known(&start, residuals)? } else { solve(&start, residuals)? };
         let errors = model.errors(&solution.parameters);
         let from = model.count() - 3;
         let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));
