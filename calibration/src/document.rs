@@ -40,6 +40,11 @@ pub fn accelerometers(document: &Document) -> &[AccelSensor] {
     document.accel.as_ref().map_or(&[], |accel| &accel.sensor)
 }
 
+/// A curve that has one value everywhere.
+pub(crate) fn constant(value: f64) -> Curve {
+    Curve::new(Shape::Constant { value: tidy(value) })
+}
+
 /// The scale factor that a document states of an accelerometer at a temperature (°C); 1 where it states none there.
 pub(crate) fn scale_at(sensor: &AccelSensor, deg_c: f64) -> f64 {
     sensor.scale_factor.shape().at(deg_c).unwrap_or(1.0)

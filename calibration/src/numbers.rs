@@ -47,6 +47,12 @@ pub fn unit(v: [f64; 3]) -> [f64; 3] {
     v.map(|part| part / norm(v))
 }
 
+/// The same; `None` where it has none.
+pub fn direction(v: [f64; 3]) -> Option<[f64; 3]> {
+    let size = norm(v);
+    (size.is_finite() && size > 0.0).then(|| unit(v))
+}
+
 /// Each of some once, in the order of their first appearance.
 pub fn once_each<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     items.into_iter().fold(Vec::new(), |mut known, item| {

@@ -20,12 +20,10 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::GyroTick;
 use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_log::mapping::{SensorUnit, TemperatureUnit};
 use isotherm_log::message::Topic;
-use isotherm_log::offline::Offline;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::progress::Progress;
 use isotherm_log::source::Log;
@@ -78,13 +76,6 @@ enum Fed<'a> {
 impl Fed<'_> {
     fn is_accel(&self) -> bool {
         matches!(self, Self::Event(LogEvent::Accel { .. }) | Self::Frame(RawStream::Accel, _))
-    }
-
-    fn give(&self, unit: &mut Offline) {
-        match self {
-            Self::Event(event) => unit.handle(event),
-            Self::Frame(input, frame) => unit.receive(*input, frame),
-        }
     }
 }
 
@@ -257,27 +248,6 @@ impl Run {
                 Ok(())
             }
         }
-    }
-
-    /// Feeds a correction.
-    fn feed(
-        &self,
-        calibration: &Calibration,
-        watch: impl Watch,
-        mut beside: impl FnMut(&Fed<'_>),
-        mut to_unit: impl FnMut(Fed<'_>),
-    ) -> Result<(), Error> {
-        // A document of gyros alone is asked about gyros: their log may well have accelerometers.
-        let has_accelerometers = calibration.accel_count() > 0;
-        self.walk(watch, |fed| {
-            beside(&fed);
-            match fed {
-                fed if !has_accelerometers && fed.is_accel() => {}
-                Fed::Event(event) => to_unit(Fed::Event(&self.taken(&self.kept(event)))),
-                Fed::Frame(input, frame) => to_unit(Fed::Frame(input, frame)),
-            }
-            Ok(())
-        })
     }
 
     /// What a correction passed over; a refusal where nothing came out of it.

@@ -122,14 +122,19 @@ impl PositionsArgs {
         let base = &*work.base_with_accelerometers(add, || {
             Written::of(&of_run(work.run()?, self.accelerometer_unit.as_deref(), &mut *watch)?)
         })?;
-        let tracks = tracks(runs, base, watch)?;
+        let tracks = tracks_of(runs, base, watch)?;
         let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;
         analysis.warnings.extend(about_gravity.cloned());
         let document = complete(&base.document, &analysis, settings.gravity);
         let before = Written::of(&before(&base.document, &analysis, settings.gravity, work.base.is_some()))?;
         let after = Written::of(&document)?;
         let inside = judged(settings, &analysis, &analysis.poses, runs, [&before, &after], watch)?;
-        let outside = outside(settings, &analysis, &work.judges, [&before, &after, base], watch)?;
+        let mut outside = None;
+        if !work.judges.is_empty() {
+            let unseen = tracks_of(&work.judges, base, watch)?;
+            let (poses, _) = positions(&unseen, settings).map_err(Error::Refused)?;
+            outside = Some(judged(settings, &analysis, &poses, &work.judges, [&before, &after], watch)?);
+        }
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
         let report = report(
@@ -153,23 +158,8 @@ impl PositionsArgs {
     }
 }
 
-/// Positions that the fit has not seen.
-fn outside(
-    settings: &Settings,
-    analysis: &Analysis,
-    runs: &[Run],
-    [before, after, base]: [&Written; 3],
-    watch: &mut dyn Watch,
-) -> Result<Option<Vec<Judgement>>, Error> {
-    if runs.is_empty() {
-        return Ok(None);
-    }
-    let (poses, _) = positions(&tracks(runs, base, watch)?, settings).map_err(Error::Refused)?;
-    Ok(Some(judged(settings, analysis, &poses, runs, [before, after], watch)?))
-}
-
 /// Runs tick by tick, corrected with a document.
-fn tracks(runs: &[Run], written: &Written, watch: &mut dyn Watch) -> Result<Vec<Track>, Error> {
+fn tracks_of(runs: &[Run], written: &Written, watch: &mut dyn Watch) -> Result<Vec<Track>, Error> {
     runs.iter().map(|run| Track::of(run, &written.loaded, &mut *watch)).collect()
 }
 
@@ -182,7 +172,7 @@ fn judged(
     [before, after]: [&Written; 2],
     watch: &mut dyn Watch,
 ) -> Result<Vec<Judgement>, Error> {
-    let (before, after) = (tracks(runs, before, watch)?, tracks(runs, after, watch)?);
+    let (before, after) = (tracks_of(runs, before, watch)?, tracks_of(runs, after, watch)?);
     let errors = analysis.fit.stand.map(|(error, _)| error);
     Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::runs::swapped::Looks;
+use crate::runs::swapped::{Looks, Shown};
 
 fn examples() -> Vec<Finding> {
     let plateau = |from: f64, rate: [f64; 3]| Plateau {
@@ -9,15 +9,14 @@ fn examples() -> Vec<Finding> {
     };
     let found = || vec![plateau(11.0, [36.0, 0.01, -0.02]), plateau(31.0, [-36.1, 0.0, 0.0])];
     let window_s = [11.0, 19.0];
-    let looks = |order| {
-        Box::new(Looks {
-            kind: "accelerometers",
-            measure: "m/s²",
-            order,
-            mean: [0.1, 9.8, 0.02],
-            stated: [9.8, 0.1, 0.0],
-        })
+    let shown = Shown {
+        kind: "accelerometers",
+        measure: "m/s²",
+        mean: [0.1, 9.8, 0.02],
+        stated: [9.8, 0.1, 0.0],
+        deviation: 0.01,
     };
+    let looks = |order| Box::new(Looks { shown, order });
     let stated = (36.0, [0.0, 1.0, 0.0]);
     let shown = || vec![("y".to_owned(), 0.02), ("x".to_owned(), 36.0)];
     let stray = Kind::OtherPlateaus { stated: 1, turning: 2, found: found() };

@@ -169,8 +169,9 @@ impl Data {
         let white = |log: f64| Noise { white: guess * libm::exp(log), markov: None };
         let (log, least) = golden(WHITE_RANGE, |log| -self.likelihood(white(log)));
         let plain = white(log);
-        let span_s = self.span_s();
-        let typical_s = self.length_s.iter().sum::<f64>() / real(self.len().max(1));
+        // Runs are far apart: what counts is the time that was measured.
+        let span_s: f64 = self.length_s.iter().sum();
+        let typical_s = span_s / real(self.len().max(1));
         let shortest = libm::log(2.0 * typical_s);
         let longest = libm::log(span_s.max(4.0 * typical_s));
         let full = |x: [f64; 3]| Noise {
@@ -240,11 +241,6 @@ impl Data {
         plain
             .solve(Noise { white: 1.0, markov: None })
             .map_or(1.0, |solution| solution.chi_square / real(freedom))
-    }
-
-    fn span_s(&self) -> f64 {
-        // Runs are far apart: what counts is the time that was measured.
-        self.length_s.iter().sum()
     }
 
     /// The same without some of the columns.

@@ -150,15 +150,19 @@ impl Folds {
         (count >= 2.0 && weight > 0.0).then(|| (square.max(0.0) / weight + noise / count).sqrt())
     }
 
+    /// What brings a column to length one; nothing but rounding has no length.
+    fn unit(&self, column: usize) -> f64 {
+        let [size, _] = self.scale[column];
+        if size > NOTHING { 1.0 / size } else { 0.0 }
+    }
+
     /// What stands against the coefficients of columns at length one.
     fn penalty(&self, columns: &[usize], shrink: Shrink<'_>) -> DMatrix<f64> {
-        let unit =
-            |index: usize| if self.scale[index][0] > NOTHING { 1.0 / self.scale[index][0] } else { 0.0 };
         DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
             let (a, b) = (columns[i], columns[j]);
             let own =
-                if i == j { shrink.share[a] * (self.scale[a][1] * unit(a)).powi(2) + HOLD } else { 0.0 };
-            own + shrink.noise[(a, b)] * unit(a) * unit(b)
+                if i == j { shrink.share[a] * (self.scale[a][1] * self.unit(a)).powi(2) + HOLD } else { 0.0 };
+            own + shrink.noise[(a, b)] * self.unit(a) * self.unit(b)
         })
     }
 
@@ -185,10 +189,8 @@ impl Folds {
     }
 
     fn added(&self, columns: &[usize], found: &DVector<f64>, noise: &DMatrix<f64>) -> f64 {
-        let unit =
-            |index: usize| if self.scale[index][0] > NOTHING { 1.0 / self.scale[index][0] } else { 0.0 };
         let raw: Vec<(usize, f64)> =
-            columns.iter().zip(found.iter()).map(|(index, c)| (*index, c * unit(*index))).collect();
+            columns.iter().zip(found.iter()).map(|(index, c)| (*index, c * self.unit(*index))).collect();
         raw.iter().map(|&(i, a)| raw.iter().map(|&(j, b)| a * b * noise[(i, j)]).sum::<f64>()).sum()
     }
 }

@@ -51,87 +51,54 @@ impl Linear {
     }
 }
 
-/// The triangle of a design, taken apart.
-struct Factors {
-    /// What each column is multiplied with.
-    scale: DVector<f64>,
-    /// Uᵀ·Qᵀ·y in the space of the singular directions.
-    projected: DVector<f64>,
-    singular: DVector<f64>,
-    /// Singular directions, one per row.
-    directions: DMatrix<f64>,
-}
-
-impl Factors {
-    fn of(design: &DMatrix<f64>, values: &DVector<f64>, weak: Weak) -> Result<Self, Undetermined> {
-        let (rows, count) = design.shape();
-        let lengths: Vec<f64> = design.column_iter().map(|column| column.norm()).collect();
-        let (least, ridge, nothing) = match weak {
-            Weak::Refuse(least) => (least, 0.0, 0.0),
-            Weak::Ridge { share, nothing } => (0.0, share.sqrt(), nothing),
-        };
-        let refuses = matches!(weak, Weak::Refuse(_));
-        if let Some(index) = lengths.iter().position(|length| length.is_nan() || refuses && *length <= 0.0) {
-            return Err(Undetermined(index));
-        }
-        let below = if refuses { 0 } else { count };
-        if count == 0 || rows + below < count {
-            return Err(Undetermined(count.saturating_sub(1)));
-        }
-        let scale = DVector::from_iterator(
-            count,
-            lengths.iter().map(|length| if *length > nothing { 1.0 / length } else { 0.0 }),
-        );
-        let scaled = DMatrix::from_fn(rows + below, count, |i, j| {
-            if i < rows { design[(i, j)] * scale[j] } else { f64::from(u8::from(i - rows == j)) * ridge }
-        });
-        let mut right = DVector::from_fn(rows + below, |i, _| if i < rows { values[i] } else { 0.0 });
-        let qr = scaled.qr();
-        qr.q_tr_mul(&mut right);
-        let svd = qr.r().svd(true, true);
-        let (Some(u), Some(directions)) = (svd.u, svd.v_t) else { return Err(Undetermined(count - 1)) };
-        let singular = svd.singular_values;
-        let limit = least * singular.max();
-        for (value, direction) in singular.iter().zip(directions.row_iter()) {
-            if value.is_nan() || *value <= limit {
-                return Err(Undetermined(direction.transpose().icamax()));
-            }
-        }
-        Ok(Self { scale, projected: u.tr_mul(&right.rows(0, count)), singular, directions })
-    }
-
-    fn coefficients(&self) -> DVector<f64> {
-        self.directions.tr_mul(&self.projected.component_div(&self.singular)).component_mul(&self.scale)
-    }
-
-    fn inverse(&self) -> DMatrix<f64> {
-        let count = self.singular.len();
-        let mut inverse = DMatrix::zeros(count, count);
-        for (value, direction) in self.singular.iter().zip(self.directions.row_iter()) {
-            inverse += direction.tr_mul(&direction) / (value * value);
-        }
-        DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * self.scale[i] * self.scale[j])
-    }
-
-    fn log_determinant(&self) -> f64 {
-        let logarithms = self.singular.iter().zip(self.scale.iter());
-        logarithms.map(|(value, scale)| 2.0 * (libm::log(*value) - libm::log(*scale))).sum()
-    }
-}
-
 /// Solves for β.
 ///
 /// # Errors
 /// Where the rows do not determine it.
 pub fn solve(design: &DMatrix<f64>, values: &DVector<f64>, weak: Weak) -> Result<Linear, Undetermined> {
-    let factors = Factors::of(design, values, weak)?;
-    let coefficients = factors.coefficients();
-    let residual = values - design * &coefficients;
+    let (rows, count) = design.shape();
+    let lengths: Vec<f64> = design.column_iter().map(|column| column.norm()).collect();
+    let (least, ridge, nothing) = match weak {
+        Weak::Refuse(least) => (least, 0.0, 0.0),
+        Weak::Ridge { share, nothing } => (0.0, share.sqrt(), nothing),
+    };
+    let refuses = matches!(weak, Weak::Refuse(_));
+    if let Some(index) = lengths.iter().position(|length| length.is_nan() || refuses && *length <= 0.0) {
+        return Err(Undetermined(index));
+    }
+    let below = if refuses { 0 } else { count };
+    if count == 0 || rows + below < count {
+        return Err(Undetermined(count.saturating_sub(1)));
+    }
+    let scale = DVector::from_iterator(
+        count,
+        lengths.iter().map(|length| if *length > nothing { 1.0 / length } else { 0.0 }),
+    );
+    let scaled = DMatrix::from_fn(rows + below, count, |i, j| {
+        if i < rows { design[(i, j)] * scale[j] } else { f64::from(u8::from(i - rows == j)) * ridge }
+    });
+    let mut right = DVector::from_fn(rows + below, |i, _| if i < rows { values[i] } else { 0.0 });
+    let qr = scaled.qr();
+    qr.q_tr_mul(&mut right);
+    let svd = qr.r().svd(true, true);
+    let (Some(u), Some(directions)) = (svd.u, svd.v_t) else { return Err(Undetermined(count - 1)) };
+    let singular = svd.singular_values;
+    let limit = least * singular.max();
+    let mut inverse = DMatrix::zeros(count, count);
+    for (value, direction) in singular.iter().zip(directions.row_iter()) {
+        if value.is_nan() || *value <= limit {
+            return Err(Undetermined(direction.transpose().icamax()));
+        }
+        inverse += direction.tr_mul(&direction) / (value * value);
+    }
+    let projected = u.tr_mul(&right.rows(0, count));
+    let coefficients = directions.tr_mul(&projected.component_div(&singular)).component_mul(&scale);
+    let logarithms = singular.iter().zip(scale.iter());
     Ok(Linear {
-        inverse: factors.inverse(),
-        log_determinant: factors.log_determinant(),
+        inverse: DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]),
+        residual: values - design * &coefficients,
+        log_determinant: logarithms.map(|(value, scale)| 2.0 * (libm::log(*value) - libm::log(*scale))).sum(),
         coefficients,
-        residual,
     })
 }
 
@@ -141,7 +108,7 @@ pub fn solve(design: &DMatrix<f64>, values: &DVector<f64>, weak: Weak) -> Result
 /// Where the rows do not determine the coefficients.
 pub fn inverse(design: &DMatrix<f64>) -> Result<DMatrix<f64>, Undetermined> {
     let values = DVector::zeros(design.nrows());
-    Factors::of(design, &values, Weak::Refuse(SINGULAR)).map(|factors| factors.inverse())
+    solve(design, &values, Weak::Refuse(SINGULAR)).map(|found| found.inverse)
 }
 
 /// Smallest over largest singular value of a design as it stands: how well its rows spread.

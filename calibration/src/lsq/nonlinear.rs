@@ -9,7 +9,6 @@ use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::linear::{self, Undetermined};
-use crate::numbers::real;
 
 /// Step of the differences.
 const STEP: f64 = 1e-6;
@@ -34,8 +33,8 @@ pub struct Solution {
 pub enum NoSolution {
     /// The parameter with the largest part in a direction that the residuals do not depend on.
     NotDetermined(usize),
-    /// The search ended without a minimum, in the library's words.
-    NoMinimum(String),
+    /// The search ended without a minimum.
+    NoMinimum,
 }
 
 impl NoSolution {
@@ -44,8 +43,7 @@ impl NoSolution {
     pub fn words(&self, of: &str, name: impl Fn(usize) -> String, more: &str, look: &str) -> String {
         match self {
             Self::NotDetermined(index) => format!("{of} do not determine {}: {more}", name(*index)),
-            // The library's words are about its search.
-            Self::NoMinimum(_) => look.to_owned(),
+            Self::NoMinimum => look.to_owned(),
         }
     }
 }
@@ -54,11 +52,6 @@ impl Solution {
     /// Standard error of a parameter.
     pub fn sigma(&self, index: usize) -> f64 {
         self.covariance.get((index, index)).map_or(f64::NAN, |variance| variance.max(0.0).sqrt())
-    }
-
-    /// χ² per degree of freedom; `None` without any.
-    pub fn per_degree(&self) -> Option<f64> {
-        (self.degrees > 0).then(|| self.chi_square / real(self.degrees))
     }
 }
 
@@ -71,10 +64,7 @@ pub fn solve(start: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Result<So
     let (problem, report) = LevenbergMarquardt::new().with_patience(100).minimize(problem);
     let good = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
-    if !good {
-        return Err(NoSolution::NoMinimum(format!("{:?}", report.termination)));
-    }
-    solution(&problem)
+    if good { solution(&problem) } else { Err(NoSolution::NoMinimum) }
 }
 
 /// The solution where it is known beforehand: what residuals of variance one will make of its covariance.

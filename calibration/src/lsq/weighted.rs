@@ -71,10 +71,11 @@ pub fn once(
 ) -> Option<Solution> {
     let rows = Rows::of(columns, target, weights, holding);
     let count = columns.len();
-    if count == 0 || !is_enough(rows.good.len(), count) {
+    if count == 0 || rows.good.len() < 2 * count + 3 {
         return None;
     }
-    let found = linear::solve(&rows.design, &rows.values, hold(rows.weight)).ok()?;
+    let ridge = Weak::Ridge { share: RIDGE, nothing: NOTHING * rows.weight.sqrt() };
+    let found = linear::solve(&rows.design, &rows.values, ridge).ok()?;
     let residual: Vec<f64> = (0..target.len())
         .map(|row| {
             let columns = columns.iter().zip(&found.coefficients);
@@ -144,16 +145,6 @@ impl Rows {
     }
 }
 
-/// Whether so many rows can bear so many coefficients.
-fn is_enough(rows: usize, columns: usize) -> bool {
-    rows >= 2 * columns + 3
-}
-
-/// The ridge of rows whose weights have this sum.
-fn hold(weight: f64) -> Weak {
-    Weak::Ridge { share: RIDGE, nothing: NOTHING * weight.sqrt() }
-}
-
 /// By how much the variance of a coefficient grows because neighbouring residuals resemble each other.
 fn inflation(residual: &[f64], good: &[usize]) -> f64 {
     let pairs = good.iter().zip(good.iter().skip(1)).filter(|(a, b)| **b == **a + 1);
@@ -166,10 +157,15 @@ fn inflation(residual: &[f64], good: &[usize]) -> f64 {
     (1.0 + rho) / (1.0 - rho)
 }
 
+/// Sizes of what is a number and has a weight.
+fn sizes(values: &[f64], weights: &[f64]) -> Vec<f64> {
+    let known = values.iter().zip(weights).filter(|(value, weight)| value.is_finite() && **weight > 0.0);
+    known.map(|(value, _)| value.abs()).collect()
+}
+
 /// The residual that all but a few windows stay below.
 fn largest(residual: &[f64], weights: &[f64]) -> f64 {
-    let known = residual.iter().zip(weights).filter(|(left, weight)| left.is_finite() && **weight > 0.0);
-    let mut sizes: Vec<f64> = known.map(|(left, _)| left.abs()).collect();
+    let mut sizes = sizes(residual, weights);
     if sizes.is_empty() {
         return 0.0;
     }
@@ -189,9 +185,7 @@ fn spikes(residual: &[f64], weights: &[f64]) -> Vec<f64> {
     };
     let away: Vec<f64> =
         (0..residual.len()).map(|row| near(row).map_or(f64::NAN, |near| residual[row] - near)).collect();
-    let known = away.iter().zip(weights).filter(|(away, weight)| away.is_finite() && **weight > 0.0);
-    let sizes: Vec<f64> = known.map(|(away, _)| away.abs()).collect();
-    let sigma = median_if_any(&sizes)
+    let sigma = median_if_any(&sizes(&away, weights))
         .map_or(0.0, |middle| 1.4826 * middle)
         .max(BESIDE_THE_REST * largest(residual, weights));
     let weight = |away: &f64| {

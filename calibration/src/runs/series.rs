@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use isotherm_correction::sample::OutputKind;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::key::UnitId;
 
@@ -84,12 +85,10 @@ impl Series {
         };
         match event {
             LogEvent::Gyro { output, tick } => {
-                let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
-                self.gyros.push(*output, tick.sequence, lasts, &tick.readings)?;
+                self.gyros.push(*output, tick.sequence, (tick.end_time, tick.duration), &tick.readings)?;
             }
             LogEvent::Accel { output, tick } => {
-                let lasts = (tick.end_time.as_ns(), tick.duration.as_s());
-                self.accels.push(*output, tick.sequence, lasts, &tick.readings)?;
+                self.accels.push(*output, tick.sequence, (tick.end_time, tick.duration), &tick.readings)?;
             }
             LogEvent::Temperature(reading) => {
                 let channel = self.temperatures.entry(reading.channel.to_string()).or_default();
@@ -128,12 +127,12 @@ impl Ticks {
         ends.map_or(0.0, |(first, last)| seconds(last.saturating_sub(*first)))
     }
 
-    /// Adds a tick, with its end (ns) and duration (s).
+    /// Adds a tick, with its end and duration.
     fn push(
         &mut self,
         output: OutputKind,
         sequence: u64,
-        (end_ns, duration_s): (i64, f64),
+        (end, duration): (Timestamp, Span),
         readings: &[f64],
     ) -> Result<(), Error> {
         if self.output.is_none() {
@@ -149,8 +148,8 @@ impl Ticks {
                 self.output.unwrap_or(output),
             )));
         }
-        self.end_ns.push(end_ns);
-        self.duration_s.push(duration_s);
+        self.end_ns.push(end.as_ns());
+        self.duration_s.push(duration.as_s());
         self.readings.iter_mut().zip(readings).for_each(|(column, reading)| column.push(*reading));
         Ok(())
     }

@@ -11,6 +11,8 @@ use crate::report::fixed;
 
 /// Orders of three axes: the swaps of two first, which need the fewest mistakes.
 pub const ORDERS: [[usize; 3]; 5] = [[1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+/// The order of the log's columns.
+pub const AS_LOGGED: [usize; 3] = [0, 1, 2];
 /// How far from what is stated the means must be, as a share of it: 20° of gravity.
 const AWAY: f64 = 0.35;
 /// And in standard deviations of the means themselves, which a bias that moves has.
@@ -19,7 +21,7 @@ const AWAY_DEVIATIONS: f64 = 5.0;
 const LEFT: f64 = 0.25;
 
 /// What three sensors show in the mean beside what they must.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shown {
     /// Of what kind they are, as in "gyros".
     pub kind: &'static str,
@@ -42,36 +44,29 @@ impl Shown {
 
     /// Which axes look swapped: another order fits by far better than that of the log; `None` where none does.
     pub fn swapped(&self) -> Option<Looks> {
-        let off = |order: [usize; 3]| norm([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]));
-        let (as_logged, size) = (self.off(), norm(self.stated));
-        if !self.is_away() {
-            return None;
-        }
+        let off = |order| self.off(order);
+        let (as_logged, size) = (off(AS_LOGGED), norm(self.stated));
         let fits = |order: &[usize; 3]| off(*order) < LEFT * as_logged;
-        let best = ORDERS.into_iter().filter(fits).reduce(|best, order| {
-            if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
-        })?;
-        Some(self.looks(Some(best)))
+        let best =
+            ORDERS.into_iter().filter(|order| self.is_away() && fits(order)).reduce(|best, order| {
+                if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
+            })?;
+        Some(Looks { shown: *self, order: Some(best) })
     }
 
     /// That the means are far from what they must be though no order looks right; `None` where they are near.
     pub fn far(&self) -> Option<Looks> {
-        (self.is_away() && self.swapped().is_none()).then(|| self.looks(None))
+        (self.is_away() && self.swapped().is_none()).then_some(Looks { shown: *self, order: None })
     }
 
-    fn looks(&self, order: Option<[usize; 3]>) -> Looks {
-        let Self { kind, measure, mean, stated, .. } = *self;
-        Looks { kind, measure, order, mean, stated }
-    }
-
-    /// How far the means are from what they must be.
-    fn off(&self) -> f64 {
-        norm([0, 1, 2].map(|axis| self.mean[axis] - self.stated[axis]))
+    /// How far the means, in an order, are from what they must be.
+    fn off(&self, order: [usize; 3]) -> f64 {
+        norm([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]))
     }
 
     /// Whether that is too far; false for NaN too.
     fn is_away(&self) -> bool {
-        let off = self.off();
+        let off = self.off(AS_LOGGED);
         off > AWAY * norm(self.stated) && off > AWAY_DEVIATIONS * self.deviation
     }
 }
@@ -79,21 +74,15 @@ impl Shown {
 /// Sensors that do not show what they must in the stated attitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looks {
-    /// Of what kind they are, as in "gyros".
-    pub kind: &'static str,
-    /// Symbol of the unit of measure.
-    pub measure: &'static str,
+    /// What they show.
+    pub shown: Shown,
     /// The order in which they fit; `None` where they fit in none.
     pub order: Option<[usize; 3]>,
-    /// Their means.
-    pub mean: [f64; 3],
-    /// What they would be.
-    pub stated: [f64; 3],
 }
 
 impl Display for Looks {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { kind, measure, order, mean, stated } = self;
+        let Self { shown: Shown { kind, measure, mean, stated, .. }, order } = self;
         // As many places as the largest of them needs for three digits: what is next to nothing is zero.
         let largest = mean.iter().chain(stated).map(|part| part.abs()).fold(0.0, f64::max);
         let places =

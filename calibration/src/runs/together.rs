@@ -67,45 +67,55 @@ impl Run {
         &self,
         loaded: &[Loaded],
         watch: impl Watch,
-        beside: impl FnMut(&Fed<'_>),
-        each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
+        mut beside: impl FnMut(&Fed<'_>),
+        mut each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
     ) -> Result<Vec<Troubles>, Error> {
         let Some(first) = loaded.first() else { return Ok(Vec::new()) };
-        let mut units = Together::new(loaded, each);
-        self.feed(&first.calibration, watch, beside, |fed| units.take(&fed))?;
+        // A document of gyros alone is asked about gyros: their log may well have accelerometers.
+        let has_accelerometers = first.calibration.accel_count() > 0;
+        let mut units = Together::new(loaded);
+        self.walk(watch, |fed| {
+            beside(&fed);
+            match fed {
+                fed if !has_accelerometers && fed.is_accel() => {}
+                Fed::Event(event) => units.handle(&self.taken(&self.kept(event))),
+                Fed::Frame(input, frame) => {
+                    units.units.iter_mut().for_each(|unit| unit.receive(input, frame));
+                }
+            }
+            units.give_out(&mut each);
+            Ok(())
+        })?;
         units.units.iter_mut().for_each(Offline::finish);
-        units.give_out();
+        units.give_out(&mut each);
         units.units.iter().map(|unit| self.judge_troubles(units.count, unit.troubles())).collect()
     }
 }
 
 /// Units that are fed with the same readings.
-struct Together<F> {
+struct Together {
     units: Vec<Offline>,
     raw: VecDeque<GyroTick>,
     corrected: Vec<VecDeque<CorrectedTick>>,
-    each: F,
     count: u64,
 }
 
-impl<F: FnMut(&GyroTick, &[CorrectedTick], &Unit)> Together<F> {
-    fn new(loaded: &[Loaded], each: F) -> Self {
-        let units: Vec<Offline> =
-            loaded.iter().map(|loaded| Offline::new(loaded, UnitSettings::default())).collect();
-        let corrected = units.iter().map(|_| VecDeque::new()).collect();
-        Self { units, raw: VecDeque::new(), corrected, each, count: 0 }
+impl Together {
+    fn new(loaded: &[Loaded]) -> Self {
+        let unit = |loaded| Offline::new(loaded, UnitSettings::default());
+        let corrected = vec![VecDeque::new(); loaded.len()];
+        Self { units: loaded.iter().map(unit).collect(), raw: VecDeque::new(), corrected, count: 0 }
     }
 
-    fn take(&mut self, fed: &Fed<'_>) {
-        if let Fed::Event(LogEvent::Gyro { tick, .. }) = fed {
+    fn handle(&mut self, event: &LogEvent) {
+        if let LogEvent::Gyro { tick, .. } = event {
             self.raw.push_back(tick.clone());
         }
-        self.units.iter_mut().for_each(|unit| fed.give(unit));
-        self.give_out();
+        self.units.iter_mut().for_each(|unit| unit.handle(event));
     }
 
     /// Gives out what all of them have.
-    fn give_out(&mut self) {
+    fn give_out(&mut self, mut each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit)) {
         for (unit, ticks) in self.units.iter_mut().zip(&mut self.corrected) {
             ticks.extend(unit.take());
         }
@@ -115,13 +125,10 @@ impl<F: FnMut(&GyroTick, &[CorrectedTick], &Unit)> Together<F> {
             let (Some(first), Some(unit)) = (ticks.first(), self.units.first()) else { return };
             let (sequence, end) = (first.sequence, first.end_time);
             let found = self.raw.iter().position(|raw| raw.sequence == sequence && raw.end_time == end);
-            if let Some(found) = found {
-                // Ticks before it were refused, or came too late.
-                self.raw.drain(..found);
-                if let Some(raw) = self.raw.pop_front() {
-                    self.count += 1;
-                    (self.each)(&raw, &ticks, unit.unit());
-                }
+            // Ticks before it were refused, or came too late.
+            if let Some(raw) = found.and_then(|found| self.raw.drain(..=found).next_back()) {
+                self.count += 1;
+                each(&raw, &ticks, unit.unit());
             }
         }
     }

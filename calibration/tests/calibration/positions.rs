@@ -29,13 +29,13 @@ fn twelve_positions_with_random_stand_errors_find_the_axes_within_their_covarian
         let how = quick(seed);
         let found = found_in_room(&instrument, &plan, &document, &how);
         let error = away(&found, &truth, 0, false);
-        axes.push(chi_square(&error, found.fit.axes_covariance(&plan, 0)));
+        axes.push(chi_square(&error, found.fit.axes_covariance(0)));
         let from = found.fit.solution.parameters.len() - 3;
         let block = found.fit.solution.covariance.view((from, from), (3, 3)) * (SMALL * SMALL);
         let errors = DVector::from_fn(3, |i, _| found.fit.stand[i].0 - how.errors[i]);
         stands.push(chi_square(&errors, block.into_owned()));
         fits.push(found.fit.solution.chi_square);
-        let sigma = found.fit.axis_sigma(&plan, 0, 0)[1] / ARCSEC;
+        let sigma = found.fit.axis_sigma(0, 0)[1] / ARCSEC;
         assert!(sigma < 4.0, "{sigma}″: four positions for every element");
     }
     plausible("axes", &axes, 6.0);
@@ -75,18 +75,17 @@ fn over_temperature(seed: u64, bend: f64) -> (Analysis, [Rows; 2]) {
 
 #[test]
 fn linear_and_quadratic_axes_over_temperature_are_recovered() {
-    let plan = Plan::twelve();
     let (mut straight, mut bent, mut slopes_of, mut bends_of) = (0, 0, Vec::new(), Vec::new());
     for seed in 0..40 {
         let (found, [slopes, _]) = over_temperature(seed, 0.0);
         let scaled = slopes.map(|row| row.map(|c| c * found.half_deg_c));
-        slopes_of.push(chi_square(&away(&found, &scaled, 1, false), found.fit.axes_covariance(&plan, 1)));
+        slopes_of.push(chi_square(&away(&found, &scaled, 1, false), found.fit.axes_covariance(1)));
         straight += usize::from(found.quadratic.as_ref().unwrap().3 > 1e-3);
         let (found, [_, bends]) = over_temperature(seed, 1.0);
         let quadratic = found.quadratic.as_ref().unwrap();
         bent += usize::from(quadratic.3 < 1e-3);
         let scaled = bends.map(|row| row.map(|c| c * found.half_deg_c * found.half_deg_c));
-        bends_of.push(chi_square(&away(&found, &scaled, 2, true), quadratic.0.axes_covariance(&plan, 2)));
+        bends_of.push(chi_square(&away(&found, &scaled, 2, true), quadratic.0.axes_covariance(2)));
     }
     assert!(straight >= 39, "{straight} of 40 straight ones are seen as straight");
     assert_eq!(bent, 40, "40″ at the ends are seen by every seed");
@@ -184,7 +183,7 @@ fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
             "{name}: {:?}",
             found.warnings
         );
-        let chi_square = chi_square(&away(&found, &truth, 0, false), found.fit.axes_covariance(&plan, 0));
+        let chi_square = chi_square(&away(&found, &truth, 0, false), found.fit.axes_covariance(0));
         assert!(chi_square < 22.5, "{name}: χ² {chi_square} with 6 degrees, 0.1 %");
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use isotherm_log::ros2::{Header, Time, time};
 use isotherm_protocol::digest::Digits;
-use isotherm_protocol::status::{Output, State, Status};
+use isotherm_protocol::status::{Output, State};
 use tokio::time::MissedTickBehavior;
 use zenoh::Session;
 

@@ -10,7 +10,7 @@ use crate::fits::drift::HOUR_S;
 use crate::fits::impact::estimate::TICK_S;
 use crate::fits::impact::logged;
 use crate::fits::impact::models::Choice;
-use crate::fits::impact::monte_carlo::{Voyages, sail_all};
+use crate::fits::impact::monte_carlo::sail_all;
 use crate::fits::impact::report::{Row, Sailed};
 use crate::fits::impact::scenario::{Drift, Voyage};
 use crate::numbers::real;
@@ -63,10 +63,8 @@ impl ImpactArgs {
         let bar = Bar::at_work("sailing");
         let sailed = sail_all(voyage, parts, on_top, &seeds);
         bar.finish();
-        let Voyages { first, spread } = sailed?;
-        let rows = first.into_iter().zip(spread);
-        let rows =
-            rows.map(|(course, spread)| Row { case: "all gyros".to_owned(), course, spread: Some(spread) });
+        let row = |(course, spread)| Row { case: "all gyros".to_owned(), course, spread: Some(spread) };
+        let rows = sailed?.into_iter().map(row).collect();
         let trend =
             self.trend.map(|trend| format!(", with a trend of {trend} °/h² on top")).unwrap_or_default();
         let from = self.document.as_ref().map_or_else(
@@ -88,14 +86,7 @@ impl ImpactArgs {
                     .to_owned(),
             );
         }
-        Ok(Sailed {
-            voyage: *voyage,
-            source,
-            seeds: seeds.len(),
-            rows: rows.collect(),
-            notes,
-            choices: Vec::new(),
-        })
+        Ok(Sailed { voyage: *voyage, source, seeds: seeds.len(), rows, notes, choices: Vec::new() })
     }
 
     pub(super) fn sail_log(

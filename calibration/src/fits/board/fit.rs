@@ -12,7 +12,7 @@ use crate::fits::thermal::samples::Samples;
 use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
 use crate::numbers::{dot, hull, once_each};
-use crate::report::{Curve, Judged, Report, Rest, Sigmas, beside, fixed, judge, per_deg_c, short};
+use crate::report::{Curve, Judged, Report, Rest, Sigmas, Verdict, beside, fixed, judge, per_deg_c, short};
 use crate::runs::table::Rows as Windows;
 use crate::runs::{Run, Watch};
 
@@ -94,16 +94,13 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     let mains: Vec<usize> =
         wanted.base.accel.iter().flat_map(|accel| accel.orientation.rows.iter().map(main_axis)).collect();
     let mut verdicts = Curve::verdicts(&curves);
-    let worse: Vec<usize> = (0..3)
-        .filter(|axis| {
-            verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == output_name(false, *axis))
-        })
-        .collect();
-    if !worse.is_empty() {
-        for (found, axis) in found.iter_mut().zip(&mains).filter(|(_, axis)| worse.contains(axis)) {
-            if found.is_ok() {
-                *found = Err(AccelKind::MadeWorse { axis: *axis });
-            }
+    let refused = |verdict: &&Verdict| !verdict.accepted;
+    let is_worse =
+        |axis| verdicts.iter().filter(refused).any(|verdict| verdict.of == output_name(false, axis));
+    if (0..3).any(is_worse) {
+        let fitted = found.iter_mut().zip(&mains).filter(|(found, _)| found.is_ok());
+        for (found, axis) in fitted.filter(|(_, axis)| is_worse(**axis)) {
+            *found = Err(AccelKind::MadeWorse { axis: *axis });
         }
         written = Written::of(&with(wanted.base, &found))?;
         let again = judged(wanted, [&given, &written], &mut watch)?;

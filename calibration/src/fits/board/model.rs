@@ -83,11 +83,8 @@ impl Rows {
         }
         let middle = 0.5 * (input[0] + input[1]);
         let [low, high] = [false, true].map(|above| {
-            ends(
-                rows.iter()
-                    .filter(|row| (self.input[**row] > middle) == above)
-                    .map(|row| self.board_deg_c[*row]),
-            )
+            let own = rows.iter().filter(|row| (self.input[**row] > middle) == above);
+            ends(own.map(|row| self.board_deg_c[*row]))
         });
         let shared = low[1].min(high[1]) - low[0].max(high[0]);
         if shared < LEAST_RANGE_DEG_C {

@@ -3,11 +3,13 @@
 //! The estimator is `isotherm_correction::drift::DriftEstimator` itself, fed tick by tick as the service feeds it: the
 //! residual rate of each gyro in, a reference each minute while the true rate is known, what it would subtract out.
 
-use crate::axes::AXES;
 use isotherm_correction::drift::{DriftEstimator, DriftModel, DriftParts, DriftSettings, Reference};
 use isotherm_correction::observation::{GyroSeen, Observation};
 use isotherm_correction::sample::{SensorFlags, Sensors};
 use isotherm_correction::units::{Span, Timestamp};
+
+use super::scenario::{Drift, Voyage};
+use crate::axes::AXES;
 
 /// Length of a tick (s); drifts take hours.
 pub const TICK_S: f64 = 10.0;
@@ -16,29 +18,17 @@ pub const REFERENCE_S: f64 = 60.0;
 /// Ticks of a reference.
 pub const REFERENCE_TICKS: usize = 6;
 
-/// How the estimator is fed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Aiding {
-    /// Ticks of the calibration, in which the rate of every gyro is known.
-    pub calibration_ticks: usize,
-    /// Whether the rates of the level gyros stay known afterwards, through the velocity log.
-    pub level_afterwards: bool,
-    /// Standard error of a reference (rad/s).
-    pub reference_sigma_rad_per_s: f64,
-}
-
 /// What is left of the drifts (rad/s) of the gyros x, y, z after the estimate, tick by tick.
 ///
-/// `drift` is what the estimate is to follow; `measured` is the same with the noise of gyros and references. `parts` is what
-/// the estimator is to expect of each.
+/// In the voyage's calibration the rate of every gyro is known, afterwards that of the level ones, where a velocity log aids them. `parts`
+/// is what the estimator is to expect of each.
 ///
 /// # Errors
 /// Everything that is wrong with the parts.
 pub fn residual(
-    drift: &[[f64; 3]],
-    measured: &[[f64; 3]],
+    voyage: &Voyage,
+    drift: &Drift,
     parts: &[DriftParts; 3],
-    aiding: &Aiding,
 ) -> Result<Vec<[f64; 3]>, Vec<String>> {
     let mut errors = Vec::new();
     let mut models = Vec::new();
@@ -55,15 +45,15 @@ pub fn residual(
     // One estimator per gyro: a reference is for all gyros of an estimator, and the azimuth's ends with the calibration.
     let mut estimators: Vec<DriftEstimator> =
         models.into_iter().map(|model| DriftEstimator::new(&[Some(model)], settings)).collect();
-    let mut left = Vec::with_capacity(drift.len());
+    let mut left = Vec::with_capacity(drift.truth.len());
     let mut end = Timestamp::default();
     let tick = Span::from_s(TICK_S);
     let project = |_: [f64; 3]| std::iter::once(0.0).collect::<Sensors<f64>>();
-    for (index, (drift, measured)) in drift.iter().zip(measured).enumerate() {
+    for (index, (truth, measured)) in drift.truth.iter().zip(&drift.measured).enumerate() {
         end = end + tick;
-        let mut of_tick = *drift;
+        let mut of_tick = *truth;
         for (axis, estimator) in estimators.iter_mut().enumerate() {
-            let known = index < aiding.calibration_ticks || (axis < 2 && aiding.level_afterwards);
+            let known = index < voyage.calibration_ticks() || (axis < 2 && voyage.log_aids_level);
             estimator.advance(end, false, &project);
             let gyro = GyroSeen { rate: measured[axis], flags: SensorFlags::VALID, ..GyroSeen::default() };
             let observation = Observation {
@@ -80,7 +70,7 @@ pub fn residual(
                     start: end - Span::from_s(REFERENCE_S),
                     end,
                     angular_rate: [0.0; 3],
-                    sigma: aiding.reference_sigma_rad_per_s,
+                    sigma: voyage.reference_sigma_rad_per_s,
                 };
                 // It is as long as one may be, and of a time that is kept.
                 if let Err(refusal) = estimator.submit_at_rest(&reference) {

@@ -10,6 +10,7 @@
 
 use isotherm_pages::Table;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::estimate::TICK_S;
 use super::scenario::{Drift, Voyage};
@@ -97,48 +98,24 @@ impl Choice {
     }
 }
 
-/// A row of 002's table 3: position errors of a voyage with the drift of a real gyro.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Voyaged {
-    /// The gyro.
-    pub gyro: &'static str,
-    /// Which of its starts.
-    pub start: u32,
-    /// Position error with model 1 (km).
-    pub existing_km: f64,
-    /// With the model with trend (km).
-    pub trend_km: f64,
-}
-
-const fn row(gyro: &'static str, start: u32, existing_km: f64, trend_km: f64) -> Voyaged {
-    Voyaged { gyro, start, existing_km, trend_km }
-}
-
-/// 002's table 3.
-pub const TABLE_3: [Voyaged; 18] = [
-    row("06011", 1, 0.81, 0.31),
-    row("06011", 2, 0.4, 0.2),
-    row("06011", 3, 0.28, 0.01),
-    row("07612", 1, 0.52, 0.10),
-    row("07612", 2, 17.2, 2.6),
-    row("07612", 3, 1.10, 0.08),
-    row("08112", 1, 0.41, 0.03),
-    row("08112", 2, 1.21, 0.1),
-    row("08112", 3, 1.11, 0.07),
-    row("08212", 1, 0.21, 0.03),
-    row("08212", 2, 0.13, 0.01),
-    row("08212", 3, 0.10, 0.01),
-    row("08612", 1, 0.07, 0.01),
-    row("08612", 2, 0.11, 0.02),
-    row("08612", 3, 0.22, 0.01),
-    row("08712", 1, 0.85, 0.05),
-    row("08712", 2, 0.95, 0.06),
-    row("08712", 3, 1.10, 0.06),
+/// 002's table 3: position errors (km) of three voyages with the drift of each of six real gyros, with model 1 and with trend.
+const TABLE_3: [(&str, [[f64; 2]; 3]); 6] = [
+    ("06011", [[0.81, 0.31], [0.4, 0.2], [0.28, 0.01]]),
+    ("07612", [[0.52, 0.10], [17.2, 2.6], [1.10, 0.08]]),
+    ("08112", [[0.41, 0.03], [1.21, 0.1], [1.11, 0.07]]),
+    ("08212", [[0.21, 0.03], [0.13, 0.01], [0.10, 0.01]]),
+    ("08612", [[0.07, 0.01], [0.11, 0.02], [0.22, 0.01]]),
+    ("08712", [[0.85, 0.05], [0.95, 0.06], [1.10, 0.06]]),
 ];
+
+/// Its rows: gyro, number of the start, both errors.
+fn voyages() -> impl Iterator<Item = (&'static str, u32, [f64; 2])> {
+    TABLE_3.into_iter().flat_map(|(gyro, starts)| (1..).zip(starts).map(move |(start, km)| (gyro, start, km)))
+}
 
 /// Least, middle and largest factor by which the model with trend is better in table 3.
 pub fn table_3_gains() -> [f64; 3] {
-    let mut gains = TABLE_3.map(|row| row.existing_km / row.trend_km);
+    let mut gains: Vec<f64> = voyages().map(|(.., [existing, trend])| existing / trend).collect();
     gains.sort_unstable_by(f64::total_cmp);
     [gains[0], 0.5 * (gains[8] + gains[9]), gains[17]]
 }
@@ -146,16 +123,17 @@ pub fn table_3_gains() -> [f64; 3] {
 /// Table 3 for the page.
 pub fn table_3() -> Table {
     let head = ["gyro", "start", "model 1, km", "with trend, km", "better by"];
-    let row = |row: &Voyaged| {
-        vec![
-            row.gyro.to_owned(),
-            row.start.to_string(),
-            row.existing_km.to_string(),
-            row.trend_km.to_string(),
-            format!("{:.1}×", row.existing_km / row.trend_km),
-        ]
+    let row = |(gyro, start, [existing, trend]): (&str, u32, [f64; 2])| {
+        let better = format!("{:.1}×", existing / trend);
+        vec![gyro.to_owned(), start.to_string(), existing.to_string(), trend.to_string(), better]
     };
-    Table::of(head, TABLE_3.iter().map(row))
+    Table::of(head, voyages().map(row))
+}
+
+/// Table 3 for the JSON.
+pub fn table_3_json() -> Value {
+    let row = |(gyro, start, [existing, trend]): (&str, u32, [f64; 2])| json!({ "gyro": gyro, "start": start, "existing_km": existing, "trend_km": trend });
+    voyages().map(row).collect()
 }
 
 #[cfg(test)]

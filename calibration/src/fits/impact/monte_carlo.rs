@@ -84,16 +84,8 @@ pub struct Spread {
     pub within_95_percent: Figures,
 }
 
-/// Many voyages.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Voyages {
-    /// By [`CARES`], the first seed's.
-    pub first: Vec<Course>,
-    /// By [`CARES`].
-    pub spread: Vec<Spread>,
-}
-
-/// Sails once per seed, with the straight `trend` (rad/s²) beside what the parts say.
+/// Sails once per seed, with the straight `trend` (rad/s²) beside what the parts say: by [`CARES`] the first seed's course, and what
+/// all of them came to.
 ///
 /// # Errors
 /// [`Error::Refused`]: everything that is wrong with the parts.
@@ -102,7 +94,7 @@ pub fn sail_all(
     parts: &[DriftParts; 3],
     trend: [f64; 3],
     seeds: &[u64],
-) -> Result<Voyages, Error> {
+) -> Result<Vec<(Course, Spread)>, Error> {
     let all = in_parallel(
         seeds,
         |_| (),
@@ -120,7 +112,7 @@ pub fn sail_all(
             first = courses;
         }
     }
-    Ok(Voyages { first, spread: figures.iter().map(|figures| spread(figures)).collect() })
+    Ok(first.into_iter().zip(figures.iter().map(|figures| spread(figures))).collect())
 }
 
 fn spread(figures: &[Figures]) -> Spread {

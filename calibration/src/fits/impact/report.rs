@@ -6,7 +6,7 @@ use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use serde_json::{Value, json};
 
 use super::ins::Errors;
-use super::models::{Choice, TABLE_3, table_3, table_3_gains};
+use super::models::{Choice, table_3, table_3_gains, table_3_json};
 use super::monte_carlo::Spread;
 use super::scenario::{CARES, Care, Course, Drift, Figures, Voyage};
 use crate::axes::AXES;
@@ -108,7 +108,7 @@ impl Sailed {
             "columns_of_points": ["hours", "heading_arcmin", "north_m", "east_m", "radial_m"],
             "rows": self.rows.iter().map(Row::to_json).collect::<Vec<_>>(),
             "models": self.choices,
-            "table_3": TABLE_3,
+            "table_3": table_3_json(),
         });
         report
     }
@@ -185,43 +185,36 @@ impl Sailed {
     fn said_of_models(&self) -> Vec<String> {
         let [least, median, most] = table_3_gains();
         let paper = format!(
-            "002's table 3, {} starts of six gyros: its model with trend, which has no Markov part, cuts the \
-             position error {least:.0}…{most:.0}×, {median:.1}× in the middle. It is worse if the drift has one: \
-             let the likelihood of a log choose.",
-            TABLE_3.len()
+            "002's table 3, 18 starts of six gyros: its model with trend, which has no Markov part, cuts the position \
+             error {least:.0}…{most:.0}×, {median:.1}× in the middle. It is worse if the drift has one: let the \
+             likelihood of a log choose."
         );
         let chosen = self.choices.iter().map(Choice::words);
         chosen.chain([paper]).collect()
     }
 
     fn chart(&self, case: &str) -> Chart {
-        let curves = |of: &dyn Fn(&Course) -> Vec<(f64, f64)>| {
+        let rows = || self.rows.iter().filter(|row| row.case == case);
+        let panel = |title: &str, measure: &str, of: &dyn Fn(&Errors, [f64; 3]) -> f64| {
+            let curve = |(row, ink): (&Row, Ink)| {
+                let points = row.course.points.iter().zip(&row.course.left);
+                let points = points.map(|((hours, errors), left)| (*hours, of(errors, *left)));
+                Series::line(row.course.care.words(), ink, points)
+            };
             let inks = [Ink::Third, Ink::Second, Ink::First, Ink::Fourth];
-            let rows = self.rows.iter().filter(|row| row.case == case).zip(inks);
-            rows.map(|(row, ink)| Series::line(row.course.care.words(), ink, of(&row.course)))
-                .collect::<Vec<_>>()
-        };
-        let errors = |of: fn(&Errors) -> f64| {
-            move |course: &Course| {
-                course.points.iter().map(|(hours, errors)| (*hours, of(errors))).collect::<Vec<_>>()
-            }
+            Panel::of(title, measure, HEIGHT, rows().zip(inks).map(curve).collect())
         };
         // The gyro of which most is left.
-        let rows = || self.rows.iter().filter(|row| row.case == case);
         let most = |axis: usize| {
             let left = rows().flat_map(|row| row.course.left.iter());
             left.map(|left| left[axis].abs()).fold(0.0, f64::max)
         };
         let axis = [2, 0, 1].into_iter().max_by(|a, b| most(*a).total_cmp(&most(*b))).unwrap_or(2);
-        let left = |course: &Course| {
-            let left = course.points.iter().zip(&course.left);
-            left.map(|((hours, _), left)| (*hours, left[axis] * DEG_PER_H_IN_RAD_PER_S)).collect::<Vec<_>>()
-        };
         let title = format!("remaining drift of gyro {}", AXES[axis]);
         let panels = vec![
-            Panel::of("radial position error", "m", HEIGHT, curves(&errors(Errors::radial_m))),
-            Panel::of("heading error", "′", HEIGHT, curves(&errors(Errors::heading_arcmin))),
-            Panel::of(title, "°/h", HEIGHT, curves(&left)),
+            panel("radial position error", "m", &|errors, _| errors.radial_m()),
+            panel("heading error", "′", &|errors, _| errors.heading_arcmin()),
+            panel(&title, "°/h", &|_, left| left[axis] * DEG_PER_H_IN_RAD_PER_S),
         ];
         let x = Axis::of("time since departure", "h");
         Chart::of(format!("{case}: errors since departure."), x, panels)

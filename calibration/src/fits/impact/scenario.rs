@@ -4,7 +4,7 @@ use clap::{ArgAction, Args};
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 
-use super::estimate::{Aiding, TICK_S, residual};
+use super::estimate::{TICK_S, residual};
 use super::ins::{Errors, GREATEST_LATITUDE_DEG, Ins, TURN_RATIO};
 use crate::error::Error;
 use crate::limits::within;
@@ -141,31 +141,21 @@ impl Voyage {
     /// [`Error::Refused`]: everything that is wrong with the parts.
     pub fn sail(&self, care: Care, drift: &Drift, parts: &[DriftParts; 3]) -> Result<Course, Error> {
         let departure = self.calibration_ticks();
-        let left: Vec<[f64; 3]> = match care {
-            Care::Held => {
-                let held = drift.held;
-                let less = |drift: &[f64; 3]| [drift[0] - held[0], drift[1] - held[1], drift[2] - held[2]];
-                drift.truth.iter().map(less).collect()
+        let expected = match care {
+            Care::Held => None,
+            Care::WithoutTrend => {
+                Some(parts.map(|parts| DriftParts { trend_sigma_rad_per_s2: 0.0, ..parts }))
             }
-            Care::WithoutTrend | Care::WithTrend | Care::TrendAlone => {
-                let aiding = Aiding {
-                    calibration_ticks: departure,
-                    level_afterwards: self.log_aids_level,
-                    reference_sigma_rad_per_s: self.reference_sigma_rad_per_s,
-                };
-                let parts = match care {
-                    Care::WithTrend => *parts,
-                    Care::TrendAlone => parts.map(|parts| DriftParts { sigma_rad_per_s: 0.0, ..parts }),
-                    Care::Held | Care::WithoutTrend => {
-                        parts.map(|parts| DriftParts { trend_sigma_rad_per_s2: 0.0, ..parts })
-                    }
-                };
-                residual(&drift.truth, &drift.measured, &parts, &aiding).map_err(Error::Refused)?
-            }
+            Care::WithTrend => Some(*parts),
+            Care::TrendAlone => Some(parts.map(|parts| DriftParts { sigma_rad_per_s: 0.0, ..parts })),
+        };
+        let less_held = |rates: &[f64; 3]| [0, 1, 2].map(|axis| rates[axis] - drift.held[axis]);
+        let left: Vec<[f64; 3]> = match expected {
+            None => drift.truth.iter().map(less_held).collect(),
+            Some(parts) => residual(self, drift, &parts).map_err(Error::Refused)?,
         };
         let alone = left.get(departure..).unwrap_or(&[]);
-        let step_s = STEP_S;
-        let mut ins = Ins::new(self.latitude_deg, self.turn_ratio, step_s);
+        let mut ins = Ins::new(self.latitude_deg, self.turn_ratio, STEP_S);
         let (mut points, mut kept) = (Vec::new(), Vec::new());
         let mut hours = 0.0;
         let last = alone.len() / STEP_TICKS;
@@ -175,7 +165,7 @@ impl Voyage {
                 mean.iter_mut().zip(drift).for_each(|(sum, drift)| *sum += drift * TICK_S / STEP_S);
             }
             ins.step(mean);
-            hours += step_s / 3600.0;
+            hours += STEP_S / 3600.0;
             if (index + 1) % POINT_STEPS == 0 || index + 1 == last {
                 points.push((hours, ins.errors()));
                 kept.push(mean);

@@ -107,7 +107,7 @@ impl Budget {
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
         let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights };
         let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
-        let covariance = found.axes_covariance(plan, 0);
+        let covariance = found.axes_covariance(0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / real(sigma.len())).sqrt();
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
@@ -121,28 +121,23 @@ impl Budget {
     }
 
     /// What this plan comes to.
-    fn words(&self, plan: &Plan, levelling_rad: f64) -> String {
+    fn words(plan: &Plan, known: Option<[f64; 2]>) -> String {
         let count = counted(plan.positions.len(), "position", "positions");
-        if let Some([known, later]) = self.known_by(plan, levelling_rad) {
+        if let Some([known, later]) = known {
             return format!(
                 "an axis will be known to {known:.1}″ (one sigma) by the plan's {count}, to {later:.1}″ with hysteresis, \
                  housing and measured temperature"
             );
         }
         let all: Vec<usize> = (0..plan.positions.len()).collect();
-        let lacking = unseen(plan, &all);
-        let lacking = if lacking.is_empty() {
-            "they do not spread enough".to_owned()
-        } else {
-            format!("none has {}", lacking.join(", "))
-        };
+        let lacking = unseen(plan, &all, "none", "they do not spread enough");
         format!("the plan's {count} will not determine C: {lacking}. Show each case axis up and down")
     }
 
     /// All that is said of it.
     pub fn report(&self, plan: &Plan, levelling_rad: f64) -> Report {
-        let words = self.words(plan, levelling_rad);
-        let mut report = Report::saying("Error budget of positions", "budget", words);
+        let known = self.known_by(plan, levelling_rad);
+        let mut report = Report::saying("Error budget of positions", "budget", Self::words(plan, known));
         let formula = "By the formula of 004, which adds its errors independent of the plan";
         report.notes.push(format!("{formula}: {:.1}″.", self.total_arcsec()));
         let typical =
@@ -171,7 +166,7 @@ impl Budget {
             "total_arcsec": self.total_arcsec(),
             "positions": plan.positions.len(),
             "determined": of_plan.is_some(),
-            "known_arcsec": self.known_by(plan, levelling_rad).map(|[_, later]| later),
+            "known_arcsec": known.map(|[_, later]| later),
             "fit_mean_arcsec": of_plan.map(|[mean, _]| mean),
             "fit_largest_arcsec": of_plan.map(|[_, largest]| largest),
         });

@@ -63,8 +63,18 @@ pub(super) fn shown(analysis: &Analysis) -> Vec<(usize, usize)> {
     sensors.flat_map(|(index, sensor)| across(sensor.axis[0]).map(move |i| (index, i))).collect()
 }
 
+/// An element of C at each temperature by itself with its standard error (″); `None` where the positions of one do not tell.
+pub(super) fn by_level(analysis: &Analysis, (index, i): (usize, usize)) -> Vec<(f64, Option<[f64; 2]>)> {
+    let found = |fit: &Fit| {
+        let value = fit.sensors[index].axis[0][i] * ARCSEC_PER_RAD;
+        [value, fit.axis_sigma(index, 0)[i] * ARCSEC_PER_RAD * analysis.widened]
+    };
+    let levels = analysis.levels_deg_c.iter().zip(&analysis.of_level);
+    levels.map(|(deg_c, fit)| (*deg_c, fit.as_ref().map(found))).collect()
+}
+
 /// Elements of C over temperature.
-pub(super) fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[String]) -> Chart {
+pub(super) fn axes_chart(analysis: &Analysis, names: &[String]) -> Chart {
     let panel = |(index, i): (usize, usize)| {
         let curve = |fit: &Fit| -> Vec<(f64, f64)> {
             let value = |deg_c: f64| {
@@ -73,20 +83,12 @@ pub(super) fn axes_chart(analysis: &Analysis, settings: &Settings, names: &[Stri
             };
             over(analysis).into_iter().map(value).collect()
         };
-        let by_level = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(|(deg_c, fit)| {
-            Some((*deg_c, fit.as_ref()?.sensors[index].axis[0][i] * ARCSEC_PER_RAD))
-        });
-        let bar = |(deg_c, fit): (&f64, &Option<Fit>)| {
-            let fit = fit.as_ref()?;
-            let value = fit.sensors[index].axis[0][i] * ARCSEC_PER_RAD;
-            let sigma = fit.axis_sigma(&settings.plan, index, 0)[i] * ARCSEC_PER_RAD * analysis.widened;
-            Some((*deg_c, [value, sigma]))
-        };
-        let known = analysis.levels_deg_c.iter().zip(&analysis.of_level).filter_map(bar);
-
+        let known = by_level(analysis, (index, i)).into_iter();
+        let known: Vec<(f64, [f64; 2])> = known.filter_map(|(deg_c, found)| Some((deg_c, found?))).collect();
+        let dots = known.iter().map(|(deg_c, [value, _])| (*deg_c, *value));
         let mut content = vec![
-            Series::dots("each temperature", Ink::Raw, by_level),
-            bars("95 %", Ink::Faint, known),
+            Series::dots("each temperature", Ink::Raw, dots),
+            bars("95 %", Ink::Faint, known.iter().copied()),
             Series::line("linear", Ink::Second, curve(&analysis.fit)),
         ];
         if let Some((quadratic, ..)) = &analysis.quadratic {

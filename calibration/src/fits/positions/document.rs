@@ -65,7 +65,7 @@ pub fn range(analysis: &Analysis) -> [f64; 2] {
 }
 
 /// Range of a curve (°C), in whole degrees.
-fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
     [(low - ROOM_DEG_C).floor(), (high + ROOM_DEG_C).ceil()]
 }
 

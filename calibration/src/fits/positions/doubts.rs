@@ -1,20 +1,18 @@
 //! What is doubtful about a result, and what makes it none.
 
-use isotherm_protocol::document::{AccelSensor, Document};
+use isotherm_protocol::document::Document;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::fit::{Analysis, Settings};
-use super::model::{Degrees, Sensor, Taken};
+use super::model::{self, Degrees, Taken};
 use super::plan::Plan;
-use super::sense::{Beside, elsewhere};
+use super::sense::of_accelerometers;
 use super::solve::Fit;
-use super::temperature::Temperatures;
-use super::{measure, model};
 use crate::axes::{AXES, sensor_name, several};
 use crate::document::scale_at;
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
-use crate::numbers::{ARCSEC_PER_RAD, real};
+use crate::numbers::{ARCSEC_PER_RAD, mean, real};
 use crate::report::{counted, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
@@ -29,15 +27,11 @@ const LARGEST_SIGMA: f64 = 1e-2;
 pub const LARGEST_TURN_DEG: f64 = 30.0;
 
 /// χ² of the quadratic terms of C, and their number.
-pub(super) fn quadratic_terms(fit: &Fit, plan: &Plan) -> (f64, usize) {
-    let covariance = fit.axes_covariance(plan, 2);
-    let model = fit.model(plan);
-    let terms: Vec<f64> = (0..fit.guess.len())
-        .flat_map(|sensor| [0, 1].map(|which| model.axis_index(sensor, which, 2)))
-        .map(|index| fit.solution.parameters[index] * model::SMALL)
-        .collect();
-    let count = terms.len();
-    (linear::chi_square(&nalgebra::DVector::from_vec(terms), &covariance).unwrap_or(0.0), count)
+pub(super) fn quadratic_terms(fit: &Fit) -> (f64, usize) {
+    let index = fit.degrees.axes_indices(fit.guess.len(), 2);
+    let terms = index.iter().map(|index| fit.solution.parameters[*index] * model::SMALL);
+    let terms = nalgebra::DVector::from_iterator(index.len(), terms);
+    (linear::chi_square(&terms, &fit.axes_covariance(2)).unwrap_or(0.0), index.len())
 }
 
 /// Probability that χ² is at least so large by accident.
@@ -45,13 +39,16 @@ pub(super) fn survival(chi_square: f64, degrees: usize) -> f64 {
     ChiSquared::new(real(degrees)).map_or(1.0, |law| law.sf(chi_square))
 }
 
+/// χ² per degree of freedom where it is larger than by accident.
+pub(super) fn excess(chi_square: f64, degrees: usize) -> Option<f64> {
+    let per_degree = chi_square / real(degrees);
+    (degrees > 0 && per_degree > 1.0 && survival(chi_square, degrees) < ACCIDENT).then_some(per_degree)
+}
+
 /// Factor by which standard errors are widened where the positions scatter more than they should.
 pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
     let (chi_square, degrees) = (fit.solution.chi_square, fit.solution.degrees);
-    let Some(per_degree) = fit.solution.per_degree() else { return 1.0 };
-    if survival(chi_square, degrees) >= ACCIDENT || per_degree <= 1.0 {
-        return 1.0;
-    }
+    let Some(per_degree) = excess(chi_square, degrees) else { return 1.0 };
     let factor = per_degree.sqrt();
     warnings.push(format!(
         "the positions scatter {factor:.1} times as much as positioning, run-out and noise explain (χ² \
@@ -99,56 +96,36 @@ pub(super) fn few(
     }
 }
 
-/// Axes that lie far from where the document at hand has them: swapped columns, a sign, or another mounting.
-pub(super) fn turned(fit: &Fit, document: &Document, gravity: f64, warnings: &mut Vec<String>) {
-    let rows = document.accel.iter().flat_map(|accel| accel.sensor.iter().zip(&accel.orientation.rows));
-    let of = |(sensor, (own, stated)): (&Sensor, (&AccelSensor, &[f64; 3]))| {
-        Beside::new(
-            [sensor.scale[0] / gravity, scale_at(own, document.temperature.assumed_deg_c)],
-            [sensor.axis.first().copied().unwrap_or_default(), *stated],
-        )
-    };
-    let beside: Vec<Beside> = fit.sensors.iter().zip(rows).map(of).collect();
-    let mounted = "Or is the unit mounted differently from the plan?";
-    warnings.extend(elsewhere("accelerometer", &beside).map(|words| format!("{words}. {mounted}")));
-}
-
-/// Scale factors that are not those of the unit of measure that the document states; `own` are the temperatures that each
-/// accelerometer was taken at (°C).
-pub(super) fn measures(fit: &Fit, document: &Document, settings: &Settings, own: &[Vec<f64>]) -> Vec<String> {
+/// Axes that lie far from where the document at hand has them (swapped columns, a sign, or another mounting), and scale factors that are
+/// not those of the unit of measure that it states; `own` are the temperatures that each accelerometer was taken at (°C).
+pub(super) fn not_as_stated(fit: &Fit, document: &Document, gravity: f64, own: &[Vec<f64>]) -> Vec<String> {
     let Some(accel) = &document.accel else { return Vec::new() };
-    let stated =
-        accel.sensor.iter().zip(own).map(|(sensor, deg_c)| scale_at(sensor, Temperatures::of(deg_c).mean));
+    let stated = accel.sensor.iter().zip(own).map(|(sensor, deg_c)| scale_at(sensor, mean(deg_c)));
     let stated: Vec<f64> = stated.collect();
-    let found: Vec<f64> = fit.sensors.iter().map(|sensor| sensor.scale[0] / settings.gravity).collect();
-    let other = measure::Beside::accelerometers(accel.output, &found, &stated).words();
-    other.into_iter().chain(measure::already_m_per_s2(accel.output, &found, &stated)).collect()
+    let scale: Vec<f64> = fit.sensors.iter().map(|sensor| sensor.scale[0] / gravity).collect();
+    let rows: Vec<[f64; 3]> = fit.sensors.iter().map(|sensor| sensor.axis[0]).collect();
+    let (elsewhere, measure) = of_accelerometers(accel, [&scale, &stated], &rows);
+    let mounted = "Or is the unit mounted differently from the plan?";
+    elsewhere.map(|words| format!("{words}. {mounted}")).into_iter().chain(measure).collect()
 }
 
-/// Axes that no position of some shows up or down, such as "x up".
-pub(super) fn unseen(plan: &Plan, positions: &[usize]) -> Vec<String> {
+/// Axes that none of some positions shows up or down, such as "none has x up", or what to say where there are none.
+pub(super) fn unseen(plan: &Plan, positions: &[usize], none: &str, otherwise: &str) -> String {
     let seen = |axis: usize, sign: f64| {
-        positions
-            .iter()
-            .filter_map(|position| plan.positions.get(*position))
-            .any(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
+        let mut positions = positions.iter().filter_map(|position| plan.positions.get(*position));
+        positions.any(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
     };
-    (0..3)
-        .flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")])
-        .filter(|(axis, sign, _)| !seen(*axis, *sign))
-        .map(|(axis, _, way)| format!("{} {way}", AXES[axis]))
-        .collect()
+    let ways = (0..3).flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")]);
+    let unseen = ways.filter(|(axis, sign, _)| !seen(*axis, *sign));
+    let unseen: Vec<String> = unseen.map(|(axis, _, way)| format!("{} {way}", AXES[axis])).collect();
+    if unseen.is_empty() { otherwise.to_owned() } else { format!("{none} has {}", unseen.join(", ")) }
 }
 
 /// Sensors whose positions do not spread, in words.
 pub(super) fn spread(plan: &Plan, taken: &[Taken], (bad, sensors): (&[usize], usize)) -> Vec<String> {
     let positions: Vec<usize> = taken.iter().map(|taken| taken.position).collect();
-    let lacking = unseen(plan, &positions);
-    let lacking = if lacking.is_empty() {
-        "the outputs do not follow the positions: check the plan and the columns of the mapping".to_owned()
-    } else {
-        format!("no position has {}", lacking.join(", "))
-    };
+    let otherwise = "the outputs do not follow the positions: check the plan and the columns of the mapping";
+    let lacking = unseen(plan, &positions, "no position", otherwise);
     vec![format!(
         "{} not determine scale factor, bias and axis of {}: {lacking}",
         counted(taken.len(), "position does", "positions do"),
@@ -221,7 +198,7 @@ mod tests {
     fn what_was_not_found_is_said_in_plain_words() {
         let degrees = Degrees { sensor: 1, axes: 1 };
         let of = |why: NoSolution| no_solution(&why, degrees, 3);
-        let mut told = vec![of(NoSolution::NoMinimum("LostPatience".to_owned()))];
+        let mut told = vec![of(NoSolution::NoMinimum)];
         told.extend([0, 11, 20, 25].map(|index| of(NoSolution::NotDetermined(index))));
         insta::assert_snapshot!(told.join("\n"));
     }

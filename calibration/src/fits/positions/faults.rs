@@ -15,10 +15,9 @@ pub fn dead(tracks: &[Track]) -> Vec<String> {
     for track in tracks {
         for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
             let mut faults: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-            for index in 0..columns.len() {
-                if let Some(fault) = Fault::among(columns, index) {
-                    faults.entry(fault.words(kind, columns.len())).or_default().push(index);
-                }
+            let found = (0..columns.len()).filter_map(|index| Some((index, Fault::among(columns, index)?)));
+            for (index, fault) in found {
+                faults.entry(fault.words(kind, columns.len())).or_default().push(index);
             }
             let of = |(words, sensors): (String, Vec<usize>)| {
                 (track.run.as_str(), format!("{}: {words}", several(kind, &sensors, columns.len())))
@@ -40,34 +39,25 @@ pub fn logs(names: &[&str]) -> String {
 }
 
 /// Accelerometers that read exactly the same throughout some poses and not in others: they are at their limit there.
-pub fn clipped(tracks: &[Track], poses: &[Pose]) -> Vec<String> {
+pub fn clipped(tracks: &[Track], poses: &[&Pose]) -> Vec<String> {
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
-    let mut reasons = Vec::new();
-    for sensor in 0..sensors {
+    let of = |sensor: usize| {
         let constant = |pose: &&Pose| {
-            let column = tracks.get(pose.run).and_then(|track| track.outputs.get(sensor));
-            column
-                .and_then(|column| column.get(pose.interval.first..pose.interval.end))
-                .and_then(faults::dead)
-                .is_some()
+            let column = tracks.get(pose.run)?.outputs.get(sensor)?;
+            faults::dead(column.get(pose.interval.first..pose.interval.end)?)
         };
-        let value = |pose: &Pose| {
-            let column = tracks.get(pose.run).and_then(|track| track.outputs.get(sensor));
-            column.and_then(|column| column.get(pose.interval.first)).copied().unwrap_or(f64::NAN)
-        };
-        let at: Vec<&Pose> = poses.iter().filter(constant).collect();
-        if let (Some(first), true) = (at.first(), at.len() < poses.len()) {
-            reasons.push(format!(
-                "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there: use a wider \
-                 range, or leave these poses out",
-                sensor_name(sensor, sensors),
-                six(value(first)),
-                at.len(),
-                poses.len()
-            ));
-        }
-    }
-    reasons
+        let at: Vec<f64> = poses.iter().filter_map(constant).collect();
+        let first = at.first().filter(|_| at.len() < poses.len())?;
+        Some(format!(
+            "accelerometer {} reads exactly {} throughout {} of {} poses: it is at its limit there: use a wider \
+             range, or leave these poses out",
+            sensor_name(sensor, sensors),
+            six(*first),
+            at.len(),
+            poses.len()
+        ))
+    };
+    (0..sensors).filter_map(of).collect()
 }
 
 #[cfg(test)]

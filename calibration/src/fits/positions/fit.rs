@@ -4,18 +4,18 @@ use isotherm_protocol::document::Document;
 
 use super::document::held_twice;
 use super::doubts::{
-    ACCIDENT, few, measures, no_solution, quadratic_terms, sound, spread, survival, turned, widening,
+    ACCIDENT, few, no_solution, not_as_stated, quadratic_terms, sound, spread, survival, widening,
 };
 use super::faults;
 use super::hysteresis::{Return, returns};
-use super::matching::{Matched, matched};
+use super::matching::matched;
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::solve::{Fit, Positions, Weights, guesses};
 use super::still::{StillLimits, still};
 use super::temperature::{
-    Followed, Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
+    Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
 };
 use super::times::Times;
 use super::track::Track;
@@ -93,7 +93,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     }
     let (poses, mut warnings) = positions(tracks, settings)?;
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
-    let Followed { channels, deg_c: axes } = followed(document, settings, &poses, &mut warnings)?;
+    let (channels, axes) = followed(document, settings, &poses, &mut warnings)?;
     let (level_of, levels_deg_c) = levels(&axes);
     let own = own_deg_c(document, &poses, &axes, sensors);
     let blind = blind(document, &own, levels_deg_c.len());
@@ -135,14 +135,14 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let found = all.fit(degrees).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
     let quadratic =
         (most >= 2).then(|| all.fit(Degrees { axes: 2, ..degrees }).ok()).flatten().map(|quadratic| {
-            let (chi_square, terms) = quadratic_terms(&quadratic, stand);
+            let (chi_square, terms) = quadratic_terms(&quadratic);
             let accident = survival(chi_square, terms);
             (quadratic, chi_square, terms, accident)
         });
-    let best = quadratic.as_ref().filter(|found| found.3 < ACCIDENT).map_or(&found, |found| &found.0);
+    let curved = quadratic.as_ref().filter(|found| found.3 < ACCIDENT);
+    let best = curved.map_or(&found, |found| &found.0);
     let widened = widening(best, &mut warnings);
-    let curved = quadratic.as_ref().is_some_and(|found| found.3 < ACCIDENT);
-    if curved {
+    if curved.is_some() {
         warnings.push(
             "C bends with temperature: the quadratic terms are significant. The document has the best straight line; \
              the report has both, and the remainder"
@@ -150,8 +150,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         );
     }
     few(stand, &taken, levels_deg_c.len(), settings, &mut warnings);
-    turned(best, document, settings.gravity, &mut warnings);
-    warnings.extend(measures(best, document, settings, &own));
+    warnings.extend(not_as_stated(best, document, settings.gravity, &own));
     let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
     let returns = returns(&all, &plain, &found, &levels_deg_c);
     let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
@@ -210,7 +209,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             continue;
         }
         match matched(&settings.plan, track, &poses) {
-            Ok(Matched { positions, doubt }) => {
+            Ok((positions, doubt)) => {
                 warnings.extend(doubt.map(|words| format!("{}: {words}", track.run)));
                 let others = positions.iter().filter(|position| position.is_none()).count();
                 if others > 0 {
@@ -235,7 +234,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             if others.is_empty() { String::new() } else { format!(". Likewise {}", faults::logs(&others)) };
         reasons.push(format!("{first}: {words}{likewise}"));
     }
-    let poses: Vec<Pose> = found.iter().map(|(pose, _)| pose.clone()).collect();
+    let poses: Vec<&Pose> = found.iter().map(|(pose, _)| pose).collect();
     reasons.extend(faults::clipped(tracks, &poses));
     if reasons.is_empty() && found.is_empty() {
         let runs: Vec<&str> = tracks.iter().map(|track| track.run.as_str()).collect();
@@ -268,7 +267,5 @@ fn intensity(tracks: &[Track], poses: &[Pose]) -> Result<Vec<f64>, Vec<String>> 
 /// A temperature by itself, where it has enough positions.
 fn one_level(all: &Positions<'_>, level: usize) -> Option<Fit> {
     let own: Vec<Taken> = all.taken.iter().filter(|taken| taken.level == level).cloned().collect();
-    let enough = guesses(all.plan, &own, all.guess.len()).is_ok();
-    let alone = Positions { taken: &own, ..*all };
-    enough.then(|| alone.fit(Degrees { sensor: 0, axes: 0 }).ok()).flatten()
+    guesses(all.plan, &own, all.guess.len()).ok().and_then(|_| all.alone(&own))
 }

@@ -2,13 +2,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::doubts::{ACCIDENT, survival};
-use super::model::{Degrees, SMALL, Taken};
+use super::doubts::{ACCIDENT, excess, survival};
+use super::model::{SMALL, Taken};
 use super::pose::Pose;
 use super::solve::{Fit, Positions};
 use crate::finding::AccelKind;
 use crate::lsq::linear;
-use crate::numbers::{ARCSEC_PER_RAD, real};
+use crate::numbers::{ARCSEC_PER_RAD, mean};
 
 /// The axes at one temperature, before and after others were visited.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,85 +24,65 @@ pub struct Return {
 }
 
 impl Return {
-    /// Whether some axis moved, beyond chance.
-    pub fn moved(&self) -> bool {
-        self.accident < ACCIDENT
-    }
-
-    /// The accelerometer whose axis turned most.
-    pub fn largest(&self) -> Option<(usize, [f64; 2])> {
-        self.turns.iter().copied().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
-    }
-
-    /// As a finding, where an axis moved: the accelerometer and the kind.
+    /// As a finding, where an axis moved beyond chance: the accelerometer whose axis turned most, and the kind.
     pub fn finding(&self, runs: &[String]) -> Option<(usize, AccelKind)> {
-        let (sensor, turn) = self.largest().filter(|_| self.moved())?;
+        let turns = self.turns.iter().copied().enumerate().filter(|_| self.accident < ACCIDENT);
+        let (sensor, turn) = turns.max_by(|a, b| a.1[0].total_cmp(&b.1[0]))?;
         let logs = self.runs.map(|run| runs.get(run).cloned().unwrap_or_default());
         Some((sensor, AccelKind::AxisMoved { deg_c: self.deg_c, logs, turn }))
     }
 }
 
-/// Positions of one temperature that were taken without another in between.
+/// Positions of one temperature that were taken without another in between, fitted by themselves.
 struct Visit {
     run: usize,
     level: usize,
-    taken: Vec<Taken>,
+    /// Mean temperature that the axes follow, scaled as that of [`Taken`].
+    axes_t: f64,
+    fit: Fit,
 }
 
 /// Every return to a temperature that was left; `poses` are those of `all.taken`, in the order of logs and time.
 pub(super) fn returns(all: &Positions<'_>, poses: &[Pose], fit: &Fit, levels_deg_c: &[f64]) -> Vec<Return> {
     let mut order: Vec<usize> = (0..poses.len()).collect();
     order.sort_by_key(|index| (poses[*index].run, poses[*index].interval.first));
-    let mut visits: Vec<Visit> = Vec::new();
-    for index in order {
-        let taken = all.taken[index].clone();
-        match visits.last_mut().filter(|visit| visit.level == taken.level) {
-            Some(visit) => visit.taken.push(taken),
-            None => visits.push(Visit { run: poses[index].run, level: taken.level, taken: vec![taken] }),
-        }
-    }
-    let found: Vec<(&Visit, Fit)> = visits
-        .iter()
-        .filter_map(|visit| {
-            let alone = Positions { taken: &visit.taken, ..*all };
-            Some((visit, alone.fit(Degrees { sensor: 0, axes: 0 }).ok()?))
-        })
-        .collect();
+    let visit = |visit: &[usize]| {
+        let taken: Vec<Taken> = visit.iter().map(|index| all.taken[*index].clone()).collect();
+        let fit = all.alone(&taken)?;
+        let axes_t: Vec<f64> = taken.iter().map(|taken| taken.axes_t).collect();
+        Some(Visit { run: poses[visit[0]].run, level: taken[0].level, axes_t: mean(&axes_t), fit })
+    };
+    let visits = order.chunk_by(|a, b| all.taken[*a].level == all.taken[*b].level);
+    let found: Vec<Visit> = visits.filter_map(visit).collect();
     let after = |at: usize| {
-        let (visit, fit_after) = &found[at];
-        let before = found[..at].iter().rev().find(|(other, _)| other.level == visit.level)?;
-        compare(all, fit, [(before.0, &before.1), (visit, fit_after)], levels_deg_c)
+        let before = found[..at].iter().rev().find(|other| other.level == found[at].level)?;
+        compare(fit, [before, &found[at]], levels_deg_c)
     };
     (0..found.len()).filter_map(after).collect()
 }
 
 /// The turn from one visit to another, less what the line over temperature says of the small difference of theirs.
-fn compare(
-    all: &Positions<'_>,
-    fit: &Fit,
-    [(first, before), (second, after)]: [(&Visit, &Fit); 2],
-    levels_deg_c: &[f64],
-) -> Option<Return> {
-    let scaled =
-        |visit: &Visit| visit.taken.iter().map(|taken| taken.axes_t).sum::<f64>() / real(visit.taken.len());
-    let away = scaled(second) - scaled(first);
-    let [level, line] = [before, fit].map(|fit| fit.model(all.plan));
+fn compare(fit: &Fit, [first, second]: [&Visit; 2], levels_deg_c: &[f64]) -> Option<Return> {
+    let [before, after] = [&first.fit, &second.fit];
+    let away = second.axes_t - first.axes_t;
     let angle = |sensor: usize, which: usize| {
-        let at = level.axis_index(sensor, which, 0);
+        let at = before.degrees.axis_index(sensor, which, 0);
         let slope = if fit.degrees.axes > 0 {
-            fit.solution.parameters[line.axis_index(sensor, which, 1)]
+            fit.solution.parameters[fit.degrees.axis_index(sensor, which, 1)]
         } else {
             0.0
         };
         (after.solution.parameters[at] - before.solution.parameters[at] - slope * away) * SMALL
     };
-    let count = all.guess.len();
+    let count = fit.guess.len();
     let angles = DVector::from_iterator(
         2 * count,
         (0..count).flat_map(|sensor| [0, 1].map(|which| angle(sensor, which))),
     );
-    let covariance: DMatrix<f64> = (before.axes_covariance(all.plan, 0) + after.axes_covariance(all.plan, 0))
-        * widening([before, after]);
+    let chi_square = before.solution.chi_square + after.solution.chi_square;
+    let degrees = before.solution.degrees + after.solution.degrees;
+    let covariance: DMatrix<f64> =
+        (before.axes_covariance(0) + after.axes_covariance(0)) * excess(chi_square, degrees).unwrap_or(1.0);
     let accident = survival(linear::chi_square(&angles, &covariance)?, 2 * count);
     let turn = |sensor: usize| {
         let own = angles.rows(2 * sensor, 2);
@@ -117,15 +97,4 @@ fn compare(
         turns: (0..count).map(turn).collect(),
         accident,
     })
-}
-
-/// Factor of the variances: χ² per degree of both visits where it is no accident.
-fn widening(fits: [&Fit; 2]) -> f64 {
-    let chi_square: f64 = fits.iter().map(|fit| fit.solution.chi_square).sum();
-    let degrees: usize = fits.iter().map(|fit| fit.solution.degrees).sum();
-    if degrees == 0 || survival(chi_square, degrees) >= ACCIDENT {
-        return 1.0;
-    }
-    let per_degree = chi_square / real(degrees);
-    per_degree.max(1.0)
 }

@@ -11,7 +11,7 @@ use super::pose::Pose;
 use super::track::Track;
 use crate::numbers::{ends, real};
 use crate::report::{counted, fixed};
-use crate::runs::swapped::{ORDERS, moved};
+use crate::runs::swapped::{AS_LOGGED, ORDERS, moved};
 
 /// Largest angle between the direction found and that of the plan (rad): 20°.
 const DIRECTION_RAD: f64 = 0.35;
@@ -21,17 +21,9 @@ const ROTATION_RAD: f64 = 0.52;
 const AGREEMENT: f64 = 0.8;
 /// Fewest ways that tell an order of columns from chance.
 const TELLING_WAYS: usize = 3;
-/// The order of the log's columns.
-const AS_LOGGED: [usize; 3] = [0, 1, 2];
 
-/// Plan positions of a run's poses.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Matched {
-    /// By pose; `None` for one that is no position of the plan.
-    pub positions: Vec<Option<usize>>,
-    /// What is to be said of it.
-    pub doubt: Option<String>,
-}
+/// Plan positions of a run's poses, `None` for one that is no position of the plan, and what is to be said of it.
+pub type Matched = (Vec<Option<usize>>, Option<String>);
 
 /// Finds the plan positions of a run's poses.
 ///
@@ -62,44 +54,40 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         format!("{}; {agree}: {hint}", nothing(plan, poses, &directions))
     };
     let doubt = match swapped {
-        Some(Swapped { accelerometers: true, hint }) => return Err(unclear(&hint)),
-        swapped => swapped.map(|of| {
-            format!("gyros and accelerometers do not agree on the turns between the poses: {}", of.hint)
-        }),
+        Some((Kind::Accelerometers, hint)) => return Err(unclear(&hint)),
+        Some((Kind::Gyros, hint)) => {
+            Some(format!("gyros and accelerometers do not agree on the turns between the poses: {hint}"))
+        }
+        None => None,
     };
-    let unique = candidates.iter().all(|candidates| candidates.len() <= 1);
-    if unique {
-        let positions = candidates.iter().map(|candidates| candidates.first().copied()).collect();
-        return Ok(Matched { positions, doubt });
-    }
-    if share >= AGREEMENT {
+    let count = plan.positions.len();
+    let in_order = || (0..poses.len()).all(|pose| fits(pose, pose % count));
+    let positions = if candidates.iter().all(|candidates| candidates.len() <= 1) {
+        candidates.iter().map(|candidates| candidates.first().copied()).collect()
+    } else if share >= AGREEMENT {
         let starts = candidates.iter().position(|candidates| !candidates.is_empty());
         let anchors = starts.map(|start| candidates[start].clone()).unwrap_or_default();
         let followed = anchors.into_iter().map(|anchor| follow(plan, &candidates, &ways, anchor));
         let missing = |found: &Vec<Option<usize>>| found.iter().filter(|position| position.is_none()).count();
         // The first of equals: the plan's order.
-        let positions = followed.min_by_key(missing).ok_or_else(|| nothing(plan, poses, &directions))?;
-        return Ok(Matched { positions, doubt });
-    }
-    let count = plan.positions.len();
-    let in_order = (0..poses.len()).all(|pose| fits(pose, pose % count));
-    if in_order && poses.len().is_multiple_of(count) {
-        let positions = (0..poses.len()).map(|pose| Some(pose % count)).collect();
-        return Ok(Matched { positions, doubt });
-    }
-    Err(unclear(&format!(
-        "they are not the plan's {count} positions in their order, one is missing or repeated{}. Identify the poses \
-         with --times, or record the turns too",
-        unseen(plan).unwrap_or_default()
-    )))
+        followed.min_by_key(missing).ok_or_else(|| nothing(plan, poses, &directions))?
+    } else if poses.len().is_multiple_of(count) && in_order() {
+        (0..poses.len()).map(|pose| Some(pose % count)).collect()
+    } else {
+        return Err(unclear(&format!(
+            "they are not the plan's {count} positions in their order, one is missing or repeated{}. Identify the poses \
+             with --times, or record the turns too",
+            unseen(plan).unwrap_or_default()
+        )));
+    };
+    Ok((positions, doubt))
 }
 
-/// Columns that look swapped.
-struct Swapped {
-    /// Of the accelerometers; otherwise of the gyros.
-    accelerometers: bool,
-    /// What to do.
-    hint: String,
+/// Sensors whose columns look swapped.
+#[derive(Clone, Copy)]
+enum Kind {
+    Accelerometers,
+    Gyros,
 }
 
 /// The order of columns, of accelerometers or gyros, with which both agree on the turns; `None` where none is.
@@ -107,24 +95,22 @@ fn swapped(
     track: &Track,
     poses: &[Pose],
     (as_logged, directions): (&[Matrix3<f64>], &[Vector3<f64>]),
-) -> Option<Swapped> {
+) -> Option<(Kind, String)> {
     if as_logged.len() < TELLING_WAYS {
         return None;
     }
-    let found = |accelerometers: bool, order: [usize; 3]| Swapped {
-        accelerometers,
-        hint: format!(
-            "with {} {} swapped they would agree; check the columns in the mapping",
-            if accelerometers { "accelerometers" } else { "gyros" },
-            moved(order)
-        ),
+    let found = |kind, order| {
+        let name = if matches!(kind, Kind::Gyros) { "gyros" } else { "accelerometers" };
+        let axes = moved(order);
+        let hint = format!("with {name} {axes} swapped they would agree; check the columns in the mapping");
+        (kind, hint)
     };
     ORDERS.into_iter().find_map(|order| {
         if agreement(as_logged, directions, order) >= AGREEMENT {
-            return Some(found(true, order));
+            return Some(found(Kind::Accelerometers, order));
         }
         let reordered = ways(track, poses, order);
-        (agreement(&reordered, directions, AS_LOGGED) >= AGREEMENT).then(|| found(false, order))
+        (agreement(&reordered, directions, AS_LOGGED) >= AGREEMENT).then(|| found(Kind::Gyros, order))
     })
 }
 

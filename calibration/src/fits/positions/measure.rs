@@ -33,107 +33,69 @@ const OF_GYROS: [(f64, &str); 5] = [
     (1.0 / 3600.0, "as for °/s taken as °/h"),
 ];
 
-/// What scale factors of a kind of sensors are beside the stated ones.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Beside {
-    /// Of what kind they are, as in "gyro".
-    pub kind: &'static str,
-    /// How many times too large the readings of each are by what is stated.
-    pub times: Vec<f64>,
-    /// Whether anything is stated that all of them can be held against, or only of one beside another.
-    stated: bool,
-    /// Mistakes that such sensors know.
-    mistakes: &'static [(f64, &'static str)],
-    /// What to do where it is none of them.
-    hint: &'static str,
-}
-
-impl Beside {
-    /// Accelerometers: output per specific force, found and stated.
-    pub fn accelerometers(output: AccelOutput, found: &[f64], stated: &[f64]) -> Self {
-        Self {
-            kind: "accelerometer",
-            times: found.iter().zip(stated).map(|(found, stated)| (found / stated).abs()).collect(),
-            stated: output == AccelOutput::MetresPerSecondSquared || !is_placeholder(stated),
-            mistakes: &OF_ACCELEROMETERS,
-            hint: "readings of a converter are neither V nor m/s²: map them as \"raw\" and leave --accelerometer-unit at V, or state \
-                   their scale in the mapping",
-        }
-    }
-
-    /// Gyros: true rate per stated rate, found and stated.
-    pub fn gyros(found: &[f64], stated: &[f64]) -> Self {
-        Self {
-            kind: "gyro",
-            times: found.iter().zip(stated).map(|(found, stated)| (stated / found).abs()).collect(),
-            stated: true,
-            mistakes: &OF_GYROS,
-            hint: "check their unit and scale in the mapping, and the range they were set to",
-        }
-    }
-
-    /// What is wrong, in words.
-    pub fn words(&self) -> Option<String> {
-        self.apart().or_else(|| self.all())
-    }
-
-    /// Sensors that are far from the others of theirs: one column in another unit.
-    fn apart(&self) -> Option<String> {
-        let size = |sensor: &usize| self.times[*sensor];
-        let most = (0..self.times.len()).max_by(|a, b| size(a).total_cmp(&size(b)))?;
-        let least = (0..self.times.len()).min_by(|a, b| size(a).total_cmp(&size(b)))?;
-        let ratio = size(&most) / size(&least);
-        let Self { kind, .. } = self;
-        (ratio > LARGEST_RATIO).then(|| {
-            format!(
-                "{kind} {} and {kind} {}: their readings are {} and {} times those of the document, or else the log, \
-                 {} times apart: check the unit of measure of each column in the mapping",
-                sensor_name(most, self.times.len()),
-                sensor_name(least, self.times.len()),
-                short(size(&most)),
-                short(size(&least)),
-                short(ratio),
-            )
-        })
-    }
-
-    /// All sensors far from what is stated.
-    fn all(&self) -> Option<String> {
-        let logs: f64 = self.times.iter().map(|times| libm::log(*times)).sum();
-        let times = libm::exp(logs / real(self.times.len()));
-        (self.stated && times.is_finite() && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&times)).then(|| {
-            format!(
-                "{}s: their readings are {} times those of the document, or else the log, {}: {}. The new document \
-                 has the fitted scale factors, for logs with this mapping",
-                self.kind,
-                short(times),
-                self.mistake(times).unwrap_or("as for no usual unit of measure"),
-                if self.mistake(times).is_some() { "correct the unit of measure in the mapping" } else { self.hint },
-            )
-        })
-    }
-
-    /// The mistake that makes readings so many times too large.
-    fn mistake(&self, times: f64) -> Option<&'static str> {
-        let away = |factor: f64| libm::log(times / factor).abs();
-        let (factor, words) = self.mistakes.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0)))?;
-        (away(*factor) < NEAR).then_some(*words)
-    }
-}
-
-/// Whether scale factors hold the place of what is to be found: they are all one.
-fn is_placeholder(stated: &[f64]) -> bool {
-    stated.iter().all(|k| (k - 1.0).abs() <= 1e-9)
-}
-
-/// Words where a log that is said to be in V is in m/s² by its scale factors.
-pub fn already_m_per_s2(output: AccelOutput, found: &[f64], stated: &[f64]) -> Option<String> {
-    let placeholder = output == AccelOutput::Volts && is_placeholder(stated);
+/// What the scale factors of accelerometers (output per specific force), found and stated, tell of their unit of measure, in words.
+pub fn accelerometers(output: AccelOutput, found: &[f64], stated: &[f64]) -> Vec<String> {
+    let times: Vec<f64> = found.iter().zip(stated).map(|(found, stated)| (found / stated).abs()).collect();
+    // Scale factors that are all one hold the place of what is to be found.
+    let placeholder = stated.iter().all(|k| (k - 1.0).abs() <= 1e-9);
+    let told = output == AccelOutput::MetresPerSecondSquared || !placeholder;
+    let hint = "readings of a converter are neither V nor m/s²: map them as \"raw\" and leave --accelerometer-unit at V, or state \
+                their scale in the mapping";
+    let of_all = || all("accelerometer", &times, &OF_ACCELEROMETERS, hint).filter(|_| told);
+    let other = apart("accelerometer", &times).or_else(of_all);
     let near = found.iter().all(|k| (k - 1.0).abs() < NEAR_ONE);
-    (placeholder && near).then(|| {
+    let already = (output == AccelOutput::Volts && placeholder && near).then(|| {
         "accelerometers: 1 V of the log is about 1 m/s²: it is already in m/s²; state --accelerometer-unit m/s2, \
          otherwise the document has V"
             .to_owned()
+    });
+    other.into_iter().chain(already).collect()
+}
+
+/// The same of gyros (true rate per stated rate).
+pub fn gyros(found: &[f64], stated: &[f64]) -> Option<String> {
+    let times: Vec<f64> = found.iter().zip(stated).map(|(found, stated)| (stated / found).abs()).collect();
+    let hint = "check their unit and scale in the mapping, and the range they were set to";
+    apart("gyro", &times).or_else(|| all("gyro", &times, &OF_GYROS, hint))
+}
+
+/// Sensors that are far from the others of theirs: one column in another unit. `times` is how many times too large the readings of each
+/// are by what is stated.
+fn apart(kind: &str, times: &[f64]) -> Option<String> {
+    let size = |sensor: &usize| times[*sensor];
+    let most = (0..times.len()).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let least = (0..times.len()).min_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let ratio = size(&most) / size(&least);
+    (ratio > LARGEST_RATIO).then(|| {
+        format!(
+            "{kind} {} and {kind} {}: their readings are {} and {} times those of the document, or else the log, \
+             {} times apart: check the unit of measure of each column in the mapping",
+            sensor_name(most, times.len()),
+            sensor_name(least, times.len()),
+            short(size(&most)),
+            short(size(&least)),
+            short(ratio),
+        )
+    })
+}
+
+/// All sensors far from what is stated: by one of the mistakes that such sensors know, or else with what to do.
+fn all(kind: &str, times: &[f64], mistakes: &[(f64, &str)], hint: &str) -> Option<String> {
+    let logs: f64 = times.iter().map(|times| libm::log(*times)).sum();
+    let mean = libm::exp(logs / real(times.len()));
+    let away = |factor: f64| libm::log(mean / factor).abs();
+    let (factor, mistake) = mistakes.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0)))?;
+    let [mistake, hint] = if away(*factor) < NEAR {
+        [*mistake, "correct the unit of measure in the mapping"]
+    } else {
+        ["as for no usual unit of measure", hint]
+    };
+    (mean.is_finite() && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&mean)).then(|| {
+        format!(
+            "{kind}s: their readings are {} times those of the document, or else the log, {mistake}: {hint}. The new document \
+             has the fitted scale factors, for logs with this mapping",
+            short(mean)
+        )
     })
 }
 
@@ -146,11 +108,11 @@ mod tests {
     fn scale_factors_tell_the_unit_of_measure() {
         let accel = |output, found: f64, stated: f64| {
             let found = [found * 1.02, found * 0.97, found * 1.01];
-            Beside::accelerometers(output, &found, &[stated; 3]).words()
+            accelerometers(output, &found, &[stated; 3]).pop()
         };
         assert_eq!(accel(MetresPerSecondSquared, 1.2, 1.0), None);
         assert_eq!(accel(Volts, 414.0, 1.0), None, "nothing is stated");
-        let gyros = |found: [f64; 3], stated| Beside::gyros(&found, &[stated; 3]).words();
+        let gyros = |found: [f64; 3], stated| gyros(&found, &[stated; 3]);
         assert_eq!(gyros([1.309, -1.312, 1.311], 1.0), None);
         let told = [
             accel(MetresPerSecondSquared, 0.102, 1.0),
@@ -159,7 +121,7 @@ mod tests {
             accel(MetresPerSecondSquared, 2.2, 1.0),
             accel(MetresPerSecondSquared, 414.0, 1.0),
             accel(Volts, 4060.0, 414.0),
-            Beside::accelerometers(Volts, &[414.0, 828.0, 412.0], &[1.0; 3]).words(),
+            accelerometers(Volts, &[414.0, 828.0, 412.0], &[1.0; 3]).pop(),
             gyros([0.0302; 3], 1.0),
             gyros([0.0229; 3], 1.0),
             gyros([6.5; 3], 1.3),
@@ -170,8 +132,9 @@ mod tests {
 
     #[test]
     fn a_log_in_metres_per_second_squared_is_not_called_v() {
-        assert!(already_m_per_s2(Volts, &[1.02, 0.97, 1.01], &[1.0; 3]).is_some());
-        assert_eq!(already_m_per_s2(Volts, &[0.102, 0.103, 0.101], &[1.0; 3]), None);
-        assert_eq!(already_m_per_s2(MetresPerSecondSquared, &[1.0; 3], &[1.0; 3]), None);
+        let told = |output, found: [f64; 3]| accelerometers(output, &found, &[1.0; 3]).len();
+        assert_eq!(told(Volts, [1.02, 0.97, 1.01]), 1);
+        assert_eq!(told(Volts, [0.102, 0.103, 0.101]), 0);
+        assert_eq!(told(MetresPerSecondSquared, [1.0; 3]), 0);
     }
 }

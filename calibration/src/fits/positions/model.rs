@@ -48,6 +48,17 @@ impl Degrees {
     pub fn of_sensor(self) -> usize {
         2 * (self.sensor + 1) + 2 * (self.axes + 1)
     }
+
+    /// Place of a parameter of an accelerometer's axis: `which` of the two directions, power.
+    pub fn axis_index(self, sensor: usize, which: usize, power: usize) -> usize {
+        sensor * self.of_sensor() + 2 * (self.sensor + 1) + which * (self.axes + 1) + power
+    }
+
+    /// The places of both directions of every accelerometer's axis.
+    pub fn axes_indices(self, sensors: usize, power: usize) -> Vec<usize> {
+        let both = |sensor| [0, 1].map(|which| self.axis_index(sensor, which, power));
+        (0..sensors).flat_map(both).collect()
+    }
 }
 
 /// First guess of one accelerometer.
@@ -64,12 +75,12 @@ pub struct Guess {
 }
 
 /// The model of all accelerometers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model<'a> {
     /// The plan.
     pub plan: &'a Plan,
     /// First guesses.
-    pub guess: Vec<Guess>,
+    pub guess: &'a [Guess],
     /// Degrees.
     pub degrees: Degrees,
 }
@@ -88,14 +99,8 @@ pub struct Sensor {
 impl Guess {
     /// From the outputs by linear least squares: U = M·u + S, K·g the length of M.
     pub fn of(ups: &[[f64; 3]], outputs: &[f64]) -> Option<Self> {
-        let design =
-            nalgebra::DMatrix::from_fn(
-                ups.len(),
-                4,
-                |row, column| {
-                    if column < 3 { ups[row][column] } else { 1.0 }
-                },
-            );
+        let entry = |row: usize, column: usize| ups[row].get(column).copied().unwrap_or(1.0);
+        let design = nalgebra::DMatrix::from_fn(ups.len(), 4, entry);
         let spread = linear::spread(&design);
         if ups.len() < 4 || spread.is_nan() || spread < LEAST_SPREAD {
             return None;
@@ -130,14 +135,6 @@ impl Model<'_> {
     pub fn errors(&self, parameters: &[f64]) -> StandErrors {
         let from = self.guess.len() * self.degrees.of_sensor();
         [0, 1, 2].map(|i| parameters.get(from + i).copied().unwrap_or(0.0) * SMALL)
-    }
-
-    /// Place of a parameter of an accelerometer's axis: `which` of the two directions, power.
-    pub fn axis_index(&self, sensor: usize, which: usize, power: usize) -> usize {
-        sensor * self.degrees.of_sensor()
-            + 2 * (self.degrees.sensor + 1)
-            + which * (self.degrees.axes + 1)
-            + power
     }
 
     /// The parameters of one accelerometer.
@@ -177,17 +174,16 @@ impl Model<'_> {
     /// What the parameters say of each accelerometer, rows of C at the reference of length one.
     pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
         let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
+        let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
         let sensor = |(index, guess): (usize, &Guess)| {
             let p = self.own(parameters, index);
             let [first, second] = guess.across;
             let row = |power: usize| {
                 let (a, b) = (p[2 * own + power] * SMALL, p[2 * own + axes + power] * SMALL);
-                let along = if power == 0 { 1.0 } else { 0.0 };
-                [0, 1, 2].map(|i| along * guess.axis[i] + a * first[i] + b * second[i])
+                [0, 1, 2].map(|i| one(power) * guess.axis[i] + a * first[i] + b * second[i])
             };
             let rows: Vec<[f64; 3]> = (0..axes).map(row).collect();
             let length = norm(rows[0]);
-            let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
             Sensor {
                 scale: (0..own).map(|j| guess.scale * (one(j) + p[j] * SMALL) * length).collect(),
                 bias: (0..own).map(|j| one(j) * guess.bias + guess.scale * p[own + j] * SMALL).collect(),

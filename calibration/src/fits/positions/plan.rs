@@ -21,6 +21,8 @@ mod file;
 
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use super::doubts::GOOD_POSITIONS;
 use crate::error::Error;
 
@@ -112,11 +114,8 @@ impl Plan {
             Attitude::Stand(angles) => *angles,
         };
         let [level, tilt, square] = errors;
-        let mut up = [0.0, 1.0, 0.0];
-        up = about_third(up, -tilt);
-        up = about_first(up, -(angle_2 + level));
-        up = about_third(up, -square);
-        up = about_second(up, -angle_1);
+        let turns = [(2, -tilt), (0, -(angle_2 + level)), (2, -square), (1, -angle_1)];
+        let up = turns.into_iter().fold([0.0, 1.0, 0.0], |up, (axis, angle)| about(axis, up, angle));
         let mut along = [0.0; 3];
         for (component, axis) in up.iter().zip(&self.mounting) {
             along.iter_mut().zip(axis).for_each(|(sum, c)| *sum += component * c);
@@ -140,36 +139,20 @@ impl Plan {
     }
 }
 
-fn about_first([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
+/// A vector turned about one of its axes.
+fn about(axis: usize, v: [f64; 3], angle: f64) -> [f64; 3] {
     let (sin, cos) = libm::sincos(angle);
-    [x, cos * y - sin * z, sin * y + cos * z]
-}
-
-fn about_second([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
-    let (sin, cos) = libm::sincos(angle);
-    [cos * x + sin * z, y, cos * z - sin * x]
-}
-
-fn about_third([x, y, z]: [f64; 3], angle: f64) -> [f64; 3] {
-    let (sin, cos) = libm::sincos(angle);
-    [cos * x - sin * y, sin * x + cos * y, z]
+    let [i, j] = [(axis + 1) % 3, (axis + 2) % 3];
+    let mut turned = v;
+    (turned[i], turned[j]) = (cos * v[i] - sin * v[j], sin * v[i] + cos * v[j]);
+    turned
 }
 
 /// Case axes of (axis 2, axis 1, their cross product); `None` where both are the same.
 fn mounting(axis_1: char, axis_2: char) -> Option<[[f64; 3]; 3]> {
-    let unit = |axis: char| match axis {
-        'x' => Some([1.0, 0.0, 0.0]),
-        'y' => Some([0.0, 1.0, 0.0]),
-        'z' => Some([0.0, 0.0, 1.0]),
-        _ => None,
-    };
-    let (second, first) = (unit(axis_2)?, unit(axis_1)?);
-    let cross = [
-        second[1] * first[2] - second[2] * first[1],
-        second[2] * first[0] - second[0] * first[2],
-        second[0] * first[1] - second[1] * first[0],
-    ];
-    (axis_1 != axis_2).then_some([second, first, cross])
+    let unit = |axis: char| Some(Vector3::ith(['x', 'y', 'z'].iter().position(|name| *name == axis)?, 1.0));
+    let (second, first): (Vector3<f64>, Vector3<f64>) = (unit(axis_2)?, unit(axis_1)?);
+    (axis_1 != axis_2).then(|| [second, first, second.cross(&first)].map(Into::into))
 }
 
 #[cfg(test)]

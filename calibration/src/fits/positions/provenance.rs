@@ -1,12 +1,13 @@
 //! Where the numbers of the document come from, and what "before" means.
 
-use isotherm_protocol::document::{Document, Shape};
+use isotherm_protocol::document::Document;
 use serde_json::{Value, json};
 
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::model::SMALL;
-use crate::document::{rows, tidy};
+use crate::axes::main_axis;
+use crate::document::{constant, rows, tidy};
 use crate::numbers::{ARCSEC_PER_RAD, real};
 use crate::report::Sigmas;
 
@@ -20,16 +21,8 @@ pub fn before(base: &Document, analysis: &Analysis, gravity: f64, given: bool) -
         for (sensor, guess) in accel.sensor.iter_mut().zip(&analysis.fit.guess) {
             let unit = sensor.scale_factor.unit();
             // An accelerometer that is mounted the other way round is no error of its scale factor.
-            let sign =
-                if guess.axis.iter().copied().fold(0.0, |a: f64, c| if c.abs() > a.abs() { c } else { a })
-                    < 0.0
-                {
-                    -1.0
-                } else {
-                    1.0
-                };
-            let shape = Shape::Constant { value: tidy(sign * mean) };
-            sensor.scale_factor = isotherm_protocol::document::Curve::new(shape).in_unit(unit);
+            let sign = guess.axis[main_axis(&guess.axis)].signum();
+            sensor.scale_factor = constant(sign * mean).in_unit(unit);
         }
     }
     document
@@ -50,7 +43,7 @@ pub fn details(analysis: &Analysis, settings: &Settings) -> Value {
         "degrees_of_freedom": fit.solution.degrees,
         "standard_errors_widened_by": analysis.widened,
         // Two angles per accelerometer across its axis, at the reference.
-        "axes_covariance_arcsec2": rows(&(fit.axes_covariance(&settings.plan, 0) * (widened * widened))),
+        "axes_covariance_arcsec2": rows(&(fit.axes_covariance(0) * (widened * widened))),
     });
     if !analysis.returns.is_empty() {
         about["hysteresis"] = analysis.returns.iter().map(hysteresis).collect();
@@ -83,7 +76,7 @@ pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> 
         };
         sigmas.put("accel", &sensor.name, "scale_factor", of(0, 1.0 / settings.gravity));
         sigmas.put("accel", &sensor.name, "bias", of(own, 1.0));
-        let axis = fit.axis_sigma(&settings.plan, index, 0);
+        let axis = fit.axis_sigma(index, 0);
         let arcsec = axis.map(|sigma| tidy(sigma * ARCSEC_PER_RAD * analysis.widened));
         sigmas.put("accel", &sensor.name, "axis_arcsec", arcsec.to_vec());
     }

@@ -3,7 +3,7 @@
 use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::charts::{across, axes_chart, bend, left_chart, shown};
+use super::charts::{across, axes_chart, bend, by_level, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
@@ -13,7 +13,7 @@ use super::solve::Fit;
 use crate::axes::AXES;
 use crate::document::accel_name;
 use crate::numbers::ARCSEC_PER_RAD;
-use crate::report::{Curve, Report, Verdict, counted, fixed, output_unit, per_deg_c, short, six};
+use crate::report::{Curve, Report, Verdict, counted, fixed, or_dash, output_unit, per_deg_c, short, six};
 
 /// A set of judged positions with the names of its runs.
 #[derive(Debug, Clone, Copy)]
@@ -50,12 +50,12 @@ pub fn report(
     report.notes = notes(document, analysis, settings);
     let names = (0..analysis.fit.guess.len()).map(|index| accel_name(document, index).to_owned());
     let names: Vec<String> = names.collect();
-    coefficients(&mut report, document, (analysis, settings), &names);
+    coefficients(&mut report, document, (analysis, settings.gravity), &names);
     report.charts.push(("What is left".to_owned(), left_chart(settings, inside.judged)));
     report.tables.push(("Positions".to_owned(), position_rows(settings, inside)));
     if analysis.levels_deg_c.len() > 1 {
-        report.tables.push(("Axes by temperature, ″".to_owned(), level_rows(analysis, settings, &names)));
-        report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, settings, &names)));
+        report.tables.push(("Axes by temperature, ″".to_owned(), level_rows(analysis, &names)));
+        report.charts.push(("Axes over temperature".to_owned(), axes_chart(analysis, &names)));
     }
     if !analysis.returns.is_empty() {
         let table = return_rows(analysis, &names, inside.runs);
@@ -143,7 +143,7 @@ fn notes(document: &Document, analysis: &Analysis, settings: &Settings) -> Vec<S
 fn coefficients(
     report: &mut Report,
     document: &Document,
-    (analysis, settings): (&Analysis, &Settings),
+    (analysis, gravity): (&Analysis, f64),
     names: &[String],
 ) {
     let fit = &analysis.fit;
@@ -158,9 +158,9 @@ fn coefficients(
         let guess = fit.guess[index].scale;
         for (power, k) in sensor.scale.iter().enumerate() {
             let factor = by_power(power);
-            let value = k * factor / settings.gravity;
+            let value = k * factor / gravity;
             let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
-            let sigma = sigma(power, guess / settings.gravity * factor);
+            let sigma = sigma(power, guess / gravity * factor);
             report.coefficient(format!("accelerometer {name} K{power}"), unit, value, sigma);
         }
         for (power, bias) in sensor.bias.iter().enumerate() {
@@ -174,7 +174,7 @@ fn coefficients(
         for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
             for (power, row) in sensor.axis.iter().enumerate().skip(from) {
                 let factor = by_power(power) * ARCSEC_PER_RAD;
-                let sigma = fit.axis_sigma(&settings.plan, index, power);
+                let sigma = fit.axis_sigma(index, power);
                 for i in across(sensor.axis[0]) {
                     let name = format!("accelerometer {name} C{power}{what} along {}", AXES[i]);
                     let sigma = sigma[i] * factor * analysis.widened;
@@ -202,7 +202,7 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
             position.map_or_else(String::new, |position| position.name.clone()),
             set.runs.get(judgement.run).cloned().unwrap_or_default(),
             format!("{:.1}", judgement.time_s),
-            if judgement.deg_c.is_finite() { fixed(judgement.deg_c, 2) } else { "–".to_owned() },
+            or_dash(judgement.deg_c.is_finite().then(|| fixed(judgement.deg_c, 2))),
         ];
         row.extend(judgement.error[1].map(milli_g));
         row.push(milli_g(judgement.length[1]));
@@ -211,18 +211,16 @@ fn position_rows(settings: &Settings, set: Set<'_>) -> Table {
     Table::of(head, set.judged.iter().map(row))
 }
 
-fn level_rows(analysis: &Analysis, settings: &Settings, names: &[String]) -> Table {
+fn level_rows(analysis: &Analysis, names: &[String]) -> Table {
     let shown = shown(analysis);
     let elements = shown.iter().map(|(index, i)| format!("{} along {}", names[*index], AXES[*i]));
-    let row = |(deg_c, fit): (&f64, &Option<Fit>)| {
-        let cell = |(index, i): &(usize, usize)| {
-            let Some(fit) = fit else { return "–".to_owned() };
-            let value = fit.sensors[*index].axis[0][*i] * ARCSEC_PER_RAD;
-            let sigma = fit.axis_sigma(&settings.plan, *index, 0)[*i] * ARCSEC_PER_RAD * analysis.widened;
-            format!("{} ± {sigma:.1}", fixed(value, 1))
+    let columns: Vec<_> = shown.iter().map(|element| by_level(analysis, *element)).collect();
+    let row = |(level, deg_c): (usize, &f64)| {
+        let cell = |column: &Vec<(f64, Option<[f64; 2]>)>| {
+            or_dash(column[level].1.map(|[value, sigma]| format!("{} ± {sigma:.1}", fixed(value, 1))))
         };
-        std::iter::once(fixed(*deg_c, 2)).chain(shown.iter().map(cell)).collect()
+        std::iter::once(fixed(*deg_c, 2)).chain(columns.iter().map(cell)).collect()
     };
     let head = std::iter::once("°C".to_owned()).chain(elements);
-    Table::of(head, analysis.levels_deg_c.iter().zip(&analysis.of_level).map(row))
+    Table::of(head, analysis.levels_deg_c.iter().enumerate().map(row))
 }

@@ -1,8 +1,10 @@
 //! Which way sensors point beside what the document at hand states of them: columns that are swapped, signs.
 
+use isotherm_protocol::document::Accel;
 use nalgebra::Vector3;
 
 use super::doubts::LARGEST_TURN_DEG;
+use super::measure;
 use crate::axes::{sensor_name, several};
 use crate::report::{fixed, short};
 
@@ -24,6 +26,20 @@ impl Beside {
     fn turned_deg(&self) -> f64 {
         self.senses[0].angle(&self.senses[1]).to_degrees()
     }
+}
+
+/// Accelerometers that are not as the document at hand has them: where they lie elsewhere, and what their scale factors tell of the unit of
+/// measure. `scale` and `stated` are their scale factors, `rows` the axes that were found.
+pub(crate) fn of_accelerometers(
+    accel: &Accel,
+    [scale, stated]: [&[f64]; 2],
+    rows: &[[f64; 3]],
+) -> (Option<String>, Vec<String>) {
+    let axes = rows.iter().zip(&accel.orientation.rows);
+    let beside = scale.iter().zip(stated).zip(axes);
+    let beside = beside.map(|((scale, stated), (row, axis))| Beside::new([*scale, *stated], [*row, *axis]));
+    let beside: Vec<Beside> = beside.collect();
+    (elsewhere("accelerometer", &beside), measure::accelerometers(accel.output, scale, stated))
 }
 
 /// Where sensors lie elsewhere than the document at hand has them: what is wrong with columns or signs by the fewest mistakes, and where they

@@ -46,24 +46,16 @@ pub struct Fit {
 
 impl Fit {
     /// Covariance of the directions of all axes at the reference: two angles (rad) per accelerometer.
-    pub fn axes_covariance(&self, plan: &Plan, power: usize) -> DMatrix<f64> {
-        let model = self.model(plan);
-        let index: Vec<usize> = (0..self.guess.len())
-            .flat_map(|sensor| [0, 1].map(|which| model.axis_index(sensor, which, power)))
-            .collect();
+    pub fn axes_covariance(&self, power: usize) -> DMatrix<f64> {
+        let index = self.degrees.axes_indices(self.guess.len(), power);
         DMatrix::from_fn(index.len(), index.len(), |i, j| {
             self.solution.covariance[(index[i], index[j])] * SMALL * SMALL
         })
     }
 
-    /// The model that it was found with.
-    pub fn model<'a>(&self, plan: &'a Plan) -> Model<'a> {
-        Model { plan, guess: self.guess.clone(), degrees: self.degrees }
-    }
-
     /// Standard errors of the elements of a sensor's row of C, by power (per scaled temperature to that power).
-    pub fn axis_sigma(&self, plan: &Plan, sensor: usize, power: usize) -> [f64; 3] {
-        let covariance = self.axes_covariance(plan, power);
+    pub fn axis_sigma(&self, sensor: usize, power: usize) -> [f64; 3] {
+        let covariance = self.axes_covariance(power);
         let Some(guess) = self.guess.get(sensor) else { return [f64::NAN; 3] };
         let block = covariance.view((2 * sensor, 2 * sensor), (2, 2));
         [0, 1, 2].map(|i| {
@@ -114,7 +106,7 @@ impl Positions<'_> {
     /// # Errors
     /// Where they do not determine it.
     pub fn fit(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
-        self.found(degrees, |start, residuals| solve(start, residuals))
+        self.found(degrees, false)
     }
 
     /// What [`Positions::fit`] will find of positions that are only planned, so that the first guess is the truth: nothing is
@@ -123,19 +115,20 @@ impl Positions<'_> {
     /// # Errors
     /// Where they do not determine it.
     pub fn planned(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
-        self.found(degrees, |start, residuals| known(start, residuals))
+        self.found(degrees, true)
     }
 
-    fn found(
-        &self,
-        degrees: Degrees,
-        solve: impl Fn(&[f64], &dyn Fn(&[f64]) -> Vec<f64>) -> Result<Solution, NoSolution>,
-    ) -> Result<Fit, NoSolution> {
+    /// What some of them say by themselves, at one temperature; `None` where they do not determine it.
+    pub(super) fn alone(&self, taken: &[Taken]) -> Option<Fit> {
+        Positions { taken, ..*self }.fit(Degrees { sensor: 0, axes: 0 }).ok()
+    }
+
+    fn found(&self, degrees: Degrees, is_planned: bool) -> Result<Fit, NoSolution> {
         let Self { plan, taken, guess, weights } = *self;
-        let model = Model { plan, guess: guess.to_vec(), degrees };
+        let model = Model { plan, guess, degrees };
         let start = vec![0.0; model.count()];
         let whitening: Vec<DMatrix<f64>> =
-            taken.iter().map(|taken| whitening(&model, &start, taken, weights)).collect();
+            taken.iter().map(|taken| whitening(model, &start, taken, weights)).collect();
         let prior = weights.levelling_rad / SMALL;
         let residuals = |p: &[f64]| -> Vec<f64> {
             let mut all = Vec::with_capacity(taken.len() * guess.len() + 3);
@@ -150,7 +143,7 @@ impl Positions<'_> {
             all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
             all
         };
-        let solution = solve(&start, &residuals)?;
+        let solution = if is_planned { known(&start, residuals)? } else { solve(&start, residuals)? };
         let errors = model.errors(&solution.parameters);
         let from = model.count() - 3;
         let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));
@@ -160,7 +153,7 @@ impl Positions<'_> {
 }
 
 /// L⁻¹ of V = L·Lᵀ for one position.
-fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights) -> DMatrix<f64> {
+fn whitening(model: Model<'_>, start: &[f64], taken: &Taken, weights: &Weights) -> DMatrix<f64> {
     let count = model.guess.len();
     let position = model.plan.positions.get(taken.position);
     let up = position.map_or([0.0; 3], |position| model.plan.up(&position.attitude, [0.0; 3]));
@@ -171,9 +164,8 @@ fn whitening(model: &Model<'_>, start: &[f64], taken: &Taken, weights: &Weights)
     } else {
         weights.positioning_rad
     };
-    let mut covariance = DMatrix::from_fn(count, count, |i, j| {
-        if i == j { weights.intensity.get(i).copied().unwrap_or(f64::NAN) / taken.duration_s } else { 0.0 }
-    });
+    let noise = |i: usize| weights.intensity.get(i).copied().unwrap_or(f64::NAN) / taken.duration_s;
+    let mut covariance = DMatrix::from_diagonal(&DVector::from_fn(count, |i, _| noise(i)));
     let at_rest = DVector::from_vec(model.outputs_under(start, taken, [0.0; 3]));
     let up = nalgebra::Vector3::from(up);
     let first = nalgebra::Vector3::from(across(up.into())[0]);

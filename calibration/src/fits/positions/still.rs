@@ -50,7 +50,11 @@ const QUIET_SHARE: f64 = 0.2;
 pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Interval> {
     let tick_s = track.tick_s();
     let half = half_window(limits.window_s, tick_s);
-    let variance = sum_of(&track.outputs, |column| spread(column, half).1, track.len());
+    let mut variance = vec![0.0; track.len()];
+    for column in &track.outputs {
+        let (_, own) = spread(column, half);
+        variance.iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
+    }
     let in_rest = |values: &[f64]| -> f64 {
         match rest {
             Some(length_s) => {
@@ -150,15 +154,6 @@ fn spread(column: &[f64], half: usize) -> (Vec<f64>, Vec<f64>) {
         (about + mean, (square - mean * mean).max(0.0) * count / (count - 1.0).max(1.0))
     };
     (0..column.len()).map(of).unzip()
-}
-
-/// Sum over columns of what is made of each.
-fn sum_of(columns: &[Vec<f64>], of: impl Fn(&[f64]) -> Vec<f64>, length: usize) -> Vec<f64> {
-    let mut sum = vec![0.0; length];
-    for column in columns {
-        sum.iter_mut().zip(of(column)).for_each(|(sum, value)| *sum += value);
-    }
-    sum
 }
 
 /// Variance that is still whatever the noise: a hundred-thousandth of the range that the outputs go through.

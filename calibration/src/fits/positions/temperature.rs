@@ -130,15 +130,8 @@ fn names(channels: &[String]) -> String {
     format!("{} {}", if quoted.len() == 1 { "channel" } else { "the mean of channels" }, quoted.join(", "))
 }
 
-/// What the orientation follows: its channels and their mean temperature in each pose.
-pub(super) struct Followed {
-    /// The channels; none where nothing measures the temperature.
-    pub(super) channels: Vec<String>,
-    /// Their mean in each pose (°C).
-    pub(super) deg_c: Vec<f64>,
-}
-
-/// The temperatures that the orientation follows: of its channels, or else of the accelerometers' own where those have no readings.
+/// What the orientation follows: its channels, or else the accelerometers' own where those have no readings, and their mean temperature in
+/// each pose (°C). No channels where nothing measures it.
 ///
 /// # Errors
 /// Channels of --channel that have none.
@@ -147,13 +140,13 @@ pub(super) fn followed(
     settings: &Settings,
     poses: &[(Pose, usize)],
     warnings: &mut Vec<String>,
-) -> Result<Followed, Vec<String>> {
+) -> Result<(Vec<String>, Vec<f64>), Vec<String>> {
     let of = |channels: &[String]| -> Option<Vec<f64>> {
         poses.iter().map(|(pose, _)| pose.mean_temperature(channels)).collect()
     };
     let stated = channels(document, settings);
     if let Some(deg_c) = of(&stated) {
-        return Ok(Followed { channels: stated, deg_c });
+        return Ok((stated, deg_c));
     }
     let gone =
         |channel: &&String| poses.iter().any(|(pose, _)| !pose.temperature_deg_c.contains_key(*channel));
@@ -171,7 +164,7 @@ pub(super) fn followed(
              temperatures the new document does the same",
             names(&gone)
         ));
-        return Ok(Followed { channels: own, deg_c });
+        return Ok((own, deg_c));
     }
     let runs: BTreeSet<usize> = poses.iter().map(|(pose, _)| pose.run).collect();
     if gone.is_empty() && runs.len() > 1 {
@@ -187,7 +180,7 @@ pub(super) fn followed(
             names(&gone)
         ));
     }
-    Ok(Followed { channels: Vec::new(), deg_c: vec![document.temperature.assumed_deg_c; poses.len()] })
+    Ok((Vec::new(), vec![document.temperature.assumed_deg_c; poses.len()]))
 }
 
 /// Mean temperature of the channels that the slopes of the document's C follow (°C); `None` without slopes or readings.

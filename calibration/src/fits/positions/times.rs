@@ -83,7 +83,7 @@ impl Times {
                 continue;
             };
             let interval = Interval { first: *first, end: last + 1 };
-            found.extend(Pose::of(track, run, &[interval]).into_iter().map(|pose| (pose, position)));
+            found.push((Pose::over(track, run, interval), position));
         }
         if reasons.is_empty() { Ok(found) } else { Err(reasons) }
     }

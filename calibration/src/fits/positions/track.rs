@@ -55,10 +55,10 @@ impl Track {
             )));
         }
         let table = Table::of_rows(run, loaded, Rows::TICKS, watch)?;
-        let at = nearest(&accels.end_ns, &table.end_ns);
-        let taken = |column: &[f64]| -> Vec<f64> {
+        let taken = |column: &[f64], at: &[usize]| -> Vec<f64> {
             at.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
         };
+        let at = nearest(&accels.end_ns, &table.end_ns);
         let per_second = |columns: &[Vec<f64>], durations: &[f64], kind| -> Vec<Vec<f64>> {
             let rate = |column: &Vec<f64>| column.iter().zip(durations).map(|(count, s)| count / s).collect();
             columns
@@ -68,23 +68,20 @@ impl Track {
         };
         let gyros = per_second(&series.gyros.readings, &series.gyros.duration_s, series.gyros.output);
         let own = nearest(&accels.end_ns, &series.gyros.end_ns);
-        let of_own = |column: &Vec<f64>| -> Vec<f64> {
-            own.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
-        };
         Ok(Self {
             run: run.name.clone(),
             outputs: per_second(&accels.readings, &accels.duration_s, accels.output),
-            gyros: gyros.iter().map(of_own).collect(),
+            gyros: gyros.iter().map(|column| taken(column, &own)).collect(),
             gyro_counts: series.gyros.output == Some(OutputKind::Counts),
             rate_deg_per_s: table
                 .rate_deg_per_h
                 .each_ref()
-                .map(|column| taken(column).iter().map(|rate| rate / DEG_PER_H_IN_DEG_PER_S).collect()),
-            force_m_per_s2: table.force_m_per_s2.each_ref().map(|column| taken(column)),
+                .map(|column| taken(column, &at).iter().map(|rate| rate / DEG_PER_H_IN_DEG_PER_S).collect()),
+            force_m_per_s2: table.force_m_per_s2.each_ref().map(|column| taken(column, &at)),
             temperature_deg_c: table
                 .temperature_deg_c
                 .iter()
-                .map(|(name, column)| (name.clone(), taken(column)))
+                .map(|(name, column)| (name.clone(), taken(column, &at)))
                 .collect(),
             end_ns: series.accels.end_ns,
             duration_s: series.accels.duration_s,

@@ -27,7 +27,10 @@ pub(super) fn doubts(
     for (number, run) in runs.iter().enumerate() {
         let Some(place) = places.get(number).or(places.first()) else { continue };
         let Some((looks, rest)) = of_run(place, run, (axes, gains)) else { continue };
-        match told.iter_mut().find(|(_, first, ..)| (first.kind, first.order) == (looks.kind, looks.order)) {
+        match told
+            .iter_mut()
+            .find(|(_, first, ..)| (first.shown.kind, first.order) == (looks.shown.kind, looks.order))
+        {
             Some((.., others)) => others.push(number),
             None => told.push((number, looks, rest, Vec::new())),
         }
@@ -104,7 +107,7 @@ mod tests {
         let [Finding { place, kind: Kind::Gravity { looks, others, .. } }] = found else {
             panic!("{found:?}");
         };
-        assert_eq!((place.log, others.as_slice(), looks.kind), (Some(0), &[1][..], "accelerometers"));
+        assert_eq!((place.log, others.as_slice(), looks.shown.kind), (Some(0), &[1][..], "accelerometers"));
         looks.order
     }
 

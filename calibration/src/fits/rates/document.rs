@@ -2,12 +2,12 @@
 
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::Angle;
-use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_protocol::document::Document;
 use serde_json::{Value, json};
 
 use super::fit::Made;
 use super::model::GyroRates;
-use crate::document::{by_name, rows, tidy};
+use crate::document::{by_name, constant, rows, tidy};
 use crate::finding::Kind;
 use crate::numbers::unit;
 use crate::report::Sigmas;
@@ -31,8 +31,7 @@ pub fn fitted(
             if with_bias {
                 let change = found.bias[0];
                 let bias = own.terms.curve(Feature::One).map(|bias| bias.plus(change));
-                let new = || Curve::new(Shape::Constant { value: tidy(change) });
-                own.set(Feature::One, bias.unwrap_or_else(new));
+                own.set(Feature::One, bias.unwrap_or_else(|| constant(change)));
             }
         }
         if let (Some(axis), Some(row)) = (found.axis, document.gyro.orientation.rows.get_mut(sensor)) {

@@ -3,6 +3,8 @@
 //! In the case the Earth's vector turns backwards, dE/dt = −ω × E with ω relative to the Earth. Over a bin ω is taken as
 //! constant, and both the turn and the mean of E over it are closed formulas.
 
+use nalgebra::Vector3;
+
 use super::bins::Bin;
 use crate::numbers::{dot, norm};
 
@@ -58,11 +60,7 @@ fn turned(vector: [f64; 3], rate_deg_per_h: [f64; 3], seconds: f64) -> ([f64; 3]
     }
     let axis = rate_deg_per_h.map(|x| x / size);
     let along = dot(axis, vector);
-    let across = [
-        axis[1] * vector[2] - axis[2] * vector[1],
-        axis[2] * vector[0] - axis[0] * vector[2],
-        axis[0] * vector[1] - axis[1] * vector[0],
-    ];
+    let across = Vector3::from(axis).cross(&Vector3::from(vector));
     let [sin, cos] = [libm::sin(angle), libm::cos(angle)];
     let half = libm::sin(0.5 * angle);
     let made =

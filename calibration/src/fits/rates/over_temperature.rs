@@ -13,16 +13,15 @@ use super::read::Turned;
 use crate::document::tidy;
 use crate::finding::Kind;
 use crate::fits::modes::document::row;
+use crate::fits::positions::document::with_room;
 use crate::fits::positions::model::across;
 use crate::fits::positions::temperature::{levels, reference};
 use crate::fits::thermal::scale::{Holds, put};
-use crate::lsq::linear::{self, Weak};
+use crate::lsq::linear::{self, Linear, Weak};
 use crate::numbers::{ARCSEC_PER_RAD, dot, ends, mean, norm, once_each, real};
 
 /// Smallest share of the largest singular value of a line.
 const SINGULAR: f64 = 1e-9;
-/// Room around the temperatures that were taken (°C).
-const ROOM_DEG_C: f64 = 1.0;
 /// Highest power of a scale factor error.
 const HIGHEST: usize = 2;
 
@@ -158,7 +157,6 @@ impl OverTemperature {
     /// Puts slopes of axes and scale factors into a document that has what holds at the reference. Gyros that were refused keep theirs.
     pub(super) fn put(&self, document: &mut Document, gyros: &[Result<GyroRates, Kind>]) {
         let ends = |of: &dyn Fn(&Level) -> f64| ends(self.levels.iter().map(of));
-        let room = |[low, high]: [f64; 2]| [(low - ROOM_DEG_C).floor(), (high + ROOM_DEG_C).ceil()];
         let old = document.gyro.orientation.thermal.take();
         let slopes = (0..self.lines.len()).map(|sensor| {
             if gyros.get(sensor).is_some_and(Result::is_ok) {
@@ -171,7 +169,7 @@ impl OverTemperature {
         document.gyro.orientation.thermal = Some(OrientationThermal {
             channels: self.channels.clone(),
             reference_deg_c: self.reference_deg_c,
-            range_deg_c: room(ends(&|level| level.deg_c)),
+            range_deg_c: with_room(ends(&|level| level.deg_c)),
             slopes_arcsec_per_deg_c: slopes,
             hysteresis: old.map(|old| old.hysteresis).unwrap_or_default(),
         });
@@ -181,7 +179,7 @@ impl OverTemperature {
                 continue;
             }
             let s: Vec<f64> = std::iter::once(0.0).chain(line.scale_ppm.iter().copied()).collect();
-            let range = room(ends(&|level| level.own_deg_c[index]));
+            let range = with_room(ends(&|level| level.own_deg_c[index]));
             let none = Curve::new(Shape::Constant { value: 0.0 });
             let old = sensor.terms.curve(Feature::Reading).unwrap_or(&none);
             sensor.set(Feature::Reading, put(old, (self.reference_deg_c, range), &s, Holds::Error));
@@ -207,19 +205,12 @@ impl Line {
     }
 }
 
-/// A polynomial of a degree through values with standard errors: coefficients, their covariance, χ².
-fn polynomial(
-    x: &[f64],
-    y: &[f64],
-    sigma: &[f64],
-    degree: usize,
-) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+/// A polynomial of a degree through values with standard errors.
+fn polynomial(x: &[f64], y: &[f64], sigma: &[f64], degree: usize) -> Option<Linear> {
     let power = |power: usize, x: f64| (0..power).fold(1.0, |product, _| product * x);
     let design = DMatrix::from_fn(x.len(), degree + 1, |i, j| power(j, x[i]) / sigma[i]);
     let values = DVector::from_fn(x.len(), |i, _| y[i] / sigma[i]);
-    let found = linear::solve(&design, &values, Weak::Refuse(SINGULAR)).ok()?;
-    let chi_square = found.chi_square();
-    Some((found.coefficients, found.inverse, chi_square))
+    linear::solve(&design, &values, Weak::Refuse(SINGULAR)).ok()
 }
 
 /// Axis and scale factor of one gyro over temperature.
@@ -240,8 +231,9 @@ fn line(levels: &[Level], sensor: usize, reference_deg_c: f64) -> Option<Line> {
         };
         let angles: Vec<f64> = levels.iter().map(angle).collect();
         let sigmas: Vec<f64> = levels.iter().map(sigma).collect();
-        let (c, covariance, chi) = polynomial(&away, &angles, &sigmas, 1)?;
-        chi_square += chi;
+        let found = polynomial(&away, &angles, &sigmas, 1)?;
+        chi_square += found.chi_square();
+        let Linear { coefficients: c, inverse: covariance, .. } = found;
         for i in 0..3 {
             axis[i] += c[0] * direction[i];
             slope[i] += c[1] * direction[i];
@@ -258,7 +250,8 @@ fn line(levels: &[Level], sensor: usize, reference_deg_c: f64) -> Option<Line> {
             sigma / (gain * gain)
         })
         .collect();
-    let (scale, covariance, _) = polynomial(&own, &inverse, &sigma, HIGHEST.min(levels.len() - 1))?;
+    let Linear { coefficients: scale, inverse: covariance, .. } =
+        polynomial(&own, &inverse, &sigma, HIGHEST.min(levels.len() - 1))?;
     let at_reference = scale[0];
     let degrees = 2.0 * (real(levels.len()) - 2.0);
     let powers = 1..scale.len();

@@ -35,10 +35,7 @@ pub(super) fn read(
     run: &Run,
     watch: &mut dyn Watch,
 ) -> Result<Result<Turned, Finding>, Error> {
-    let binned = binned(run, wanted.base, &mut *watch)?;
-    let counts: Vec<f64> =
-        (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
-    let found = plateaus::find(&binned.bins, &counts);
+    let binned = binned(run, wanted.base, watch)?;
     let own: Vec<Step> = wanted.steps.iter().filter(|step| step.run == number).copied().collect();
     if own.is_empty() {
         return Ok(Err(Kind::NoStepStated { log: run.name.clone() }.in_log(number)));
@@ -48,31 +45,30 @@ pub(super) fn read(
         finding.place.log = Some(number);
         return Ok(Err(finding));
     }
-    let matched = match matched(&own, &binned.bins, &found) {
-        Ok(matched) => matched,
-        Err(kind) => {
-            return Ok(Err(match gaps(&binned.bins) {
-                None => kind,
-                Some(share) => Kind::BesideGaps { kind: Box::new(kind), share },
-            }
-            .in_log(number)));
-        }
-    };
-    let stated = turned_as_stated(&matched, wanted.base, wanted.scale_known)
-        .and_then(|()| steady(&matched, &binned.bins));
-    if let Err(kind) = stated {
-        return Ok(Err(kind.in_log(number)));
-    }
+    Ok(turned(wanted, number, &own, binned).map_err(|kind| kind.in_log(number)))
+}
+
+/// The steps of a run, which are its `own` of all, by its bins.
+fn turned(wanted: &Wanted<'_>, number: usize, own: &[Step], binned: Binned) -> Result<Turned, Kind> {
+    let counts: Vec<f64> =
+        (0..wanted.base.gyro.sensor.len()).map(|sensor| count_arcsec(wanted.base, sensor) / BIN_S).collect();
+    let found = plateaus::find(&binned.bins, &counts);
+    let matched = matched(own, &binned.bins, &found).map_err(|kind| match gaps(&binned.bins) {
+        None => kind,
+        Some(share) => Kind::BesideGaps { kind: Box::new(kind), share },
+    })?;
+    turned_as_stated(&matched, wanted.base, wanted.scale_known)?;
+    steady(&matched, &binned.bins)?;
     for one in &matched {
         let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
         let [good, all] =
             bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
         let window_s = one.plateau.window_s;
         if good < (1.0 - LOST) * all {
-            return Ok(Err(Kind::Lost { window_s, share: [1.0 - good / all, LOST] }.in_log(number)));
+            return Err(Kind::Lost { window_s, share: [1.0 - good / all, LOST] });
         }
         if bins.iter().any(|bin| bin.overrange) {
-            return Ok(Err(Kind::AtLimit { window_s, stated: one.step.rate_deg_per_s }.in_log(number)));
+            return Err(Kind::AtLimit { window_s, stated: one.step.rate_deg_per_s });
         }
     }
     let place = wanted.place.get(number).or(wanted.place.first());
@@ -81,10 +77,10 @@ pub(super) fn read(
         Some(Some(rate)) => Some(rate.map(deg_per_h)),
         Some(None) => {
             let Binned { first_force: force, troubles, .. } = binned;
-            return Ok(Err(Kind::NotLevel { at_beginning: true, force, troubles }.in_log(number)));
+            return Err(Kind::NotLevel { at_beginning: true, force, troubles });
         }
     };
-    Ok(Ok(Turned { binned, matched, rests: slow(&own, found), earth_start }))
+    Ok(Turned { binned, matched, rests: slow(own, found), earth_start })
 }
 
 /// Share of the bins in which ticks are missing, where it is more than a twentieth: no steady stretch is long enough then.
@@ -101,21 +97,19 @@ pub(super) fn whole_turns(run: &mut Turned) -> Vec<f64> {
         let [begin, end] = one.plateau.bins;
         let bins = run.binned.bins.get(begin..end).unwrap_or_default();
         let length_s: f64 = bins.iter().map(|bin| bin.length_s).sum();
-        let turns = libm::floor(one.step.rate_deg_per_s.abs() * length_s / TURN_DEG);
-        if one.step.rate_deg_per_s == 0.0 {
+        let rate = one.step.rate_deg_per_s;
+        let turns = libm::floor(rate.abs() * length_s / TURN_DEG);
+        if rate == 0.0 || turns < 1.0 {
+            short.extend((rate != 0.0).then_some(rate));
             continue;
         }
-        if turns < 1.0 {
-            short.push(one.step.rate_deg_per_s);
-            continue;
-        }
-        let wanted_s = turns * TURN_DEG / one.step.rate_deg_per_s.abs();
+        let wanted_s = turns * TURN_DEG / rate.abs();
         let mut taken = 0.0;
-        let count = bins.iter().take_while(|bin| {
+        let is_within = |bin: &&Bin| {
             taken += bin.length_s;
             taken <= wanted_s + 0.5 * bin.length_s
-        });
-        let count = count.count().max(1);
+        };
+        let count = bins.iter().take_while(is_within).count().max(1);
         one.plateau.bins = [begin, begin + count];
         if let Some(last) = bins.get(count - 1) {
             one.plateau.window_s[1] = last.begin_s + last.length_s;

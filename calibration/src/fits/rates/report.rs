@@ -161,46 +161,40 @@ fn coefficients(name: &str, found: &GyroRates, weight: Option<(f64, &str)>, repo
     }
 }
 
+/// The gyros that something is told of, by their names, and what, each in a list; `None` without any.
+fn listed(made: &Made, told: impl Fn(&GyroRates) -> Option<String>) -> Option<(String, String)> {
+    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
+    let all = sensors.filter_map(|(sensor, found)| Some((sensor.name.as_str(), told(found.as_ref().ok()?)?)));
+    let (names, told): (Vec<&str>, Vec<String>) = all.unzip();
+    (!names.is_empty()).then(|| (gyros(&names), told.join(", ")))
+}
+
 /// Gyros whose weight is far from what it was, in one sentence: the rates, or the unit of measure, may be others than stated.
 fn other_weights(made: &Made) -> Option<String> {
-    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
-    let other = sensors.filter(|_| made.scale_known).filter_map(|(sensor, found)| {
-        let change = 1.0 / found.as_ref().ok()?.gain[0].abs() - 1.0;
-        (change.abs() > OTHER_WEIGHT).then(|| (sensor.name.as_str(), format!("{} %", short(100.0 * change))))
-    });
-    let (names, changes): (Vec<&str>, Vec<String>) = other.unzip();
-    (!names.is_empty()).then(|| {
-        format!(
-            "{}: the weight changes by {}, more than {:.0} %: check the stated rates, the unit of measure in the \
-             mapping, and that the document is of this unit",
-            gyros(&names),
-            changes.join(", "),
-            100.0 * OTHER_WEIGHT
-        )
-    })
+    let (gyros, changes) = listed(made, |found| {
+        let change = 1.0 / found.gain[0].abs() - 1.0;
+        (made.scale_known && change.abs() > OTHER_WEIGHT).then(|| format!("{} %", short(100.0 * change)))
+    })?;
+    Some(format!(
+        "{gyros}: the weight changes by {changes}, more than {:.0} %: check the stated rates, the unit of measure in the \
+         mapping, and that the document is of this unit",
+        100.0 * OTHER_WEIGHT
+    ))
 }
 
 /// Gyros whose steps scatter by more than noise, in one sentence.
 fn widened(made: &Made) -> Option<String> {
-    let sensors = made.written.document.gyro.sensor.iter().zip(&made.gyros);
-    let wide = sensors.filter_map(|(sensor, found)| {
-        let found = found.as_ref().ok().filter(|found| found.widened)?;
-        Some((sensor.name.as_str(), format!("{:.1}", found.chi_square.sqrt())))
-    });
-    let (names, times): (Vec<&str>, Vec<String>) = wide.unzip();
+    let (gyros, times) =
+        listed(made, |found| found.widened.then(|| format!("{:.1}", found.chi_square.sqrt())))?;
     let place = if made.earth_known {
         ", or latitude and attitude other than at the beginning of each log"
     } else {
         ", or the Earth's rate, which is not removed"
     };
-    (!names.is_empty()).then(|| {
-        format!(
-            "{}: steps scatter by {} times what noise explains; standard errors are widened. Nonlinearity, a table less steady than stated \
-             (--table-ppm){place}",
-            gyros(&names),
-            times.join(", ")
-        )
-    })
+    Some(format!(
+        "{gyros}: steps scatter by {times} times what noise explains; standard errors are widened. Nonlinearity, a table less steady \
+         than stated (--table-ppm){place}"
+    ))
 }
 
 fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &mut Report) {

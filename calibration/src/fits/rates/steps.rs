@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::csv;
 use crate::error::Error;
-use crate::numbers::norm;
+use crate::numbers::direction;
 use crate::report::counted;
 
 /// Fastest table (°/s).
@@ -74,14 +74,9 @@ pub fn axis(text: &str) -> Result<[f64; 3], String> {
     let numbers: Vec<f64> =
         text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
     match numbers.as_slice() {
-        [x, y, z] => unit([*x, *y, *z]).ok_or_else(|| format!("axis {text:?} has no length")),
+        [x, y, z] => direction([*x, *y, *z]).ok_or_else(|| format!("axis {text:?} has no length")),
         _ => Err(format!("axis {text:?} must be x, y, z, -x, -y, -z or three numbers such as 0,0.6,0.8")),
     }
-}
-
-fn unit(axis: [f64; 3]) -> Option<[f64; 3]> {
-    let size = norm(axis);
-    (size.is_finite() && size > 0.0).then(|| axis.map(|x| x / size))
 }
 
 /// Steps by lists of rates: run k turns about axis k. Both rates and runs are those of the fit, then those that it is judged on.
@@ -126,7 +121,7 @@ pub fn read(path: &Path, runs: usize) -> Result<Vec<Step>, Error> {
         let axis = match &row.axis {
             Axis::Name(name) => axis(name).map_err(|what| format!("step {}: {what}", index + 1))?,
             Axis::Vector(vector) => {
-                unit(*vector).ok_or_else(|| format!("step {}: axis has no length", index + 1))?
+                direction(*vector).ok_or_else(|| format!("step {}: axis has no length", index + 1))?
             }
         };
         let window_s = match (row.begin_s, row.end_s) {

@@ -39,11 +39,8 @@ pub struct AccelFit {
 impl AccelFit {
     /// Specific force along the case axes (m/s²) that three outputs stand for.
     pub fn force(&self, outputs: &[f64]) -> [f64; 3] {
-        let mut along = [0.0; 3];
-        for (index, value) in along.iter_mut().enumerate() {
-            let output = outputs.get(index).copied().unwrap_or(f64::NAN);
-            *value = (output - self.bias[index]) / self.scale[index];
-        }
+        let output = |index: usize| outputs.get(index).copied().unwrap_or(f64::NAN);
+        let along = [0, 1, 2].map(|index| (output(index) - self.bias[index]) / self.scale[index]);
         resolve(&self.rows, along)
     }
 }

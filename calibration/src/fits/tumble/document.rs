@@ -2,14 +2,14 @@
 
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
-use isotherm_protocol::document::{Accel, AccelOutput, Curve, Document, Shape};
+use isotherm_protocol::document::{Accel, AccelOutput, Document};
 
 use super::accel::AccelFit;
 use super::acceleration::GyroDrift;
 use super::fit::Tumble;
 use super::fit::odd::odd;
 use super::gyro::GyroFit;
-use crate::document::tidy;
+use crate::document::{constant, tidy};
 use crate::fits::positions::document::{held_twice, level};
 
 /// Puts what was found into a document; gives what is to be said of it.
@@ -69,14 +69,12 @@ fn gyros(
         if let Some(drift) = drift {
             let axes = [Feature::ForceX, Feature::ForceY, Feature::ForceZ];
             for (feature, per_force) in axes.into_iter().zip(drift.response.by_force) {
-                let value = tidy(deg_per_h(per_force * STANDARD_GRAVITY_M_PER_S2));
-                sensor.set(feature, Curve::new(Shape::Constant { value }));
+                sensor.set(feature, constant(deg_per_h(per_force * STANDARD_GRAVITY_M_PER_S2)));
             }
         }
         let there = sensor.terms.curve(Feature::One);
         let moved = there.and_then(|curve| Some(curve.plus(tidy(rest - curve.shape().at(deg_c)?))));
-        let new = || Curve::new(Shape::Constant { value: tidy(rest) });
-        sensor.set(Feature::One, moved.unwrap_or_else(new));
+        sensor.set(Feature::One, moved.unwrap_or_else(|| constant(rest)));
     }
     document.gyro.orientation.rows = found.rows.iter().map(|row| row.map(tidy)).collect();
     document.gyro.orientation.thermal = None;
@@ -86,7 +84,7 @@ fn gyros(
 /// scale factor and one zero for all accelerometers, for readings in V or counts alone are no specific force.
 pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'static str) {
     let mut document = base.clone();
-    let mean = |values: [f64; 3]| tidy(values.iter().sum::<f64>() / 3.0);
+    let mean = |values: [f64; 3]| constant(values.iter().sum::<f64>() / 3.0);
     let raw = |accel: &&mut Accel| accel.output == AccelOutput::MetresPerSecondSquared;
     let words = if given {
         "Before is the given document."
@@ -99,16 +97,14 @@ pub fn before(base: &Document, tumble: &Tumble, given: bool) -> (Document, &'sta
     if let Some(accel) = document.accel.as_mut().filter(|accel| !given && !raw(accel)) {
         let scale_unit = accel.output.scale_unit();
         for sensor in &mut accel.sensor {
-            let constant = |value| Shape::Constant { value };
-            sensor.scale_factor = Curve::new(constant(mean(tumble.accel.scale))).in_unit(scale_unit);
-            sensor.set(Feature::One, Curve::new(constant(mean(tumble.accel.bias))));
+            sensor.scale_factor = mean(tumble.accel.scale).in_unit(scale_unit);
+            sensor.set(Feature::One, mean(tumble.accel.bias));
         }
     }
     if let (Ok(gyro), false) = (&tumble.gyro, given) {
         // Without the mean at rest the gyros would be judged by their bias, which nobody leaves in.
         for (sensor, rest) in document.gyro.sensor.iter_mut().zip(gyro.rest) {
-            let rest = AngularRate::from_rad_per_s(rest).as_deg_per_h();
-            sensor.set(Feature::One, Curve::new(Shape::Constant { value: tidy(rest) }));
+            sensor.set(Feature::One, constant(AngularRate::from_rad_per_s(rest).as_deg_per_h()));
         }
     }
     (document, words)

@@ -78,18 +78,16 @@ impl Tumble {
 /// Every reason why it cannot be, with what to do.
 pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>> {
     faults(track)?;
-    let factors: &[f64] = if settings.search { &FACTORS } else { &[] };
+    let factors = if settings.search { &FACTORS[..] } else { &[settings.limits.factor][..] };
     let mut best: Option<(f64, Vec<Pose>, AccelFit)> = None;
     let mut reasons = Vec::new();
-    let single = [settings.limits.factor];
-    for factor in if factors.is_empty() { &single[..] } else { factors } {
+    for factor in factors {
         let limits = StillLimits { factor: *factor, ..settings.limits };
-        let intervals = still(track, &limits, Some(settings.start_s));
-        let poses = Pose::of(track, 0, &intervals);
-        match found(track, &poses, settings).and_then(|()| {
-            accel::fit(&outputs(&poses), settings.gravity)
-                .map_err(|why| vec![doubts::no_accelerometers(&why)])
-        }) {
+        let poses = Pose::of(track, 0, &still(track, &limits, Some(settings.start_s)));
+        let fit = || accel::fit(&outputs(&poses), settings.gravity);
+        let fitted = found(track, &poses, settings)
+            .and_then(|()| fit().map_err(|why| vec![doubts::no_accelerometers(&why)]));
+        match fitted {
             Ok(fit) => {
                 let rms = Size::of(&fit.residual).rms;
                 if best.as_ref().is_none_or(|(_, _, other)| rms < Size::of(&other.residual).rms) {
@@ -101,7 +99,9 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     }
     let Some((factor, poses, accel)) = best else { return Err(reasons) };
     doubts::sound(&poses, &accel)?;
-    let held_out = held_out(&poses, &accel);
+    let force: Vec<[f64; 3]> = poses.iter().map(|pose| accel.force(&pose.outputs)).collect();
+    let directions: Vec<[f64; 3]> = force.iter().map(|force| unit(*force)).collect();
+    let held_out = held_out(&poses, &directions, accel.gravity);
     let mut warnings = Vec::new();
     let (after, outside) = (Size::of(&accel.residual).rms, Size::of(&held_out).rms);
     if outside > 2.0 * after {
@@ -115,16 +115,10 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     warnings.extend(doubts::ends_early(track, &poses));
     let rest = at_rest(&poses);
     let gyro = gyros(track, &poses, &accel, rest);
-    let force: Vec<[f64; 3]> = poses.iter().map(|pose| accel.force(&pose.outputs)).collect();
-    let directions: Vec<[f64; 3]> = force.iter().map(|force| unit(*force)).collect();
     let acceleration = acceleration::judged(&poses, &force, |a, b| !apart(&directions, a, b));
     let largest_rate = [0, 1, 2].map(|gyro| {
-        let column = track.gyros.get(gyro).map_or(&[][..], Vec::as_slice);
-        column
-            .iter()
-            .map(|rate| (rate - rest[gyro]).abs())
-            .filter(|away| away.is_finite())
-            .fold(0.0, f64::max)
+        let away = track.gyros.get(gyro).into_iter().flatten().map(|rate| (rate - rest[gyro]).abs());
+        away.filter(|away| away.is_finite()).fold(0.0, f64::max)
     });
     Ok(Tumble { poses, factor, accel, gyro, acceleration, held_out, largest_rate, warnings })
 }
@@ -169,7 +163,7 @@ fn found(track: &Track, poses: &[Pose], settings: &Settings) -> Result<(), Vec<S
         ));
         reasons.extend(track.gaps());
     }
-    reasons.extend(faults::clipped(std::slice::from_ref(track), poses));
+    reasons.extend(faults::clipped(std::slice::from_ref(track), &poses.iter().collect::<Vec<_>>()));
     if poses.len() < FEWEST_POSES {
         reasons.push(format!(
             "{} found, {FEWEST_POSES} are needed and 30 are good: put the unit down in more ways, for {} s each",
@@ -211,14 +205,12 @@ fn flat(poses: &[Pose]) -> Option<String> {
 
 /// |f| − g of every pose by the fit of those that look elsewhere. A unit that is put down by hand is often put down alike: of two
 /// poses next to each other the one knows what the other leaves, and a fit that has either says nothing of poses that are new.
-fn held_out(poses: &[Pose], fit: &AccelFit) -> Vec<f64> {
+fn held_out(poses: &[Pose], directions: &[[f64; 3]], gravity: f64) -> Vec<f64> {
     let all = outputs(poses);
-    let directions: Vec<[f64; 3]> = all.iter().map(|outputs| unit(fit.force(outputs))).collect();
     let one = |index: usize| {
-        let others = (0..all.len()).filter(|other| apart(&directions, index, *other));
+        let others = (0..all.len()).filter(|other| apart(directions, index, *other));
         let others: Vec<Vec<f64>> = others.map(|other| all[other].clone()).collect();
-        let fit = accel::fit(&others, fit.gravity);
-        fit.map_or(f64::NAN, |fit| norm(fit.force(&all[index])) - fit.gravity)
+        accel::fit(&others, gravity).map_or(f64::NAN, |fit| norm(fit.force(&all[index])) - gravity)
     };
     (0..all.len()).map(one).collect()
 }

@@ -5,6 +5,7 @@ mod search;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::fits::positions::matching::seen;
 use crate::fits::positions::track::Track;
 use crate::lsq::nonlinear::{NoSolution, solve};
 use crate::numbers::{Size, norm, real};
@@ -118,29 +119,29 @@ fn from(
     Ok(GyroFit { weight: start.weights(p), rest, rows: start.rows(p), sigma, angle })
 }
 
-/// The direction before the transition, as the case sees it after the gyros' rotation.
+/// The direction before a transition, as the case sees it after the gyros' rotation.
 fn turned(track: &Track, rest: [f64; 3], inverse: &Matrix3<f64>, transition: &Transition) -> [f64; 3] {
-    let mut seen = Vector3::from(transition.directions[0]);
-    for tick in transition.ticks[0]..transition.ticks[1] {
-        let output = |gyro: usize| {
-            let column = track.gyros.get(gyro).and_then(|column| column.get(tick));
-            column.copied().unwrap_or(f64::NAN) - rest[gyro]
-        };
-        let duration = track.duration_s.get(tick).copied().unwrap_or(0.0);
-        seen = crate::fits::positions::matching::seen(
-            inverse * Vector3::new(output(0), output(1), output(2)) * duration,
-        ) * seen;
-    }
-    seen.into()
+    let output = |gyro: usize, tick: usize| {
+        let column = track.gyros.get(gyro).and_then(|column| column.get(tick));
+        column.copied().unwrap_or(f64::NAN) - rest[gyro]
+    };
+    let rate = |tick| inverse * Vector3::from_fn(|gyro, _| output(gyro, tick));
+    seen_after(track, transition, rate).into()
 }
 
 /// Angle (rad) between the direction that corrected rates predict after a transition and the one that corrected accelerometers
 /// find there.
 pub fn angle_of(track: &Track, transition: &Transition) -> f64 {
-    let mut seen = Vector3::from(transition.directions[0]);
-    for tick in transition.ticks[0]..transition.ticks[1] {
-        let rate = Vector3::from_fn(|axis, _| track.rate_deg_per_s[axis][tick].to_radians());
-        seen = crate::fits::positions::matching::seen(rate * track.duration_s[tick]) * seen;
-    }
-    seen.angle(&Vector3::from(transition.directions[1]))
+    let rate = |tick: usize| Vector3::from_fn(|axis, _| track.rate_deg_per_s[axis][tick].to_radians());
+    seen_after(track, transition, rate).angle(&Vector3::from(transition.directions[1]))
+}
+
+/// The direction before a transition in a case that turns with a rate (rad/s) by tick.
+fn seen_after(track: &Track, transition: &Transition, rate: impl Fn(usize) -> Vector3<f64>) -> Vector3<f64> {
+    let [first, end] = transition.ticks;
+    let before = Vector3::from(transition.directions[0]);
+    (first..end).fold(before, |before, tick| {
+        let duration = track.duration_s.get(tick).copied().unwrap_or(0.0);
+        seen(rate(tick) * duration) * before
+    })
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::{Attitude, Plan, Position, mounting};
 use crate::csv;
 use crate::error::Error;
-use crate::numbers::{norm, unit};
+use crate::numbers::direction;
 
 /// What goes behind everything that is wrong with a plan.
 const HINT: &str = "; a plan is \"twelve\", \"six\", or a file as docs/calibration/positions.md shows";
@@ -67,24 +67,21 @@ impl Written {
             if positions.iter().any(|other| other.name == position.name) {
                 return Err(format!("position {:?} is given twice: names must differ", position.name));
             }
-            let attitude = match (position.axis_1_deg, position.axis_2_deg, position.up) {
-                (Some(first), Some(second), None) if first.is_finite() && second.is_finite() => {
-                    Attitude::Stand([first.to_radians(), second.to_radians()])
-                }
-                (None, None, Some(up)) => {
-                    let size = norm(up);
-                    if !(size.is_finite() && size > 0.0) {
-                        return Err(format!("position {:?}: up is {up:?}, not a direction", position.name));
+            let attitude =
+                match (position.axis_1_deg, position.axis_2_deg, position.up) {
+                    (Some(first), Some(second), None) if first.is_finite() && second.is_finite() => {
+                        Attitude::Stand([first.to_radians(), second.to_radians()])
                     }
-                    Attitude::Up(unit(up))
-                }
-                _ => {
-                    return Err(format!(
-                        "position {:?} needs axis_1_deg and axis_2_deg, or up = [x, y, z]",
-                        position.name
-                    ));
-                }
-            };
+                    (None, None, Some(up)) => Attitude::Up(direction(up).ok_or_else(|| {
+                        format!("position {:?}: up is {up:?}, not a direction", position.name)
+                    })?),
+                    _ => {
+                        return Err(format!(
+                            "position {:?} needs axis_1_deg and axis_2_deg, or up = [x, y, z]",
+                            position.name
+                        ));
+                    }
+                };
             positions.push(Position { name: position.name, attitude });
         }
         Ok(Plan { mounting, positions })

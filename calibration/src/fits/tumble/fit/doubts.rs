@@ -35,20 +35,14 @@ pub(super) const WRONG_GYROS: &str = "check the unit of measure of the gyros in 
 
 /// A fit of the accelerometers without a solution, in words.
 pub(super) fn no_accelerometers(why: &NoSolution) -> String {
-    const NAMES: [&str; 9] = [
-        "the scale factor of x",
-        "the scale factor of y",
-        "the scale factor of z",
-        "the bias of x",
-        "the bias of y",
-        "the bias of z",
-        "the angle between x and y",
-        "the angle between x and z",
-        "the angle between y and z",
-    ];
+    let name = |index: usize| match index / 3 {
+        0 => format!("the scale factor of {}", AXES[index]),
+        1 => format!("the bias of {}", AXES[index - 3]),
+        _ => format!("the angle between {}", ["x and y", "x and z", "y and z"][index - 6]),
+    };
     why.words(
         "the poses",
-        |index| NAMES.get(index).copied().unwrap_or("all parameters").to_owned(),
+        name,
         "put the unit down in more different ways",
         "no scale factors, biases and angles make |f| = g in all poses: check every column of the mapping, and that \
          the unit of measure is the same throughout. Put the unit on edges and corners too, not only on its faces",
@@ -203,7 +197,7 @@ mod tests {
 
     #[test]
     fn what_was_not_found_is_said_in_plain_words() {
-        let patience = NoSolution::NoMinimum("LostPatience".to_owned());
+        let patience = NoSolution::NoMinimum;
         // What no document may state is refused before it is written, without the numbers of a matrix.
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let of =

@@ -6,7 +6,7 @@ use super::Tumble;
 use crate::axes::{AXES, several};
 use crate::document::scale_at;
 use crate::fits::positions::measure;
-use crate::fits::positions::sense::{Beside, elsewhere, out_of_place, places};
+use crate::fits::positions::sense::{Beside, elsewhere, of_accelerometers, out_of_place, places};
 use crate::report::short;
 
 /// Words where gyros lie elsewhere than stated: `Err` where the accelerometers show a mirror image of the case by the fewest mistakes.
@@ -45,18 +45,11 @@ pub(in crate::fits::tumble) fn odd(
 ) -> Result<Vec<String>, Vec<String>> {
     let mut words = Vec::new();
     if let Some(accel) = &base.accel {
-        let stated: Vec<f64> = (accel.sensor.iter())
-            .map(|sensor| scale_at(sensor, temperature(sensor.channel.as_ref())))
-            .collect();
-        let found = tumble.accel.scale.iter().zip(&tumble.accel.rows);
-        let beside = found
-            .zip(stated.iter().zip(&accel.orientation.rows))
-            .map(|((scale, row), (old, axis))| Beside::new([*scale, *old], [*row, *axis]));
-        let beside: Vec<Beside> = beside.collect();
-        words.extend(elsewhere("accelerometer", &beside));
-        let scale = &tumble.accel.scale;
-        words.extend(measure::Beside::accelerometers(accel.output, scale, &stated).words());
-        words.extend(measure::already_m_per_s2(accel.output, scale, &stated));
+        let stated = accel.sensor.iter().map(|sensor| scale_at(sensor, temperature(sensor.channel.as_ref())));
+        let stated: Vec<f64> = stated.collect();
+        let (elsewhere, measure) =
+            of_accelerometers(accel, [&tumble.accel.scale, &stated], &tumble.accel.rows);
+        words.extend(elsewhere.into_iter().chain(measure));
     }
     let Ok(gyro) = &tumble.gyro else { return Ok(words) };
     let stated: Vec<f64> =
@@ -66,7 +59,7 @@ pub(in crate::fits::tumble) fn odd(
         .zip(stated.iter().zip(&base.gyro.orientation.rows))
         .map(|((weight, row), (old, axis))| Beside::new([*weight, *old], [*row, *axis]));
     words.extend(gyros(&beside.collect::<Vec<_>>()).map_err(|mirrored| vec![mirrored])?);
-    words.extend(measure::Beside::gyros(&gyro.weight, &stated).words());
+    words.extend(measure::gyros(&gyro.weight, &stated));
     words.extend(far_from_zero(tumble));
     Ok(words)
 }

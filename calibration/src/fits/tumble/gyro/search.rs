@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use super::{Track, Transition, others, turned};
 use crate::numbers::unit;
-use crate::runs::swapped::ORDERS;
+use crate::runs::swapped::{AS_LOGGED, ORDERS};
 
 /// Factors between the log's unit of measure and rad/s that are tried: rad/s, °/s and rad/s for each other, hours for seconds,
 /// and what lies between.
@@ -71,7 +71,7 @@ pub(super) fn likely(track: &Track, rest: [f64; 3], transitions: &[Transition]) 
         turns.iter().map(of).sum()
     };
     let mut all = Vec::new();
-    for along in std::iter::once([0, 1, 2]).chain(ORDERS) {
+    for along in std::iter::once(AS_LOGGED).chain(ORDERS) {
         for scale in SCALES {
             for signs in 0..8_u8 {
                 let weight = [0, 1, 2].map(|gyro| if signs >> gyro & 1 == 1 { -scale } else { scale });
