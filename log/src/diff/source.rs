@@ -110,18 +110,19 @@ impl CorrectedLog {
         let path = &self.path;
         let failed = |source| Error::file(path, "read the corrected log", source);
         let part = &mut self.part;
-        let mut is_in_part =
-            |LogTick { tick, .. }: &LogTick| part.holds(tick.end_time - tick.duration, tick.end_time);
+        let mut take = |ticks: &mut Vec<LogTick>| {
+            ticks.retain(|LogTick { tick, .. }: &LogTick| {
+                part.holds(tick.end_time - tick.duration, tick.end_time)
+            });
+            part.over
+        };
         match &mut self.source {
             Source::Recording(recording) => recording.next_ticks(),
             Source::Csv { lines, unit, line } => loop {
                 let mut ticks = read_rows(lines, line).map_err(failed)?;
-                if ticks.is_empty() {
-                    return Ok(None);
-                }
-                ticks.retain(&mut is_in_part);
-                if !ticks.is_empty() {
-                    return Ok(Some(Ticks { unit: unit.clone(), ticks }));
+                let over = ticks.is_empty() || take(&mut ticks);
+                if over || !ticks.is_empty() {
+                    return Ok((!ticks.is_empty()).then(|| Ticks { unit: unit.clone(), ticks }));
                 }
             },
             Source::Wire { bytes, units, frame, begun } => loop {
@@ -135,7 +136,7 @@ impl CorrectedLog {
                 let Some(batch) = read? else { return Ok(None) };
                 *begun = true;
                 let mut ticks = ticks_of(batch)?;
-                ticks.ticks.retain(&mut is_in_part);
+                take(&mut ticks.ticks);
                 if !ticks.ticks.is_empty() && (units.is_empty() || units.contains(&ticks.unit)) {
                     return Ok(Some(ticks));
                 }

@@ -131,3 +131,24 @@ fn what_is_no_corrected_log_is_refused_with_its_place() {
     });
     insta::assert_snapshot!(refused.join("\n").replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
+
+#[test]
+fn a_part_of_a_csv_is_its_ticks_that_begin_and_end_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let unit = unit_id("U-1").unwrap();
+    let all: Vec<_> = (0..3000).map(tick).collect();
+    let path = csv(folder.path(), "long.csv", &all);
+    let sequences = |start, end: Option<u32>| {
+        let part = Part { start: Span::from_ms(start), end: end.map(Span::from_ms), ..Part::default() };
+        let mut log = CorrectedLog::open(&path, &part, &unit).unwrap();
+        let mut found = Vec::new();
+        while let Some(ticks) = log.next_ticks().unwrap() {
+            found.extend(ticks.ticks.iter().map(|tick| tick.tick.sequence));
+        }
+        found
+    };
+    assert_eq!(sequences(0, Some(10)), [0, 1]);
+    assert_eq!(sequences(12_498, Some(12_520)), [2500, 2501, 2502, 2503]);
+    assert_eq!(sequences(14_990, None), [2998, 2999]);
+    assert!(sequences(20_000, None).is_empty());
+}

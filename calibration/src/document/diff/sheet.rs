@@ -33,7 +33,7 @@ impl Changes {
                 let beyond = self.turned();
                 let names: Vec<&str> = beyond.iter().map(|axis| axis.of.as_str()).collect();
                 let judged = if self.axes.iter().all(|axis| axis.significance.is_none()) {
-                    "no document states its uncertainty".to_owned()
+                    "not both documents state their uncertainty".to_owned()
                 } else if names.is_empty() {
                     format!("no axis beyond {BEYOND} σ")
                 } else {

@@ -28,6 +28,10 @@ pub fn fitted(
         if let Some(own) = document.gyro.sensor.get_mut(sensor) {
             let weights = [&mut own.increment_weight_arcsec_per_count, &mut own.increment_weight_rad_per_rad];
             weights.into_iter().flatten().for_each(|weight| *weight = tidy(*weight / gain));
+            if let Some([change, _]) = found.weight_asymmetry_ppm() {
+                let old = own.terms.curve(Feature::RateMagnitude).map(|asymmetry| asymmetry.plus(change));
+                own.set(Feature::RateMagnitude, old.unwrap_or_else(|| constant(change)));
+            }
             if with_bias {
                 let change = found.bias[0];
                 let bias = own.terms.curve(Feature::One).map(|bias| bias.plus(change));
@@ -59,6 +63,9 @@ pub fn sigmas(made: &Made) -> Sigmas {
         let Ok(found) = found else { continue };
         let ppm = tidy(1e6 * found.gain[1] / found.gain[0].abs());
         sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        if let Some([_, sigma]) = found.weight_asymmetry_ppm() {
+            sigmas.put("gyro", &sensor.name, "increment_weight_asymmetry", vec![tidy(sigma)]);
+        }
         if found.axis.is_some() {
             let arcsec = found.axis_sigma.map(|sigma| tidy(Angle::from_rad(sigma).as_arcsec()));
             sigmas.put("gyro", &sensor.name, "axis_arcsec", arcsec.to_vec());

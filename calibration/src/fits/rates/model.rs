@@ -22,6 +22,9 @@ const ALLOWED: f64 = 3.0;
 /// Least variance that a step is taken to leave, over that of its noise.
 const LEAST_SPARE: f64 = 1e-3;
 
+/// Size of an asymmetry, in its standard deviations, from which on it is no accident.
+const SEEN: f64 = 4.0;
+
 /// One step as a gyro saw it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
@@ -59,6 +62,13 @@ pub struct GyroRates {
 }
 
 impl GyroRates {
+    /// The asymmetry of the weight that takes that of the scale factor away (ppm), and its standard error, where it is none by accident:
+    /// half of it, the other way round (models §2).
+    pub fn weight_asymmetry_ppm(&self) -> Option<[f64; 2]> {
+        let [value, sigma] = self.asymmetry.filter(|[value, sigma]| self.stands_out(value / sigma, SEEN))?;
+        Some([-0.5e6 * value, 0.5e6 * sigma])
+    }
+
     /// Whether a value of so many standard errors is no more of an accident than `seen` of them were, if they were known. Widened ones
     /// are known no better than the few steps about the gyro's own axis tell.
     pub fn stands_out(&self, sigmas: f64, seen: f64) -> bool {

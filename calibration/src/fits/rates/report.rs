@@ -14,8 +14,6 @@ use crate::report::{Report, counted, fixed, gyros, per_deg_c, short, together};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
-/// Largest size of what is left, in its standard deviations, before it is called a nonlinearity.
-const SEEN: f64 = 4.0;
 /// Share by which a weight changes at most without a word: what micromechanical gyros differ by from their data sheet.
 const OTHER_WEIGHT: f64 = 0.1;
 
@@ -39,8 +37,8 @@ impl Made {
         ));
         report.notes.push(
         "Before and after are the errors of the corrected rate over the steps, less Earth's rate and mean error \
-         (bias). The increment weight is the mean for positive and negative input; asymmetry and nonlinearity are \
-         in origin.details."
+         (bias). The increment weight is the mean for positive and negative input; nonlinearity is in \
+         origin.details."
             .to_owned(),
     );
         let mut told: Vec<(&str, String)> = Vec::new();
@@ -234,13 +232,11 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
         short(1e6 * worst / full),
         short(full / 3600.0)
     ));
-    if let Some([value, sigma]) =
-        found.asymmetry.filter(|[value, sigma]| found.stands_out(value / sigma, SEEN))
-    {
-        report.warnings.push(format!(
-            "gyro {name}: positive and negative scale factor differ by {} ± {} ppm, which is not in the document",
-            short(1e6 * value),
-            short(1e6 * sigma)
+    if let Some([value, sigma]) = found.weight_asymmetry_ppm() {
+        report.notes.push(format!(
+            "gyro {name}: positive and negative scale factor differ: increment_weight_asymmetry changes by {} ± {} ppm.",
+            short(value),
+            short(sigma)
         ));
     }
 }
