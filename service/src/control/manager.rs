@@ -129,7 +129,7 @@ impl Worker {
             refusals: Refusals::default(),
             control_status: Arc::default(),
             lost: None,
-            losses: losses(opened),
+            losses: opened.lost.clone(),
             group: None,
             unclaimed: Vec::new(),
             unwritten: Vec::new(),
@@ -288,10 +288,4 @@ impl Worker {
             tracing::error!(unit, revision, "{what} is not in the audit file: {error}");
         }
     }
-}
-
-/// What was lost, in words, with the unit that it concerns.
-fn losses(opened: &Opened) -> Vec<(Option<UnitId>, String)> {
-    let lost = opened.lost.iter().map(|lost| (UnitId::new(&lost.unit).ok(), lost.to_string()));
-    lost.chain(opened.emptied.iter().map(|emptied| (None, emptied.to_string()))).collect()
 }
