@@ -48,4 +48,3 @@ pub(crate) use control_status::{ControlStatus, STATE_FOLDER, UNWRITTEN};
 pub(crate) use manager::{SwapManager, Worker};
 pub(crate) use queue::{Asked, Inbox, Message, Notice, Origin, PreLaunchEnd};
 pub(crate) use request::is_asked;
-pub(crate) use start::Found;

@@ -17,9 +17,6 @@ use super::revision::{Calibrations, Record, Revision};
 use crate::control::watch::{Known, files_in};
 use crate::signing::check_signature;
 
-/// What was found of each file of the folder, for its watcher.
-pub(crate) type Found = std::collections::BTreeMap<std::path::PathBuf, Known>;
-
 impl Worker {
     /// Takes over calibrations that the program itself was started with.
     pub(crate) fn take_over(&mut self, calibrations: &Calibrations) {
@@ -80,22 +77,22 @@ impl Worker {
     ///
     /// # Errors
     /// Where the folder itself cannot be read.
-    pub(crate) fn read_folder(&mut self) -> std::io::Result<(Found, usize)> {
-        let mut found = Found::new();
+    pub(crate) fn read_folder(&mut self) -> std::io::Result<(Known, usize)> {
+        let mut found = Known::new();
         let Some(folder) = self.folder.path.clone() else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
         for (file, read) in read_all(&files_in(&folder, "toml")?) {
             match read {
                 Ok(read) => {
-                    found.insert(file.clone(), Known::Content(read.digest));
+                    found.insert(file.clone(), Some(read.digest));
                     self.folder.enter(&file, &read);
                     contents.push((file, read));
                 }
                 Err(error) => {
                     let problem = self.folder.unreadable(&file, &error.to_string());
                     tracing::error!("{problem}");
-                    found.insert(file, Known::Unreadable);
+                    found.insert(file, None);
                     bad += 1;
                 }
             }
