@@ -135,7 +135,9 @@ pub(crate) async fn start_on(
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let inbox = inbox.clone();
-            let watcher = Watcher::start(folder, settings.folder, found, move |event| inbox.folder(event));
+            let watcher = Watcher::start(folder, settings.folder, found, move |event| {
+                inbox.tell_in_turn(Message::Folder(event))
+            });
             Some(watcher.map_err(ServiceError::Thread)?)
         }
         None => None,
@@ -293,7 +295,7 @@ impl RunningService {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
         // Where there is no room the documents are judged with what is there.
-        self.inbox.tell(Message::JudgeAgain);
+        let _ = self.inbox.tell(Message::JudgeAgain);
     }
 
     /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.

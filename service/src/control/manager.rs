@@ -19,7 +19,7 @@ use super::compressed::CompressedText;
 use super::control_status::ControlStatus;
 use super::decision::Decision;
 use super::folder::Folder;
-use super::queue::{Inbox, Message, Notice, Queue, Stopped};
+use super::queue::{Inbox, Message, Notice, Stopped};
 use super::refusals::Refusals;
 use super::request::Request;
 use super::revision::Record;
@@ -30,7 +30,7 @@ use crate::receive::intake::Intake;
 /// The running swap manager. Dropped without [`SwapManager::stop`] it ends by itself after what waits.
 #[derive(Debug)]
 pub(crate) struct SwapManager {
-    queue: Arc<Queue>,
+    inbox: Inbox,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -40,17 +40,17 @@ impl SwapManager {
     /// # Errors
     /// Where the system gives no thread.
     pub(crate) fn start(inbox: &Inbox, work: Worker) -> std::io::Result<Self> {
-        let (queue, requests) = (inbox.queue(), inbox.queue());
+        let (inbox, requests) = (inbox.clone(), inbox.clone());
         let thread = std::thread::Builder::new().name("isotherm-control".to_owned()).spawn(move || {
             yield_to_ticks();
             work.run(&requests);
         })?;
-        Ok(Self { queue, thread: Some(thread) })
+        Ok(Self { inbox, thread: Some(thread) })
     }
 
     /// Has it finish what waits and ends it; whether it ended in order.
     pub(crate) fn stop(mut self) -> bool {
-        self.queue.stop();
+        self.inbox.stop();
         self.thread.take().is_some_and(|thread| thread.join().is_ok())
     }
 }
@@ -70,7 +70,7 @@ fn yield_to_ticks() {
 impl Drop for SwapManager {
     fn drop(&mut self) {
         // Units hold a way to it for as long as it holds them: nothing else would ever end it.
-        self.queue.stop();
+        self.inbox.stop();
     }
 }
 
@@ -146,7 +146,7 @@ impl Worker {
     }
 
     /// Works until it is told to stop, and then finishes what units still have to tell.
-    pub(super) fn run(mut self, queue: &Queue) {
+    pub(super) fn run(mut self, queue: &Inbox) {
         self.show();
         loop {
             queue.know(self.records.keys());

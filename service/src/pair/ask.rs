@@ -252,7 +252,7 @@ impl Asker {
         // A document may lie under an overlay: that is known when the overlay is there.
         for _ in 0..2 {
             let (answer, lacking) = oneshot::channel();
-            self.inbox.tell(Message::Lacks(carried.clone(), answer));
+            let _ = self.inbox.tell(Message::Lacks(carried.clone(), answer));
             for digest in lacking.await.unwrap_or_default() {
                 let found = self.ask(&key::kept("*", &digest)).await;
                 let bytes = found.iter().map(|sample| sample.payload().to_bytes().into_owned());
@@ -262,7 +262,7 @@ impl Asker {
             }
         }
         let (answer, done) = oneshot::channel();
-        self.inbox.tell(Message::Carry(carried, answer));
+        let _ = self.inbox.tell(Message::Carry(carried, answer));
         done.await.is_ok()
     }
 }
