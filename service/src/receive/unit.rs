@@ -5,15 +5,15 @@ mod arrivals;
 mod journal_writer;
 mod notices;
 mod present;
-mod seen;
 mod speech;
 mod unknown_channels;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use isotherm_correction::observation::Observation;
 use isotherm_correction::operation::{Command, Refusal, State};
-use isotherm_correction::unit::{self, UnitSettings};
+use isotherm_correction::unit::{self, Applied, UnitSettings};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
@@ -33,7 +33,6 @@ use speech::Speech;
 pub(crate) use account::SwapAccount;
 pub use journal_writer::{Journal, JournalOutlet};
 pub(crate) use present::Present;
-pub(crate) use seen::TickSeen;
 pub(crate) use speech::{Footing, Standing, Wants};
 use unknown_channels::UnknownChannels;
 
@@ -244,15 +243,17 @@ impl UnitActor {
             // It goes away: nothing is given back for it.
             match self.let_out(std::mem::take(&mut frame)) {
                 Ok(()) => published = true,
-                Err(error) => self.fault(FaultKind::Unpublished, ticks as u64, || {
-                    format!("corrected: {}", isotherm_bus::words(&error))
-                }),
+                Err(error) => self.note_unpublished(ticks as u64, &error),
             }
         }
         published
     }
 
     /// Counts a fault, and logs the first of its kind; of those that follow, their number once a minute.
+    fn note_unpublished(&mut self, count: u64, error: &zenoh::Error) {
+        self.fault(FaultKind::Unpublished, count, || format!("corrected: {}", isotherm_bus::words(error)));
+    }
+
     fn fault(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) {
         let Some(telling) = self.faults.note(kind, count, words) else { return };
         self.status_due |= matches!(telling, Telling::First(_));
@@ -302,6 +303,12 @@ impl UnitActor {
     /// What the unit is like at this moment.
     pub(crate) fn present(&self) -> Present {
         Present::of(self.stream.unit())
+    }
+
+    /// The last tick that was corrected, and what was subtracted from it; `None` before the first, and without a calibration.
+    pub(crate) fn tick_seen(&self) -> Option<(Observation, Applied)> {
+        let unit = self.stream.unit();
+        Some((unit.observation()?.clone(), unit.applied()?))
     }
 
     /// The change that waits for its tick: its revision counter, and when it takes effect.

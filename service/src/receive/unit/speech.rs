@@ -6,7 +6,6 @@
 mod following;
 mod heard;
 mod kept;
-mod output;
 
 use std::time::{Duration, Instant};
 
@@ -143,6 +142,26 @@ impl UnitActor {
         }
         let due = following.kept.due(now, REPEATED);
         due.into_iter().map(|frame| (self.outlet)(frame)).fold(Ok(()), Result::and)
+    }
+
+    /// An active instance publishes what its stream makes as soon as that has joined, and what it made until then: the other may have
+    /// stood still meanwhile, and published nothing.
+    fn publish_owed(&mut self, now: Instant, active: bool) {
+        let Some(following) = &mut self.speech.following else { return };
+        following.also_out = active && following.follower.has_joined();
+        if following.also_out {
+            let owed = following.kept.due(now, REPEATED);
+            self.publish_kept(owed);
+        }
+    }
+
+    /// Publishes frames that were kept.
+    fn publish_kept(&mut self, frames: Vec<Vec<u8>>) {
+        for frame in frames {
+            if let Err(error) = (self.outlet)(frame) {
+                self.note_unpublished(1, &error);
+            }
+        }
     }
 
     /// Goes on as the journal says, as far as frames and entries have come.
