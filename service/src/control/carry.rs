@@ -87,7 +87,7 @@ impl Worker {
     }
 
     /// Has a unit begin anew with what is written down of it.
-    fn plan_again(&mut self, unit: &UnitId, record: Record) {
+    pub(super) fn plan_again(&mut self, unit: &UnitId, record: Record) {
         let plan = record.plan.clone();
         self.records.insert(unit.clone(), record);
         self.intake.plan_again(unit, plan);

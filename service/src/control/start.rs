@@ -20,7 +20,7 @@ use crate::signing::check_signature;
 impl Worker {
     /// Takes over calibrations that the program itself was started with.
     pub(crate) fn take_over(&mut self, calibrations: &Calibrations) {
-        for (unit, plan) in calibrations.iter() {
+        for (unit, plan) in &calibrations.plans {
             let Some(current) = &plan.current else { continue };
             let counter = current.number.counter;
             self.records.insert(unit.clone(), Record { counter, plan: plan.clone(), ..Record::default() });
@@ -35,8 +35,7 @@ impl Worker {
             if let Some(last) = record.last() {
                 tracing::info!(%unit, revision = last.number.counter, "last good calibration restored");
             }
-            self.intake.restore(&unit, record.plan.clone());
-            self.records.insert(unit, record);
+            self.plan_again(&unit, record);
         }
     }
 

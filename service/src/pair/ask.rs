@@ -36,26 +36,12 @@ const ENTRIES: u32 = 1000;
 /// Where questions are handed in.
 #[derive(Debug, Clone)]
 pub(crate) struct Questions {
-    memories: UnboundedSender<UnitId>,
-    records: UnboundedSender<Option<UnitId>>,
-    takes: UnboundedSender<String>,
-}
-
-impl Questions {
     /// The memory of a unit.
-    pub(super) fn memory(&self, unit: UnitId) {
-        let _ = self.memories.send(unit);
-    }
-
+    pub(super) memories: UnboundedSender<UnitId>,
     /// The histories of a unit, or of all, and the documents in them.
-    pub(super) fn records(&self, unit: Option<UnitId>) {
-        let _ = self.records.send(unit);
-    }
-
+    pub(super) records: UnboundedSender<Option<UnitId>>,
     /// What an instance of another group takes.
-    pub(super) fn takes(&self, instance: String) {
-        let _ = self.takes.send(instance);
-    }
+    pub(super) takes: UnboundedSender<String>,
 }
 
 /// What is asked with; its tasks end with the last [`Questions`].

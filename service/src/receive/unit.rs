@@ -8,6 +8,7 @@ mod present;
 mod speech;
 mod unknown_channels;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -104,7 +105,7 @@ impl UnitActor {
 
     /// To whom the unit tells what only the swap manager can write down.
     pub(crate) fn report_to(&mut self, inbox: Inbox) {
-        self.notices.report_to(inbox);
+        self.notices.inbox = Some(inbox);
     }
 
     /// Has a calibration take effect at its tick: the only way by which a unit ever gets one. Gives the revision counter of
@@ -162,7 +163,7 @@ impl UnitActor {
         let repeat = (is_gyro && self.arrivals.is_repeat(frame)).then(|| self.contradicting());
         let received = self.stream.receive(input, frame);
         if let Some(before) = repeat {
-            self.arrivals.note_repeat(self.contradicting() - before);
+            self.arrivals.repeated += self.contradicting() - before;
         }
         let series = (is_gyro && received.is_ok()).then(|| self.stream.incoming_series());
         self.arrivals.note(input, series, arrival);
@@ -296,8 +297,8 @@ impl UnitActor {
     }
 
     /// What is left to tell when the swap manager ends.
-    pub(crate) fn take_untold(&mut self) -> Vec<Notice> {
-        self.notices.take_untold()
+    pub(crate) fn take_untold(&mut self) -> VecDeque<Notice> {
+        std::mem::take(&mut self.notices.untold)
     }
 
     /// What the unit is like at this moment.

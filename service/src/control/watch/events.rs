@@ -25,7 +25,7 @@ pub(super) struct FsEvents {
     make: MakeListener,
     listener: Option<Listener>,
     /// Why there are no events, as it was logged.
-    complaint: Option<String>,
+    pub(super) complaint: Option<String>,
 }
 
 impl FsEvents {
@@ -39,11 +39,6 @@ impl FsEvents {
     /// Whether no event can come.
     pub(super) fn are_deaf(&self) -> bool {
         self.listener.is_none()
-    }
-
-    /// Why there are no events, as it was logged.
-    pub(super) fn complaint(&self) -> Option<&String> {
-        self.complaint.as_ref()
     }
 
     /// The watch has ended.

@@ -103,7 +103,7 @@ impl<S: Fn(FolderEvent)> Worker<S> {
         let polling = now >= self.next_poll;
         // Before the look, so that what happens after it is heard.
         if (polling || self.events.are_deaf()) && self.events.tend() {
-            (self.sink)(FolderEvent::Deaf(self.events.complaint().cloned()));
+            (self.sink)(FolderEvent::Deaf(self.events.complaint.clone()));
         }
         self.asked = None;
         match files_in(&self.folder, "toml") {

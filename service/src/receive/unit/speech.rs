@@ -169,7 +169,7 @@ impl UnitActor {
         let Some(following) = &mut self.speech.following else { return };
         let ns = following.ns(now);
         let had_joined = following.follower.has_joined();
-        let (rebuilt, stuck) = following.follower.advance(&self.stream, following.kept.made(), ns);
+        let (rebuilt, stuck) = following.follower.advance(&self.stream, following.kept.made, ns);
         if stuck {
             following.lose();
         }
@@ -273,9 +273,9 @@ impl UnitActor {
             self.speech.memory_due = true;
         }
         for order in orders {
-            self.notices.push(Notice::Followed(Box::new(order)));
+            self.notices.untold.push_back(Notice::Followed(Box::new(order)));
         }
-        self.notices.push(Notice::Speaks);
+        self.notices.untold.push_back(Notice::Speaks);
         self.status_due = true;
         self.look();
     }
