@@ -183,7 +183,7 @@ impl Source {
             instances: self.pair.others().len() as u64 + 1,
             faults: self.intake.faults(),
             log_lines_dropped: dropped_lines(),
-            late_receipts: self.subscribers.late_receipts(),
+            late_receipts: self.subscribers.fault().map_or(0, |fault| fault.count),
             posted: self.control_status.read(),
             units,
         }

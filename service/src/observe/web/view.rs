@@ -65,17 +65,15 @@ struct Row {
     correction_mg: Option<f64>,
     raw_ticks_per_s: Option<f64>,
     p99_ns: u64,
-    gaps: u64,
-    duplicates: u64,
-    late: u64,
-    bad: u64,
+    /// Counted since the service started.
+    #[serde(flatten)]
+    counted: Lately,
 }
 
 impl Row {
     fn of(unit: &Unit<'_>) -> Self {
         let status = unit.status;
         let (channel, applied) = (channel_in_view(status), applied(status));
-        let counted = Lately::counted(status);
         Self {
             unit: status.unit.clone(),
             instance: status.instance.clone(),
@@ -93,10 +91,7 @@ impl Row {
             correction_mg: applied.map(|[_, force]| force),
             raw_ticks_per_s: knows_rates(status).then_some(status.input_rates.gyro_ticks_per_s),
             p99_ns: status.latency.p99_ns,
-            gaps: counted.gaps,
-            duplicates: counted.duplicates,
-            late: counted.late,
-            bad: counted.bad,
+            counted: Lately::counted(status),
         }
     }
 }
