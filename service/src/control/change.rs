@@ -123,7 +123,7 @@ impl Worker {
     /// group is written.
     fn accept(&mut self, request: &Request, decision: &Decision) -> Result<(), StoreError> {
         if let Some(layers) = decision.document.as_ref().and_then(|document| document.layers.as_ref()) {
-            self.store.put_overlay(layers.text.read().as_bytes())?;
+            self.store.put_overlay(&layers.text.read())?;
         }
         let accepted = (request.clone(), decision.clone());
         if let Some(group) = &mut self.group {
@@ -170,9 +170,9 @@ impl Worker {
             Some((request, unit, document, self.acceptance(request, decision)?))
         });
         let accepted: Vec<_> = accepted.collect();
-        let text = |document: &Document| Some(document.text.as_ref()?.bytes().clone());
-        let documents =
-            accepted.iter().filter_map(|(.., document, accepted)| Some((accepted.digest, text(document)?)));
+        let documents = accepted
+            .iter()
+            .filter_map(|(.., document, accepted)| Some((accepted.digest, document.text.clone()?)));
         self.store.put_documents(&documents.collect::<Vec<_>>())?;
         let entries = accepted.iter().map(|(request, unit, _, accepted)| {
             (Some(*unit), request.options.by.as_str(), AuditEvent::Accepted(accepted.clone()))

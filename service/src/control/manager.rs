@@ -15,7 +15,7 @@ use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::{AuditEvent, FirstTick};
 use isotherm_protocol::key::UnitId;
 
-use super::compressed::CompressedText;
+use super::compressed::Compressed;
 use super::control_status::ControlStatus;
 use super::decision::Decision;
 use super::folder::Folder;
@@ -186,7 +186,7 @@ impl Worker {
         let layers = kept.clone().filter_map(|document| document.layers.as_ref());
         let bases = layers.clone().map(|layers| &layers.base);
         let documents = kept.filter_map(|document| document.text.as_ref()).chain(bases);
-        let documents = documents.map(CompressedText::read);
+        let documents = documents.map(Compressed::read);
         let overlays = layers.map(|layers| layers.text.read());
         let lost = match self.store.keep(SystemTime::now(), documents, overlays) {
             // A trial that goes well is less than a document that does not.

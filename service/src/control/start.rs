@@ -127,7 +127,7 @@ impl Worker {
         if !self.swap.require_signature {
             return None;
         }
-        let signed = document.signed()?.read();
+        let signed = document.signed()?.text();
         let name = format!("revision {revision}");
         let (mut problems, mut warnings) = (Vec::new(), Vec::new());
         check_signature(&self.swap, &signed, &name, &mut problems, &mut warnings);
