@@ -131,8 +131,6 @@ impl Calibrations {
 /// What the swap manager keeps of one unit.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
-    /// Highest revision counter that it was ever given.
-    pub(super) counter: u64,
     /// What it was given, and is to follow. What has come in force since may still stand there as what is to follow.
     pub(super) plan: Plan,
     /// Swaps accepted since the service started: what a unit is given first, from its file, is none.

@@ -21,9 +21,7 @@ impl Worker {
     /// Takes over calibrations that the program itself was started with.
     pub(crate) fn take_over(&mut self, calibrations: &Calibrations) {
         for (unit, plan) in &calibrations.plans {
-            let Some(current) = &plan.current else { continue };
-            let counter = current.number.counter;
-            self.records.insert(unit.clone(), Record { counter, plan: plan.clone(), ..Record::default() });
+            self.records.insert(unit.clone(), Record { plan: plan.clone(), ..Record::default() });
         }
     }
 
@@ -41,7 +39,7 @@ impl Worker {
 
     /// What the state folder says of a unit.
     pub(super) fn restored(&self, unit: &UnitId) -> Record {
-        let mut record = Record { counter: self.store.highest_revision(unit), ..Record::default() };
+        let mut record = Record::default();
         let orders = self.store.intent(unit).into_iter().flat_map(Intent::orders);
         // What was carried out once is understood.
         record.plan.intent = orders.filter_map(|order| self.core_command(&order).ok()).collect();
