@@ -176,7 +176,7 @@ impl Worker {
         let entries = accepted.iter().map(|(request, unit, _, accepted)| {
             (Some(*unit), request.options.by.as_str(), AuditEvent::Accepted(accepted.clone()))
         });
-        self.entries = self.store.append_all(SystemTime::now(), entries)?;
+        self.store.append_all(SystemTime::now(), entries)?;
         for (request, unit, document, accepted) in accepted {
             let next = Revision::new(accepted.revision, Arc::clone(document), &accepted.source);
             let (at, slew) = (accepted.schedule, self.slew(request));

@@ -46,10 +46,10 @@ impl Worker {
         let posted = ServiceStatus {
             calibrations,
             bad_documents: bad.collect(),
-            store: self
-                .store
-                .folder()
-                .map(|path| StoreStatus { path: shown(&path.display()), audit_entries: self.entries }),
+            store: self.store.folder().map(|path| StoreStatus {
+                path: shown(&path.display()),
+                audit_entries: self.store.last_number(),
+            }),
             faults: self.faults(),
             swaps_accepted: self.accepted,
             swaps_refused: self.refusals.count,

@@ -84,8 +84,6 @@ pub(crate) struct Worker {
     pub(super) certified_names: bool,
     pub(super) intake: Arc<Intake>,
     pub(super) store: Store,
-    /// Number of the last entry of the audit file.
-    pub(super) entries: u64,
     pub(super) records: BTreeMap<UnitId, Record>,
     pub(super) folder: Folder,
     /// Swaps accepted since the service started, those of units that were forgotten too.
@@ -114,9 +112,7 @@ const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 impl Worker {
     /// A swap manager that knows nothing yet; [`Worker::restore`] and [`Worker::read_folder`] tell it what holds.
     pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, store: Store, opened: &Opened) -> Self {
-        let last = store.history(None, 1).unwrap_or_default();
         Self {
-            entries: last.last().map_or(0, |entry| entry.number),
             swap: settings.swap.clone(),
             pre_launch: settings.pre_launch,
             in_standby: settings.unit.in_standby,
@@ -272,8 +268,7 @@ impl Worker {
     ) -> Result<(), StoreError> {
         // What was accepted before comes before.
         self.write_group();
-        self.entries = self.store.append(SystemTime::now(), unit, by, event)?;
-        Ok(())
+        self.store.append(SystemTime::now(), unit, by, event).map(drop)
     }
 
     /// Writes down what happens whether or not it can be written down.

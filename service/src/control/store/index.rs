@@ -217,6 +217,11 @@ impl Index {
 
 /// What holds by the entries so far.
 impl Store {
+    /// Number of the last entry; 0 where there is none.
+    pub(crate) fn last_number(&self) -> u64 {
+        self.index.last_number
+    }
+
     /// What an operator wants of a unit, by the commands that were carried out.
     pub(crate) fn intent(&self, unit: &UnitId) -> Option<&Intent> {
         self.index.units.get(unit).map(|of_unit| &of_unit.intent)
