@@ -136,7 +136,7 @@ pub(crate) async fn start_on(
         Some(folder) => {
             let inbox = inbox.clone();
             let watcher = Watcher::start(folder, settings.folder, found, move |event| {
-                inbox.tell_in_turn(Message::Folder(event))
+                inbox.tell_in_turn(Message::Folder(event));
             });
             Some(watcher.map_err(ServiceError::Thread)?)
         }

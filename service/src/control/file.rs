@@ -47,7 +47,7 @@ impl Read {
             _ => std::str::from_utf8(bytes).ok().and_then(unit_of),
         };
         let text = found.as_ref().and_then(|found| found.as_ref().ok()?.text.as_ref());
-        let content = text.map_or_else(|| Compressed::new(bytes), |text| text.clone());
+        let content = text.cloned().unwrap_or_else(|| Compressed::new(bytes));
         Self { content, digest, hint, found }
     }
 

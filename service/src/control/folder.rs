@@ -171,11 +171,10 @@ impl Worker {
             }
             FolderEvent::Away(reason) => {
                 let path = self.folder.path.as_deref().unwrap_or(Path::new("")).display();
-                match &reason {
-                    Some(reason) => {
-                        tracing::error!("{path} cannot be read: {reason}; the calibration in force stays");
-                    }
-                    None => tracing::info!("the folder of calibrations can be read again"),
+                if let Some(reason) = &reason {
+                    tracing::error!("{path} cannot be read: {reason}; the calibration in force stays");
+                } else {
+                    tracing::info!("the folder of calibrations can be read again");
                 }
                 self.folder.gone = reason;
             }

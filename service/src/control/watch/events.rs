@@ -64,11 +64,10 @@ impl FsEvents {
             return false;
         }
         let (folder, poll) = (self.folder.display(), self.poll);
-        match &complaint {
-            Some(reason) => {
-                tracing::warn!(%folder, "the folder sends no events, it is polled every {poll:?}: {reason}");
-            }
-            None => tracing::info!(%folder, "the folder sends events again"),
+        if let Some(reason) = &complaint {
+            tracing::warn!(%folder, "the folder sends no events, it is polled every {poll:?}: {reason}");
+        } else {
+            tracing::info!(%folder, "the folder sends events again");
         }
         self.complaint = complaint;
         true

@@ -86,7 +86,9 @@ impl Instance {
         self.said = Some(news.clone());
         let now_unix_ms = unix_ms();
         let mut faults = news.faults.clone();
-        faults.iter_mut().for_each(|fault| fault.last_unix_ms = now_unix_ms);
+        for fault in &mut faults {
+            fault.last_unix_ms = now_unix_ms;
+        }
         faults.extend(intake.missing_other());
         faults.extend(intake.faults());
         faults.extend(intake.awaited());
