@@ -11,7 +11,7 @@ use std::time::SystemTime;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key::UnitId;
-use isotherm_service::control::store::{Opened, Store};
+use isotherm_service::control::store::{Opened, Store, Torn};
 use tempfile::TempDir;
 
 /// Names the state folder to the process that [`writes_until_it_is_stopped`] is run in.
@@ -56,12 +56,6 @@ fn check_whole(store: &Store) -> u64 {
     last
 }
 
-/// What is said of a last line that was put aside.
-fn moved(bytes: usize, to: &Path) -> String {
-    let to = to.display();
-    format!("the last line of the audit file was cut short: its {bytes} bytes are now in {to}")
-}
-
 #[test]
 fn a_last_line_cut_at_any_byte_costs_at_most_that_line() {
     let written = TempDir::new().unwrap();
@@ -80,12 +74,12 @@ fn a_last_line_cut_at_any_byte_costs_at_most_that_line() {
         let entries = if cut + 1 >= whole.len() { 3 } else { 2 };
         let torn = match whole.len() - cut {
             0 => None,
-            1 => Some("the last line of the audit file had no line feed: it was added".to_owned()),
+            1 => Some(Torn::Completed),
             _ if cut == last => None,
             _ => {
                 let to = written.path().join("audit.torn-1");
                 assert_eq!(fs::read(&to).unwrap(), whole[last..cut], "nothing is lost silently");
-                Some(moved(cut - last, &to))
+                Some(Torn::Moved { to, bytes: (cut - last) as u64 })
             }
         };
         assert_eq!(opened, Opened { entries, torn, ..Opened::default() }, "cut at {cut}");
@@ -112,7 +106,7 @@ fn a_file_that_lost_its_power_with_zeros_at_its_end_goes_on() {
         fs::write(&audit, bytes).unwrap();
         let (store, opened) = Store::open(folder.path()).unwrap();
         let to = folder.path().join(format!("audit.torn-{round}"));
-        assert_eq!(opened.torn, Some(moved(300_000, &to)));
+        assert_eq!(opened.torn, Some(Torn::Moved { to, bytes: 300_000 }));
         assert_eq!((opened.damaged, check_whole(&store)), (0, round));
     }
 }
