@@ -103,27 +103,32 @@ impl Asker {
             let spoken = self.spoken().await;
             self.pair.opened(&self.intake, &spoken);
         }
-        let (ripen, mut ripe) = unbounded_channel();
+        // Histories are asked for when no entry has come for a while.
+        let mut due: BTreeMap<Option<UnitId>, Vec<Instant>> = BTreeMap::new();
         loop {
-            tokio::select! {
-                question = questions.recv() => {
-                    let Some(unit) = question else { return };
-                    for delay in DELAYS {
-                        let (ripen, unit) = (ripen.clone(), unit.clone());
-                        tokio::spawn(async move {
-                            tokio::time::sleep(delay).await;
-                            let _ = ripen.send(unit);
-                        });
-                    }
+            let next = due.values().flatten().min().copied();
+            let wait =
+                next.map_or(Duration::from_secs(3600), |next| next.saturating_duration_since(Instant::now()));
+            match tokio::time::timeout(wait, questions.recv()).await {
+                Ok(None) => break,
+                Ok(Some(unit)) => {
+                    let now = Instant::now();
+                    due.entry(unit).or_default().extend(DELAYS.map(|delay| now + delay));
                 }
-                Some(unit) = ripe.recv() => {
-                    let mut units = BTreeSet::from([unit]);
-                    while let Ok(unit) = ripe.try_recv() {
-                        units.insert(unit);
-                    }
-                    for unit in units {
+                Err(_) => {
+                    let now = Instant::now();
+                    let ripe: Vec<_> = due
+                        .iter()
+                        .filter(|(_, at)| at.iter().any(|at| *at <= now))
+                        .map(|(unit, _)| unit.clone())
+                        .collect();
+                    for unit in ripe {
+                        if let Some(at) = due.get_mut(&unit) {
+                            at.retain(|at| *at > now);
+                        }
                         self.records(unit, &mut copied).await;
                     }
+                    due.retain(|_, at| !at.is_empty());
                 }
             }
         }
