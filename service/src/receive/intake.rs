@@ -143,17 +143,12 @@ impl Intake {
 
     /// Whether a unit has appeared.
     pub(crate) fn has(&self, unit: &UnitId) -> bool {
-        read(&self.units).contains_key(unit)
+        read(&self.units).by_serial.contains_key(unit)
     }
 
     /// The unit of a serial, if it has appeared.
     fn unit(&self, serial: &str) -> Option<Unit> {
-        read(&self.units).get(serial).map(Arc::clone)
-    }
-
-    /// All units as they are now, in the order of their serials.
-    fn in_order(&self) -> Vec<Unit> {
-        read(&self.units).values().cloned().collect()
+        read(&self.units).by_serial.get(serial).map(Arc::clone)
     }
 
     /// Counts a fault that belongs to no unit, and logs the first of its kind.
@@ -208,8 +203,8 @@ impl Intake {
     /// Does something with every unit, in the order of their serials; a panic costs that unit its memory and no more.
     pub fn each_unit<T>(&self, mut work: impl FnMut(&mut UnitActor) -> T) -> Vec<T> {
         // Not locked meanwhile: a unit that appears must not wait for a look at all others.
-        let units = self.in_order();
-        units.iter().filter_map(|unit| guarded(&mut lock(unit), &mut work)).collect()
+        let units = read(&self.units).in_order();
+        units.iter().filter_map(|(_, unit)| guarded(&mut lock(unit), &mut work)).collect()
     }
 
     /// Does something with every unit, as [`Self::each_unit`], and what is to follow with each before the next: the unit is
@@ -219,8 +214,8 @@ impl Intake {
         mut work: impl FnMut(&mut UnitActor) -> Option<T>,
         mut then: impl FnMut(T),
     ) -> usize {
-        let units = self.in_order();
-        let found = units.iter().filter_map(|unit| {
+        let units = read(&self.units).in_order();
+        let found = units.iter().filter_map(|(_, unit)| {
             // A statement of its own: the lock ends with it.
             let found = guarded(&mut lock(unit), &mut work);
             found.flatten()

@@ -45,7 +45,7 @@ impl Intake {
             self.make_room(now);
         }
         let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
-        if let Some(unit) = units.get(serial) {
+        if let Some(unit) = units.by_serial.get(serial) {
             return Some(Arc::clone(unit));
         }
         if !self.has_place(&units, calibrated) {
@@ -86,7 +86,7 @@ impl Intake {
             tracing::warn!(unit = %id, uncalibrated = ?self.settings.unit.uncalibrated, "appeared, no calibration");
         }
         let unit = Arc::new(Mutex::new(actor));
-        units.insert(id, Arc::clone(&unit));
+        units.insert(id, &unit);
         Some(unit)
     }
 
@@ -120,7 +120,7 @@ impl Intake {
         units: &Units,
         calibrations: &'u Calibrations,
     ) -> impl Iterator<Item = &'u UnitId> {
-        calibrations.units().filter(|unit| self.takes(unit) && !units.contains_key(*unit))
+        calibrations.units().filter(|unit| self.takes(unit) && !units.by_serial.contains_key(*unit))
     }
 
     /// That units with a calibration have not appeared: their serial may be misspelt, or their producer be off.
@@ -144,11 +144,11 @@ impl Intake {
             }
             *looked = Some(now);
         }
-        let units = self.in_order();
-        let silent = units.iter().filter_map(|unit| {
+        let units = read(&self.units).in_order();
+        let silent = units.iter().filter_map(|(id, unit)| {
             // Whoever is at work on it hears of it.
             let actor = unit.try_lock().ok()?;
-            (actor.doing().1 != Output::Calibrated).then(|| (actor.silence(now), actor.id().clone()))
+            (actor.doing().1 != Output::Calibrated).then(|| (actor.silence(now), id.clone()))
         });
         if let Some((silence, id)) = silent.max().filter(|(silence, _)| *silence >= STRANGER_KEPT) {
             tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());

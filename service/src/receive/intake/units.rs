@@ -1,6 +1,6 @@
 //! The units that have appeared, and the outlets of those that may.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use isotherm_protocol::key::UnitId;
@@ -15,7 +15,39 @@ pub(super) type Unit = Arc<Mutex<UnitActor>>;
 pub type OutletMaker = Box<dyn Fn(&UnitId) -> Result<Outlet, zenoh::Error> + Send + Sync>;
 
 /// The units that have appeared.
-pub(super) type Units = BTreeMap<UnitId, Unit>;
+#[derive(Debug, Default)]
+pub(super) struct Units {
+    // For messages: the key finds its unit without an allocation.
+    pub(super) by_serial: HashMap<UnitId, Unit>,
+    /// In the order of their serials, for those who look at all of them many times a second.
+    in_order: Arc<Vec<(UnitId, Unit)>>,
+}
+
+impl Units {
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.by_serial.len()
+    }
+
+    /// Takes one in.
+    pub(super) fn insert(&mut self, id: UnitId, unit: &Unit) {
+        let in_order = Arc::make_mut(&mut self.in_order);
+        let place = in_order.partition_point(|(before, _)| *before < id);
+        in_order.insert(place, (id.clone(), Arc::clone(unit)));
+        self.by_serial.insert(id, Arc::clone(unit));
+    }
+
+    /// Takes one out.
+    pub(super) fn remove(&mut self, id: &UnitId) -> Option<Unit> {
+        Arc::make_mut(&mut self.in_order).retain(|(other, _)| other != id);
+        self.by_serial.remove(id)
+    }
+
+    /// All of them as they are now, in the order of their serials.
+    pub(super) fn in_order(&self) -> Arc<Vec<(UnitId, Unit)>> {
+        Arc::clone(&self.in_order)
+    }
+}
 
 /// Outlets of units that have not appeared.
 ///
