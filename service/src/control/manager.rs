@@ -125,7 +125,7 @@ impl Worker {
             refusals: Refusals::default(),
             control_status: Arc::default(),
             lost: None,
-            losses: opened.lost.clone(),
+            losses: losses(opened),
             group: None,
             unclaimed: Vec::new(),
             unwritten: Vec::new(),
@@ -283,4 +283,10 @@ impl Worker {
             tracing::error!(unit, revision, "{what} is not in the audit file: {error}");
         }
     }
+}
+
+/// What was lost, in words, with the unit that it concerns.
+fn losses(opened: &Opened) -> Vec<(Option<UnitId>, String)> {
+    let lost = opened.lost.iter().map(|lost| (UnitId::new(&lost.unit).ok(), lost.to_string()));
+    lost.chain(opened.emptied.iter().map(|emptied| (None, emptied.to_string()))).collect()
 }

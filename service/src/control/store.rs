@@ -27,7 +27,7 @@ mod trial;
 mod verify;
 
 pub use error::StoreError;
-pub use opened::Opened;
+pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn};
 pub use verify::{Break, Lost, Verification, verify};
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -110,13 +110,14 @@ impl Store {
             mark.lose(folder).map_err(unmarked)?;
             // The numbers of what is lost are missed.
             index.last_number = index.last_number.max(Mark::last_entry(folder).unwrap_or(0));
-            opened.lose_all(folder, kept, has_older, mark.floor);
+            let (folder, floor) = (folder.to_owned(), mark.floor);
+            opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
         // The last line alone may be missing after a crash in mid-write.
         } else if let Some(written) =
             Mark::last_entry(folder).filter(|written| *written > index.next_number())
         {
             mark.lose(folder).map_err(unmarked)?;
-            opened.cut(index.last_number, written, mark.floor);
+            opened.cut = Some(Cut { last: index.last_number, written, floor: mark.floor });
             index.last_number = written;
         } else if index.highest() > 0 {
             mark.reserve(folder, index.highest()).map_err(unmarked)?;
@@ -124,12 +125,15 @@ impl Store {
         index.floor = mark.floor;
         // A calibration that never was a document is in force without an acceptance: that alone is no loss.
         if opened.damaged > 0 {
-            for (unit, revision) in index.lost() {
-                opened.lose(unit, revision, index.sets(unit).next_back().map(|set| set.revision));
-            }
+            let lost = index.lost().map(|(unit, revision)| LostRevision {
+                unit: unit.to_string(),
+                revision,
+                in_its_place: index.sets(unit).next_back().map(|set| set.revision),
+            });
+            opened.lost = lost.collect();
         }
         let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
-        let is_damaged = opened.losses().next().is_some() || !opened.doubts.is_empty();
+        let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
         let prune_due = true;
         let store = Self { journal, documents, overlays, index, prune_due, is_damaged, ..Self::in_memory() };
         Ok((store, opened))

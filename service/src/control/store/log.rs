@@ -10,7 +10,7 @@ use isotherm_protocol::history::{AuditEntry, LineError};
 use isotherm_protocol::key::UnitId;
 
 use super::index::Index;
-use super::opened::Opened;
+use super::opened::{Damage, Gap, Opened, Torn};
 use super::read::{self, Extent, Line};
 use super::{StoreError, folder as files};
 use isotherm_document::file::check_regular;
@@ -74,13 +74,12 @@ impl Log {
         let (extent, rest_is_whole) = take_in(&path, true, opened, &mut chain, index)?;
         let mut length = extent.lines;
         if extent.rest > 0 {
-            let torn = if rest_is_whole {
+            let torn = if rest_is_whole { complete(&mut file) } else { move_rest(folder, &mut file, extent) };
+            let torn = torn.map_err(StoreError::write(&path))?;
+            if torn == Torn::Completed {
                 length += extent.rest + 1;
-                complete(&mut file)
-            } else {
-                move_rest(folder, &mut file, extent)
-            };
-            opened.torn = Some(torn.map_err(StoreError::write(&path))?);
+            }
+            opened.torn = Some(torn);
         }
         files::sync_folder(folder).map_err(StoreError::write(folder))?;
         if length == 0 {
@@ -239,14 +238,14 @@ fn take_in(
             Ok(entry) => {
                 opened.entries += 1;
                 if let Some(first) = next.filter(|next| entry.number > *next) {
-                    opened.miss(path, line, first, entry.number - 1);
+                    opened.gaps.push(Gap { file: path.to_owned(), line, first, last: entry.number - 1 });
                 }
                 next = Some(entry.number.saturating_add(1));
                 index.apply(&entry);
             }
             Err(_) if may_be_torn && !ended && !rest_is_whole => {}
             Err(error) => {
-                opened.damage(path, line, &error);
+                opened.damage(Damage { file: path.to_owned(), line, words: error.to_string() });
                 let number = if let LineError::Entry { number, .. } = error { number } else { None };
                 next = number.or(next).map(|number| number.saturating_add(1));
                 index.skip(number, acceptance_in(bytes));
@@ -267,15 +266,15 @@ fn acceptance_in(line: &[u8]) -> Option<(UnitId, u64)> {
     Some((UnitId::new(unit).ok()?, digits.parse().ok()?))
 }
 
-/// Adds the line feed that is missing; that it was, in words.
-fn complete(file: &mut File) -> io::Result<String> {
+/// Adds the line feed that is missing.
+fn complete(file: &mut File) -> io::Result<Torn> {
     Write::write_all(file, b"\n")?;
     file.sync_data()?;
-    Ok("the last line of the audit file had no line feed: it was added".to_owned())
+    Ok(Torn::Completed)
 }
 
-/// Moves what stands behind the last line feed to a file of its own: first there, then away from here. Where it is now, in words.
-fn move_rest(folder: &Path, file: &mut File, extent: Extent) -> io::Result<String> {
+/// Moves what stands behind the last line feed to a file of its own: first there, then away from here.
+fn move_rest(folder: &Path, file: &mut File, extent: Extent) -> io::Result<Torn> {
     let names = (1_u64..).map(|number| folder.join(format!("audit.torn-{number}")));
     let to = free(names).ok_or(ErrorKind::AlreadyExists)?;
     file.seek(SeekFrom::Start(extent.lines))?;
@@ -284,6 +283,5 @@ fn move_rest(folder: &Path, file: &mut File, extent: Extent) -> io::Result<Strin
     torn.sync_all()?;
     file.set_len(extent.lines)?;
     file.sync_data()?;
-    let (bytes, to) = (extent.rest, to.display());
-    Ok(format!("the last line of the audit file was cut short: its {bytes} bytes are now in {to}"))
+    Ok(Torn::Moved { to, bytes: extent.rest })
 }

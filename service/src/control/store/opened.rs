@@ -1,12 +1,11 @@
 //! What the audit file was found like.
 
-use std::path::Path;
+use std::path::PathBuf;
 
-use isotherm_protocol::history::LineError;
-use isotherm_protocol::key::UnitId;
+use thiserror::Error;
 
 /// Most damaged lines that are kept in words.
-const MAX_DAMAGES: u64 = 16;
+const MAX_DAMAGES: usize = 16;
 
 /// What was found when a state folder was opened.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -15,98 +14,173 @@ pub struct Opened {
     pub entries: u64,
     /// Lines that were skipped, being damaged or not understood.
     pub damaged: u64,
-    /// The first of them, and entries that are missing between two lines, in words.
-    pub doubts: Vec<String>,
-    /// What became of a last line that was not written to its end.
-    pub torn: Option<String>,
-    /// Acceptances that are lost, with the unit of each where it is known.
-    pub lost: Vec<(Option<UnitId>, String)>,
+    /// The first of them.
+    pub damages: Vec<Damage>,
+    /// Entries that are missing between two lines.
+    pub gaps: Vec<Gap>,
     /// Entries that are missing at the end.
-    pub cut: Option<String>,
+    pub cut: Option<Cut>,
+    /// What became of a last line that was not written to its end.
+    pub torn: Option<Torn>,
+    /// Units whose newest acceptance is among the damaged lines.
+    pub lost: Vec<LostRevision>,
+    /// The audit file is empty, and was not always.
+    pub emptied: Option<Emptied>,
+}
+
+/// A revision that was accepted, and cannot be put in force again because its line is damaged.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "unit {unit}: revision {revision} was accepted, but its line of the audit file is damaged: {}; put the newer \
+     document in force with `isotherm swap`",
+    instead(*in_its_place)
+)]
+pub struct LostRevision {
+    /// Serial of the unit.
+    pub unit: String,
+    /// The revision.
+    pub revision: u64,
+    /// The revision that holds in its place; `None` where there is none.
+    pub in_its_place: Option<u64>,
+}
+
+/// An audit file without entries beside documents that were accepted.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "the audit file of {folder} is empty, though {documents} document{} kept next to it: the history is lost; was the \
+     file emptied or removed? {}; check every unit, and restore what is missing with `isotherm swap` (documents: \
+     {folder}/documents). {}",
+    if *documents == 1 { " is" } else { "s are" },
+    if *has_older {
+        "Older sets, of the audit file before it, are in force"
+    } else {
+        "What was in force is unknown, and units begin with the folder of calibrations"
+    },
+    next_revision(*floor),
+    folder = folder.display()
+)]
+pub struct Emptied {
+    /// The state folder.
+    pub folder: PathBuf,
+    /// How many documents are kept.
+    pub documents: usize,
+    /// Whether an older audit file is there, so that older sets hold.
+    pub has_older: bool,
+    /// Revisions up to this one are not given again; 0 where nothing is known of them.
+    pub floor: u64,
+}
+
+/// Entries whose lines are missing in the middle of an audit file.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "{file}:{line}: {} missing before this line; if it was an acceptance, an older calibration may be in force than \
+     expected: check `isotherm status`",
+    entries(*first, *last),
+    file = file.display()
+)]
+pub struct Gap {
+    /// The audit file.
+    pub file: PathBuf,
+    /// The line behind them, from 1.
+    pub line: u64,
+    /// Number of the first missing entry.
+    pub first: u64,
+    /// Number of the last missing entry.
+    pub last: u64,
+}
+
+/// Entries that were written and are missing at the end of the audit file.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are missing, and older \
+     calibrations may be in force than before. Check every unit, and restore what is missing with `isotherm swap`. \
+     Revisions continue from {}, so no number is used twice",
+    written - last,
+    floor.saturating_add(1)
+)]
+pub struct Cut {
+    /// Number of the last entry that is there; 0 where there is none.
+    pub last: u64,
+    /// Number of the last one that was written.
+    pub written: u64,
+    /// Revisions up to this one are not given again.
+    pub floor: u64,
+}
+
+/// A line that was skipped; it stays in its file as it is.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "{file}:{line}: {words}; the line is skipped, and if it was an acceptance, the one before it is in force",
+    file = file.display()
+)]
+pub struct Damage {
+    /// The audit file.
+    pub file: PathBuf,
+    /// Line, from 1.
+    pub line: u64,
+    /// What is wrong with it.
+    pub words: String,
+}
+
+/// A last line that was not written to its end.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Torn {
+    /// Only the line feed was missing: the entry counts, the line feed was added.
+    #[error("the last line of the audit file had no line feed: it was added")]
+    Completed,
+    /// It was cut off the audit file.
+    #[error("the last line of the audit file was cut short: its {bytes} bytes are now in {to}", to = to.display())]
+    Moved {
+        /// The file that holds it now.
+        to: PathBuf,
+        /// How long it is.
+        bytes: u64,
+    },
 }
 
 impl Opened {
-    /// A line was skipped; it stays in its file as it is.
-    pub(super) fn damage(&mut self, file: &Path, line: u64, error: &LineError) {
+    pub(super) fn damage(&mut self, damage: Damage) {
         self.damaged += 1;
-        if self.damaged <= MAX_DAMAGES {
-            self.doubts.push(format!(
-                "{}:{line}: {error}; the line is skipped, and if it was an acceptance, the one before it is in force",
-                file.display()
-            ));
+        if self.damages.len() < MAX_DAMAGES {
+            self.damages.push(damage);
         }
     }
 
-    /// The entries from `first` to `last` are missing before a line.
-    pub(super) fn miss(&mut self, file: &Path, line: u64, first: u64, last: u64) {
-        let entries = if first == last {
-            format!("entry {first} is")
-        } else {
-            format!("entries {first} to {last} are")
-        };
-        self.doubts.push(format!(
-            "{}:{line}: {entries} missing before this line; if it was an acceptance, an older calibration may be in force \
-             than expected: check `isotherm status`",
-            file.display()
-        ));
-    }
-
-    /// Entries that were written are missing at the end.
-    pub(super) fn cut(&mut self, last: u64, written: u64, floor: u64) {
-        self.cut = Some(format!(
-            "the audit file ends with entry {last}, but entry {written} was written: the last {} entries are missing, and \
-             older calibrations may be in force than before. Check every unit, and restore what is missing with \
-             `isotherm swap`. {}",
-            written - last,
-            going_on(floor)
-        ));
-    }
-
-    /// A revision was accepted, and cannot be put in force again because its line is damaged.
-    pub(super) fn lose(&mut self, unit: &UnitId, revision: u64, older: Option<u64>) {
-        let instead = older.map_or("there is no older one to put in force".to_owned(), |older| {
-            format!("the older revision {older} is in force instead")
-        });
-        let words = format!(
-            "unit {unit}: revision {revision} was accepted, but its line of the audit file is damaged: {instead}; put \
-             the newer document in force with `isotherm swap`"
-        );
-        self.lost.push((Some(unit.clone()), words));
-    }
-
-    /// There are no entries, though documents were accepted.
-    pub(super) fn lose_all(&mut self, folder: &Path, documents: usize, has_older: bool, floor: u64) {
-        let folder = folder.display();
-        let are = if documents == 1 { " is" } else { "s are" };
-        let in_force = if has_older {
-            "Older sets, of the audit file before it, are in force"
-        } else {
-            "What was in force is unknown, and units begin with the folder of calibrations"
-        };
-        let revisions = if floor == 0 { "Revisions begin at 1 again".to_owned() } else { going_on(floor) };
-        let words = format!(
-            "the audit file of {folder} is empty, though {documents} document{are} kept next to it: the history is lost; \
-             was the file emptied or removed? {in_force}; check every unit, and restore what is missing with \
-             `isotherm swap` (documents: {folder}/documents). {revisions}"
-        );
-        self.lost.push((None, words));
-    }
-
     /// What was lost, in words: an older calibration may be in force than the operator knows of, or none.
-    pub fn losses(&self) -> impl Iterator<Item = &String> {
-        self.lost.iter().map(|(_, words)| words).chain(&self.cut)
+    pub fn losses(&self) -> impl Iterator<Item = String> {
+        let lost = self.lost.iter().map(ToString::to_string);
+        let cut = self.cut.iter().map(ToString::to_string);
+        lost.chain(self.emptied.iter().map(ToString::to_string)).chain(cut)
     }
 
-    /// What else is odd about the audit file, in words.
+    /// Everything else that an operator should know, a line each; none after a clean stop.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        let beyond = self.damaged.saturating_sub(MAX_DAMAGES);
+        let damages = self.damages.iter().map(ToString::to_string);
+        let beyond = self.damaged.saturating_sub(self.damages.len() as u64);
         let more =
             (beyond > 0).then(|| format!("and {beyond} more damaged lines of the audit file, all skipped"));
-        self.doubts.iter().cloned().chain(more).chain(self.torn.clone())
+        let gaps = self.gaps.iter().map(ToString::to_string);
+        damages.chain(more).chain(gaps).chain(self.torn.iter().map(ToString::to_string))
     }
 }
 
-/// How revisions are numbered after a loss.
-fn going_on(floor: u64) -> String {
-    format!("Revisions continue from {}, so no number is used twice", floor.saturating_add(1))
+/// What is in force in the place of a revision that is lost.
+fn instead(older: Option<u64>) -> String {
+    older.map_or_else(
+        || "there is no older one to put in force".to_owned(),
+        |older| format!("the older revision {older} is in force instead"),
+    )
+}
+
+/// Where revisions go on.
+fn next_revision(floor: u64) -> String {
+    match floor {
+        0 => "Revisions begin at 1 again".to_owned(),
+        floor => format!("Revisions continue from {}, so no number is used twice", floor.saturating_add(1)),
+    }
+}
+
+/// Entries that are missing.
+fn entries(first: u64, last: u64) -> String {
+    if first == last { format!("entry {first} is") } else { format!("entries {first} to {last} are") }
 }
