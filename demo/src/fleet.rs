@@ -121,7 +121,7 @@ pub(crate) fn fleet(seed: u64) -> Result<Vec<Member>, DemoError> {
 #[derive(Debug, Clone)]
 pub(crate) struct Nominal {
     weights: Vec<f64>,
-    output: OutputKind,
+    pub(crate) output: OutputKind,
     inverse: Inverse,
 }
 
@@ -134,11 +134,6 @@ impl Nominal {
             output: parts.gyro_output,
             inverse: orientation.inverse(parts.gyro_orientation.reference_deg_c, all)?,
         })
-    }
-
-    /// What the readings stand for.
-    pub(crate) fn output(&self) -> OutputKind {
-        self.output
     }
 
     /// Angle increments about the case axes (rad) of a tick of `duration_s`.

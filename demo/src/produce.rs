@@ -66,7 +66,7 @@ pub(crate) async fn produce(
             if let (Some(output), Some(accel)) = (accel_output, step.accel) {
                 producer.accel(output, accel).await?;
             }
-            producer.gyro(member.nominal.output(), step.gyro).await?;
+            producer.gyro(member.nominal.output, step.gyro).await?;
         }
     }
     producer.flush().await?;

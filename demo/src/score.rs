@@ -48,10 +48,10 @@ pub(crate) struct SentBatch {
 /// The account.
 #[derive(Debug)]
 pub(crate) struct Score {
-    sent: u64,
+    pub(crate) sent: u64,
     expected: VecDeque<SentTick>,
     under_way: VecDeque<(u64, Instant)>,
-    windows: Windows,
+    pub(crate) windows: Windows,
     temperatures: Vec<Temperatures>,
     switches: SwitchWatch,
     end_to_end: Histogram,
@@ -126,16 +126,6 @@ impl Score {
         );
         let interpolated = tick.flags.contains(TickFlags::INTERPOLATED);
         self.switches.push(Tick { sent, corrected, interpolated });
-    }
-
-    /// Raw ticks sent.
-    pub(crate) fn sent(&self) -> u64 {
-        self.sent
-    }
-
-    /// Errors of the last full window.
-    pub(crate) fn latest(&self) -> Option<&Mean> {
-        self.windows.latest()
     }
 
     /// Closes the account.

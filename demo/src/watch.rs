@@ -83,17 +83,17 @@ impl<'a> Tally<'a> {
             return;
         }
         let out = consumer.continuity(&self.member.id).ticks;
-        let error = self.score.latest().map_or_else(String::new, |mean| {
+        let error = self.score.windows.means.last().map_or_else(String::new, |mean| {
             let [raw, corrected] = [mean.raw, mean.corrected].map(|error| deg_per_h(over_axes(error)));
             format!("  raw {raw:.2} → {corrected:.2} °/h")
         });
         self.bar.set_position(out);
-        self.bar.set_message(format!("in {} out {out}{error}", self.score.sent()));
+        self.bar.set_message(format!("in {} out {out}{error}", self.score.sent));
     }
 
     fn is_complete(&self, consumer: &Consumer) -> bool {
         let continuity = consumer.continuity(&self.member.id);
-        continuity.ticks + continuity.announced_missing >= self.score.sent()
+        continuity.ticks + continuity.announced_missing >= self.score.sent
     }
 
     fn finish(self, consumer: &Consumer) -> Watched {

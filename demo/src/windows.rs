@@ -31,7 +31,7 @@ pub(crate) struct Windows {
     duration_s: f64,
     raw: [f64; 3],
     corrected: [f64; 3],
-    means: Vec<Mean>,
+    pub(crate) means: Vec<Mean>,
 }
 
 impl Windows {
@@ -58,10 +58,6 @@ impl Windows {
     pub(crate) fn finish(mut self) -> Vec<Mean> {
         self.close();
         self.means
-    }
-
-    pub(crate) fn latest(&self) -> Option<&Mean> {
-        self.means.last()
     }
 
     /// A window that is less than half full (at the end, or over a gap) says too little to stand beside the others.

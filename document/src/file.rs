@@ -1,7 +1,11 @@
-//! Files as text, or what keeps them from being read as such.
+//! Files as text, or what keeps them from being read as such; and files written so that nobody ever sees half of them.
 
-use std::io::Read;
-use std::path::Path;
+use std::fs::{self, File, Permissions};
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+use std::path::{Path, PathBuf};
+
+use tempfile::{Builder, NamedTempFile};
 
 use crate::looks::doubt;
 use crate::problem::{Lines, Problem};
@@ -11,9 +15,9 @@ use crate::text::{MAX_BYTES, unplaced};
 ///
 /// # Errors
 /// That of the file.
-pub fn read_bounded(file: &Path) -> std::io::Result<Vec<u8>> {
+pub fn read_bounded(file: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    std::fs::File::open(file)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+    File::open(file)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -21,11 +25,9 @@ pub fn read_bounded(file: &Path) -> std::io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// What the file is instead.
-pub fn check_regular(file: &Path) -> std::io::Result<()> {
-    match std::fs::metadata(file) {
-        Ok(found) if !found.is_file() => {
-            Err(std::io::Error::other("it is a folder, pipe or device, not a file"))
-        }
+pub fn check_regular(file: &Path) -> io::Result<()> {
+    match fs::metadata(file) {
+        Ok(found) if !found.is_file() => Err(io::Error::other("it is a folder, pipe or device, not a file")),
         _ => Ok(()),
     }
 }
@@ -49,8 +51,93 @@ pub fn text<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Prob
     })
 }
 
+/// What a file that is being written is called until it is whole: hidden, so that no reader of the folder takes it.
+const PREFIX: &str = ".isotherm-";
+/// Permissions of a new file before the umask takes its part.
+pub const NEW_FILE: u32 = 0o666;
+
+/// Writes a file anew: under a temporary name beside it, then renamed over it.
+///
+/// A symbolic link stays one, its target is replaced. Permissions are kept, the owner too where the caller may give
+/// files away. Whatever happens on the way, the old file or the new one is there in whole.
+///
+/// # Errors
+/// That of the folder or the disk; what is no regular file is left alone.
+pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let old = match fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound && !path.is_symlink() => None,
+        old => Some(old?),
+    };
+    if old.as_ref().is_some_and(|old| !old.is_file()) {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "is not a regular file"));
+    }
+    let target = if old.is_some() { path.canonicalize()? } else { path.to_owned() };
+    let file = written(&target, bytes, NEW_FILE)?;
+    if let Some(old) = old {
+        let new = file.as_file().metadata()?;
+        if (old.uid(), old.gid()) != (new.uid(), new.gid()) {
+            // Only root may give files away; for others the file becomes theirs, as with any editor that renames.
+            let _ = fchown(file.as_file(), Some(old.uid()), Some(old.gid()));
+        }
+        file.as_file().set_permissions(old.permissions())?;
+    }
+    file.as_file().sync_all()?;
+    file.persist(&target)?;
+    sync(&folder_of(&target))
+}
+
+/// Writes a file anew, as [`replace`]; a pipe or a device is written to as it is.
+///
+/// # Errors
+/// That of the file, the folder or the disk.
+pub fn write_over(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if path.exists() && !path.is_file() { fs::write(path, bytes) } else { replace(path, bytes) }
+}
+
+/// Writes a new file with these permissions; one of that name is left alone and is an error.
+///
+/// # Errors
+/// That of the folder or the disk.
+pub fn create(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
+    let file = written(path, bytes, mode)?;
+    file.as_file().sync_all()?;
+    file.persist_noclobber(path)?;
+    sync(&folder_of(path))
+}
+
+/// The bytes in a temporary file, in the folder where it will stay.
+fn written(path: &Path, bytes: &[u8], mode: u32) -> io::Result<NamedTempFile> {
+    let folder = folder_of(path);
+    if !folder.is_dir() {
+        let words = format!("there is no folder {}: make it first, or name another", folder.display());
+        return Err(io::Error::new(ErrorKind::NotFound, words));
+    }
+    let mut builder = Builder::new();
+    builder.prefix(PREFIX).permissions(Permissions::from_mode(mode));
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    Ok(file)
+}
+
+fn folder_of(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    folder.map_or_else(|| PathBuf::from("."), Path::to_owned)
+}
+
+/// Makes a rename outlive a power failure. Some file systems cannot, and say that the call is invalid.
+fn sync(folder: &Path) -> io::Result<()> {
+    match File::open(folder)?.sync_all() {
+        Err(error) if error.kind() == ErrorKind::InvalidInput => Ok(()),
+        synced => synced,
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::symlink;
+
+    use tempfile::TempDir;
+
     use super::*;
 
     #[test]
@@ -63,5 +150,72 @@ mod tests {
         );
         let zero = read_bounded(Path::new("/dev/zero")).unwrap();
         assert_eq!(zero.len(), MAX_BYTES + 1);
+    }
+
+    fn mode(path: &Path) -> u32 {
+        fs::metadata(path).unwrap().permissions().mode() & 0o777
+    }
+
+    fn names(folder: &TempDir) -> Vec<String> {
+        let entries = fs::read_dir(folder.path()).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_replaced_file_keeps_its_permissions_and_its_links() {
+        let folder = TempDir::new().unwrap();
+        let [file, link] = ["file", "link"].map(|name| folder.path().join(name));
+        fs::write(&file, "old").unwrap();
+        fs::set_permissions(&file, Permissions::from_mode(0o640)).unwrap();
+        symlink("file", &link).unwrap();
+        replace(&link, b"new").unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert!(link.is_symlink());
+        assert_eq!(mode(&file), 0o640);
+        assert_eq!(names(&folder), ["file", "link"], "nothing is left over");
+    }
+
+    #[test]
+    fn a_reader_sees_the_old_text_or_the_new_one_and_nothing_between() {
+        let folder = TempDir::new().unwrap();
+        let file = folder.path().join("file");
+        let texts = ["a".repeat(100_000), "b".repeat(200_000)];
+        replace(&file, texts[0].as_bytes()).unwrap();
+        std::thread::scope(|scope| {
+            let writer = scope.spawn(|| {
+                for round in 0..50 {
+                    replace(&file, texts[round % 2].as_bytes()).unwrap();
+                }
+            });
+            while !writer.is_finished() {
+                let text = fs::read_to_string(&file).unwrap();
+                assert!(texts.contains(&text), "{} bytes", text.len());
+            }
+        });
+    }
+
+    #[test]
+    fn the_old_file_stays_where_the_new_one_cannot_be_written() {
+        let folder = TempDir::new().unwrap();
+        let [nowhere, nothing] = ["nowhere/file", "nothing"].map(|name| folder.path().join(name));
+        assert_eq!(replace(&nowhere, b"new").unwrap_err().kind(), ErrorKind::NotFound);
+        symlink("missing", &nothing).unwrap();
+        assert_eq!(replace(&nothing, b"new").unwrap_err().kind(), ErrorKind::NotFound, "a link to nothing");
+        assert_eq!(replace(folder.path(), b"new").unwrap_err().to_string(), "is not a regular file");
+        assert_eq!(names(&folder), ["nothing"]);
+    }
+
+    #[test]
+    fn a_new_file_never_takes_the_place_of_another() {
+        let folder = TempDir::new().unwrap();
+        let file = folder.path().join("file");
+        create(&file, b"secret", 0o600).unwrap();
+        assert_eq!(mode(&file), 0o600);
+        assert_eq!(create(&file, b"other", 0o600).unwrap_err().kind(), ErrorKind::AlreadyExists);
+        assert_eq!(fs::read_to_string(&file).unwrap(), "secret");
+        assert_eq!(names(&folder), ["file"], "nothing is left over");
     }
 }

@@ -3,15 +3,14 @@
 mod alone;
 
 use std::collections::BTreeSet;
-use std::fs::{File, Permissions, canonicalize};
+use std::fs::{File, canonicalize};
 use std::io::{self, BufWriter, Read, Stdout, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf, absolute};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use isotherm_document::file::read_bounded;
+use isotherm_document::file::{NEW_FILE, create, read_bounded, write_over};
 
 pub(crate) use alone::create_alone;
 pub use alone::is_being_written;
@@ -91,21 +90,14 @@ pub fn refuse_replacing(out: &Path, overwrite: bool) -> Result<(), Error> {
 /// # Errors
 /// That of the folder or the disk.
 pub fn write_whole(path: &Path, bytes: &[u8], overwrite: bool) -> io::Result<()> {
-    // What a link names is replaced, not the link; a device is written to as it is.
-    let path =
-        &if overwrite { canonicalize(path).unwrap_or_else(|_| path.to_owned()) } else { path.to_owned() };
-    if overwrite && path.exists() && !path.is_file() {
-        return std::fs::write(path, bytes);
+    if !overwrite {
+        return create(path, bytes, NEW_FILE);
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut file = tempfile::Builder::new()
-        .prefix(".new-")
-        .permissions(Permissions::from_mode(0o666))
-        .tempfile_in(folder.unwrap_or(Path::new(".")))?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    let placed = if overwrite { file.persist(path) } else { file.persist_noclobber(path) };
-    placed.map(drop).map_err(|failed| failed.error)
+    if path.is_symlink() && !path.exists() {
+        // A link that leads nowhere goes.
+        std::fs::remove_file(path)?;
+    }
+    write_over(path, bytes)
 }
 
 /// What is being written and has no name yet.
@@ -268,6 +260,8 @@ pub(crate) fn begins_with(source: impl Read, magic: &[u8]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
 
     #[test]

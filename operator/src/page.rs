@@ -26,6 +26,7 @@ use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
 use ratatui::text::Line;
+use serde::Serialize;
 
 pub use figure::fit;
 pub(crate) use figure::{deg_per_h, of, short};
@@ -63,7 +64,7 @@ impl<'a> Unit<'a> {
 }
 
 /// Counters that stand in the line of a unit: by how much they grew over the last minute.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Lately {
     /// Gaps announced.
     pub gaps: u64,
@@ -74,6 +75,7 @@ pub struct Lately {
     /// Frames refused.
     pub bad: u64,
     /// Raw ticks come, the unit is running, and for ten seconds nothing has gone out.
+    #[serde(skip)]
     pub stuck: bool,
 }
 

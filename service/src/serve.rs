@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use isotherm_bus::{BoxFuture, SessionOptions};
 use isotherm_cli::{Exit, print_within};
+use isotherm_document::file::write_over;
 use tokio::signal::unix::{SignalKind, signal};
 use zenoh::Session;
 
@@ -16,7 +17,6 @@ use crate::control::revision::Calibrations;
 use crate::logging::LogArgs;
 use crate::observe::metrics::Endpoint;
 use crate::service::{open_store, start_on, tell_state};
-use crate::signing::replace;
 use crate::supervisor;
 use crate::{ServiceError, Totals};
 
@@ -227,5 +227,6 @@ fn announce(args: &ServeArgs, locators: &[String], metrics: Option<SocketAddr>) 
         let _ = writeln!(stdout, "{line}").and_then(|()| stdout.flush());
     }
     let Some(path) = &args.ready_file else { return Ok(()) };
-    replace(path, &(line + "\n")).map_err(|source| ServiceError::Write { path: path.clone(), source })
+    write_over(path, (line + "\n").as_bytes())
+        .map_err(|source| ServiceError::Write { path: path.clone(), source })
 }

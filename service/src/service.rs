@@ -17,8 +17,8 @@ use crate::ServiceError;
 use crate::config::Settings;
 use crate::control::revision::Calibrations;
 use crate::control::store::{Opened, Store};
-use crate::control::watch::Watcher;
-use crate::control::{Found, Inbox, Message, SwapManager, Worker};
+use crate::control::watch::{Known, Watcher};
+use crate::control::{Inbox, Message, SwapManager, Worker};
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
 use crate::observe::subscribers::Subscribers;
@@ -135,7 +135,9 @@ pub(crate) async fn start_on(
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let inbox = inbox.clone();
-            let watcher = Watcher::start(folder, settings.folder, found, move |event| inbox.folder(event));
+            let watcher = Watcher::start(folder, settings.folder, found, move |event| {
+                inbox.tell_in_turn(Message::Folder(event));
+            });
             Some(watcher.map_err(ServiceError::Thread)?)
         }
         None => None,
@@ -210,8 +212,8 @@ fn tell_keys(settings: &Settings) {
 }
 
 /// Reads the configured folder; a bad one is survived, unless a strict start is asked for.
-fn read_folder(work: &mut Worker, settings: &Settings) -> Result<Found, ServiceError> {
-    let Some(folder) = &settings.calibrations else { return Ok(Found::new()) };
+fn read_folder(work: &mut Worker, settings: &Settings) -> Result<Known, ServiceError> {
+    let Some(folder) = &settings.calibrations else { return Ok(Known::new()) };
     match work.read_folder() {
         Ok((_, bad)) if settings.strict_start && bad > 0 => Err(ServiceError::BadCalibrations { count: bad }),
         Ok((found, _)) => Ok(found),
@@ -221,7 +223,7 @@ fn read_folder(work: &mut Worker, settings: &Settings) -> Result<Found, ServiceE
         }
         Err(error) => {
             work.miss_folder(&error);
-            Ok(Found::new())
+            Ok(Known::new())
         }
     }
 }
@@ -258,7 +260,7 @@ impl RunningService {
                 let (received, alive) = declared.undeclare();
                 let paired = pair.stop();
                 let kept = status_publisher.stop();
-                let watched = watcher.is_none_or(Watcher::stop);
+                let watched = watcher.as_ref().is_none_or(Watcher::stop);
                 // Last of all: the first ticks of a calibration may have come with the flush.
                 let registered = swap_manager.stop();
                 units.each_unit(UnitActor::end);
@@ -293,7 +295,7 @@ impl RunningService {
         tracing::info!("the documents of the folder are read again");
         self.watcher.iter().for_each(Watcher::reread);
         // Where there is no room the documents are judged with what is there.
-        self.inbox.tell(Message::JudgeAgain);
+        let _ = self.inbox.tell(Message::JudgeAgain);
     }
 
     /// Whether the receive path is alive: messages are done in time, or, where none is there, its threads give signs of life.

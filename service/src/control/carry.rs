@@ -87,7 +87,7 @@ impl Worker {
     }
 
     /// Has a unit begin anew with what is written down of it.
-    fn plan_again(&mut self, unit: &UnitId, record: Record) {
+    pub(super) fn plan_again(&mut self, unit: &UnitId, record: Record) {
         let plan = record.plan.clone();
         self.records.insert(unit.clone(), record);
         self.intake.plan_again(unit, plan);
@@ -115,8 +115,7 @@ impl Worker {
             if let AuditEvent::InForce(first) = &entry.event {
                 self.unclaimed.retain(|(of, unclaimed)| of != unit || unclaimed.revision != first.revision);
             }
-            self.entries =
-                self.store.append(entry.time.system_time(), Some(unit), &entry.by, entry.event.clone())?;
+            self.store.append(entry.time.system_time(), Some(unit), &entry.by, entry.event.clone())?;
         }
         Ok(fresh.len())
     }
@@ -167,9 +166,7 @@ impl Worker {
                 schedule: *at,
                 slew_ms: u64::try_from(slew_ns / 1_000_000).unwrap_or(0),
             };
-            self.entries =
-                self.store.append(SystemTime::now(), Some(unit), "", AuditEvent::Accepted(accepted))?;
-            Ok(())
+            self.store.append(SystemTime::now(), Some(unit), "", AuditEvent::Accepted(accepted))
         });
         if let Err(error) = stored {
             tracing::error!(%unit, revision = revision.counter, "the calibration in force is not in the audit file: \

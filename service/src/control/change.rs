@@ -109,10 +109,9 @@ impl Worker {
 
     /// Whether a document is what was accepted last, and nothing else is asked of it.
     fn is_unchanged(&self, unit: &UnitId, document: &Document, schedule: Schedule) -> bool {
-        let Some(record) = self.records.get(unit) else { return false };
-        let waits = self.intake.waiting(unit).filter(|(revision, _)| *revision == record.counter);
-        record.document().is_some_and(|last| last.digest() == document.digest())
-            && waits.is_none_or(|(_, at)| at == schedule)
+        let Some(last) = self.records.get(unit).and_then(Record::last) else { return false };
+        let waits = self.intake.waiting(unit).filter(|(revision, _)| *revision == last.number.counter);
+        last.document.digest() == document.digest() && waits.is_none_or(|(_, at)| at == schedule)
     }
 
     fn slew(&self, request: &Request) -> Span {
@@ -123,7 +122,7 @@ impl Worker {
     /// group is written.
     fn accept(&mut self, request: &Request, decision: &Decision) -> Result<(), StoreError> {
         if let Some(layers) = decision.document.as_ref().and_then(|document| document.layers.as_ref()) {
-            self.store.put_overlay(layers.text.read().as_bytes())?;
+            self.store.put_overlay(&layers.text.read())?;
         }
         let accepted = (request.clone(), decision.clone());
         if let Some(group) = &mut self.group {
@@ -170,14 +169,14 @@ impl Worker {
             Some((request, unit, document, self.acceptance(request, decision)?))
         });
         let accepted: Vec<_> = accepted.collect();
-        let text = |document: &Document| Some(document.text.as_ref()?.bytes().clone());
-        let documents =
-            accepted.iter().filter_map(|(.., document, accepted)| Some((accepted.digest, text(document)?)));
+        let documents = accepted
+            .iter()
+            .filter_map(|(.., document, accepted)| Some((accepted.digest, document.text.clone()?)));
         self.store.put_documents(&documents.collect::<Vec<_>>())?;
         let entries = accepted.iter().map(|(request, unit, _, accepted)| {
             (Some(*unit), request.options.by.as_str(), AuditEvent::Accepted(accepted.clone()))
         });
-        self.entries = self.store.append_all(SystemTime::now(), entries)?;
+        self.store.append_all(SystemTime::now(), entries)?;
         for (request, unit, document, accepted) in accepted {
             let next = Revision::new(accepted.revision, Arc::clone(document), &accepted.source);
             let (at, slew) = (accepted.schedule, self.slew(request));
@@ -189,8 +188,8 @@ impl Worker {
     /// What is written down of a document that was found good.
     fn acceptance(&self, request: &Request, decision: &Decision) -> Option<Acceptance> {
         let (unit, document) = (decision.unit.as_ref()?, decision.document.as_ref()?);
-        let record = self.records.get(unit);
-        let highest = record.map_or(0, |record| record.counter).max(self.store.highest_revision(unit));
+        let last = self.records.get(unit).and_then(Record::last).map_or(0, |last| last.number.counter);
+        let highest = last.max(self.store.highest_revision(unit));
         // Another instance may have given the unit more than came here in time.
         let given = self.intake.with(unit, |actor| actor.highest_revision()).unwrap_or(0);
         let changed = decision.difference.iter().flat_map(|difference| &difference.document);
@@ -218,7 +217,6 @@ impl Worker {
             record.plan.settle();
         }
         record.plan.change(change.clone());
-        record.counter = *revision;
         // An overlay's own signature says nothing of the document that it lies on; that one's was asked for by a rollback to both.
         let is_overlay = change.next.document.layers.is_some() && !matches!(source, Source::Rollback { .. });
         if !is_overlay {

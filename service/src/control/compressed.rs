@@ -10,14 +10,15 @@ use flate2::write::DeflateEncoder;
 /// Bytes in little room: deflated, and shared by whoever keeps them. A calibration document of a few kilobytes takes a
 /// quarter of them, which counts where there are thousands.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct CompressedBytes {
+pub struct Compressed {
     deflated: Arc<[u8]>,
     length: usize,
 }
 
-impl CompressedBytes {
+impl Compressed {
     /// Keeps them.
-    pub(crate) fn new(bytes: &[u8]) -> Self {
+    #[must_use]
+    pub fn new(bytes: &[u8]) -> Self {
         let mut encoder = DeflateEncoder::new(Vec::new(), Compression::fast());
         // Writing to a vector does not fail.
         let _ = encoder.write_all(bytes);
@@ -32,32 +33,14 @@ impl CompressedBytes {
         bytes
     }
 
+    /// They as the text that they were.
+    pub(crate) fn text(&self) -> String {
+        String::from_utf8(self.read()).unwrap_or_default()
+    }
+
     /// How many there are.
     pub(crate) fn len(&self) -> usize {
         self.length
-    }
-}
-
-/// A text that is kept as [`CompressedBytes`].
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CompressedText(CompressedBytes);
-
-impl CompressedText {
-    /// Keeps a text.
-    #[must_use]
-    pub fn new(text: &str) -> Self {
-        Self(CompressedBytes::new(text.as_bytes()))
-    }
-
-    /// The text.
-    pub(crate) fn read(&self) -> String {
-        // It was one when it was kept.
-        String::from_utf8(self.0.read()).unwrap_or_default()
-    }
-
-    /// Its bytes, kept once for both.
-    pub(crate) fn bytes(&self) -> &CompressedBytes {
-        &self.0
     }
 }
 
@@ -69,16 +52,15 @@ mod tests {
     fn a_kept_is_read_as_it_was_and_is_small() {
         let document = include_str!("../../../config/calibration/MEMS-0001.toml");
         for text in ["", "°", document] {
-            let kept = CompressedText::new(text);
-            let bytes = kept.bytes();
-            assert_eq!((kept.read().as_str(), bytes.len()), (text, text.len()));
+            let kept = Compressed::new(text.as_bytes());
+            assert_eq!((kept.text().as_str(), kept.len()), (text, text.len()));
         }
-        assert!(CompressedText::new(document).bytes().deflated.len() * 3 < document.len());
+        assert!(Compressed::new(document.as_bytes()).deflated.len() * 3 < document.len());
     }
 
     #[test]
     fn what_is_no_text_is_kept_too() {
         let bytes = [0xff, 0x00, 0xfe];
-        assert_eq!(CompressedBytes::new(&bytes).read(), bytes);
+        assert_eq!(Compressed::new(&bytes).read(), bytes);
     }
 }

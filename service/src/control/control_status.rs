@@ -5,58 +5,25 @@ use std::sync::{Arc, Mutex, PoisonError};
 use isotherm_document::few;
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::service_status::{
-    BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, StoreStatus,
+    BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, ServiceStatus, StoreStatus,
 };
+use isotherm_protocol::status::Fault;
 
 use super::manager::Worker;
 
-/// Kind of the standing problem of a state folder that cannot be written.
+/// Kind of the fault of a state folder that cannot be written.
 pub(crate) const STATE_FOLDER: &str = "state_folder";
-/// Kind of the standing problem of documents that are good and could not be written down.
+/// Kind of the fault of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";
 
-/// The present state of folder, store and swaps.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct Posted {
-    /// Folder of calibrations; `None` where none is configured.
-    pub(crate) folder: Option<FolderStatus>,
-    /// Documents of it that are not taken.
-    pub(crate) bad_documents: Vec<BadDocument>,
-    /// State folder; `None` where nothing survives the service.
-    pub(crate) store: Option<StoreStatus>,
-    /// What is wrong until somebody does something about it.
-    pub(crate) problems: Vec<Standing>,
-    /// Swaps accepted since the start.
-    pub(crate) accepted: u64,
-    /// Swaps refused since the start.
-    pub(crate) refused: u64,
-}
-
-impl Posted {
-    /// The problem of a kind, if there is one.
-    pub(crate) fn standing(&self, kind: &str) -> Option<&Standing> {
-        self.problems.iter().find(|problem| problem.kind == kind)
-    }
-}
-
-/// Something that is wrong until somebody does something about it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Standing {
-    /// Its kind, as in a fault of the status.
-    pub(crate) kind: &'static str,
-    /// How many units or things it concerns.
-    pub(crate) count: u64,
-    /// It in words.
-    pub(crate) words: String,
-}
-
-/// Where the swap manager posts it, and anybody looks at it.
+/// Where the swap manager posts its part of the service's status, and anybody looks at it: folders, swaps, and the faults that last until
+/// somebody does something about them, which have no time.
 #[derive(Debug, Default)]
-pub(crate) struct ControlStatus(Mutex<Arc<Posted>>);
+pub(crate) struct ControlStatus(Mutex<Arc<ServiceStatus>>);
 
 impl ControlStatus {
     /// What is posted: the same for as long as nothing has changed.
-    pub(crate) fn read(&self) -> Arc<Posted> {
+    pub(crate) fn read(&self) -> Arc<ServiceStatus> {
         Arc::clone(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -70,22 +37,23 @@ impl Worker {
             (None, None) => (FolderState::Watching, None),
         };
         let path = self.folder.path.as_ref();
-        let folder = path.map(|path| FolderStatus { path: shown(&path.display()), state, reason });
+        let calibrations = path.map(|path| FolderStatus { path: shown(&path.display()), state, reason });
         let bad = self.folder.bad().take(MAX_BAD_DOCUMENTS).map(|(file, problems)| BadDocument {
             file: shown(&file.display()),
             problem: problems.first().map(ToString::to_string).unwrap_or_default(),
             problems: problems.len() as u64,
         });
-        let posted = Posted {
-            folder,
+        let posted = ServiceStatus {
+            calibrations,
             bad_documents: bad.collect(),
-            store: self
-                .store
-                .folder()
-                .map(|path| StoreStatus { path: shown(&path.display()), audit_entries: self.entries }),
-            problems: self.problems(),
-            accepted: self.accepted,
-            refused: self.refusals.count,
+            store: self.store.folder().map(|path| StoreStatus {
+                path: shown(&path.display()),
+                audit_entries: self.store.last_number(),
+            }),
+            faults: self.faults(),
+            swaps_accepted: self.accepted,
+            swaps_refused: self.refusals.count,
+            ..ServiceStatus::default()
         };
         let mut control_status = self.control_status.0.lock().unwrap_or_else(PoisonError::into_inner);
         if **control_status != posted {
@@ -94,10 +62,10 @@ impl Worker {
     }
 
     /// What is wrong until somebody does something about it.
-    fn problems(&self) -> Vec<Standing> {
-        let mut problems = Vec::new();
-        let mut add = |kind, count: usize, words| {
-            problems.push(Standing { kind, count: count as u64, words });
+    fn faults(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        let mut add = |kind: &str, count: usize, first| {
+            faults.push(Fault { kind: kind.to_owned(), count: count as u64, first, last_unix_ms: 0 });
         };
         if let Some(words) = &self.lost {
             let words = format!("swaps are refused, the state folder cannot be written: {words}");
@@ -124,6 +92,6 @@ impl Worker {
             );
             add(UNWRITTEN, unwritten.len(), words);
         }
-        problems
+        faults
     }
 }

@@ -89,7 +89,7 @@ impl Worker {
             Some(overlay) => {
                 let document = document.over(Layers::stored(&self.store, overlay));
                 if let Some(signed) = document.signed() {
-                    check_signature(&self.swap, &signed.read(), &request.name, &mut problems, &mut warnings);
+                    check_signature(&self.swap, &signed.text(), &request.name, &mut problems, &mut warnings);
                 }
                 document
             }
@@ -139,7 +139,7 @@ fn read_document(
 ) -> Result<Document, Vec<Problem>> {
     let base = is_overlay(text).then(|| {
         let named = Overlay::parse(text, None).map(|parsed| parsed.overlay.overlay_of).unwrap_or_default();
-        Some(record?.document()?.base(&named)?.read())
+        Some(record?.document()?.base(&named)?.text())
     });
     let base = base.flatten();
     let candidate = Candidate::parse(text, Some(name), base.as_deref())?;

@@ -10,7 +10,7 @@ use isotherm_protocol::history::GoodSet;
 use isotherm_protocol::overlay::{Candidate, Overlay};
 use isotherm_protocol::stream::Label;
 
-use super::compressed::CompressedText;
+use super::compressed::Compressed;
 use super::store::Store;
 
 /// A calibration document, an overlay on one, or a calibration that never was a document.
@@ -21,7 +21,7 @@ pub struct Document {
     /// What the status says of it, but where it came from; without a digest for a calibration that never was a document.
     pub label: Label,
     /// The text that stands for it; `None` for a calibration that never was a document.
-    pub text: Option<CompressedText>,
+    pub text: Option<Compressed>,
     /// What it was made from, where it is a document with an overlay.
     pub(super) layers: Option<Box<Layers>>,
     /// Unit that it names.
@@ -38,11 +38,11 @@ pub struct Document {
 #[derive(Debug, Clone)]
 pub(super) struct Layers {
     /// Text of the document below.
-    pub(super) base: CompressedText,
+    pub(super) base: Compressed,
     /// The overlay.
     pub(super) overlay: Overlay,
     /// Its text, as it came.
-    pub(super) text: CompressedText,
+    pub(super) text: Compressed,
     /// SHA-256 of the overlay's text.
     pub(super) digest: Digest,
 }
@@ -64,7 +64,7 @@ impl Document {
 
     /// What was compiled from a text, and what the status says of it.
     #[must_use]
-    pub fn new(calibration: Arc<Calibration>, label: Label, text: CompressedText) -> Self {
+    pub fn new(calibration: Arc<Calibration>, label: Label, text: Compressed) -> Self {
         Self { label, text: Some(text), ..Self::plain(calibration) }
     }
 
@@ -72,13 +72,13 @@ impl Document {
     pub(super) fn of(candidate: Candidate, base: Option<&str>, bytes: &[u8]) -> Self {
         let Candidate { document, calibration, text, digest, overlay, warnings, .. } = candidate;
         let layers = overlay.zip(base).map(|(overlay, base)| Layers {
-            base: CompressedText::new(base),
+            base: Compressed::new(base.as_bytes()),
             overlay: overlay.overlay,
-            text: CompressedText::new(&String::from_utf8_lossy(bytes)),
+            text: Compressed::new(bytes),
             digest: Digest::of(bytes),
         });
         let label = Label::of(&document, Digest(digest), "");
-        let found = Self::new(shared(&calibration), label, CompressedText::new(&text));
+        let found = Self::new(shared(&calibration), label, Compressed::new(text.as_bytes()));
         let (unit, schema, created) = (document.unit, document.schema, document.created);
         Self { unit, schema, created, warnings, ..found }.over(layers)
     }
@@ -95,7 +95,7 @@ impl Document {
         let text = file::text(&bytes, Some(&name))?;
         let parsed = document::Document::parse(text, Some(&name))?;
         let label = Label { overlay: set.overlay, ..Label::of(&parsed.document, set.digest, "") };
-        let found = Self::new(shared(&parsed.calibration), label, CompressedText::new(text));
+        let found = Self::new(shared(&parsed.calibration), label, Compressed::new(text.as_bytes()));
         let layers = set.overlay.and_then(|overlay| Layers::stored(store, overlay)).map(Box::new);
         Ok(Self { layers, ..found })
     }
@@ -113,18 +113,18 @@ impl Document {
 
     /// What stands in it; `None` for a calibration that never was a document.
     pub(super) fn content(&self) -> Option<document::Document> {
-        let text = self.text.as_ref()?.read();
+        let text = self.text.as_ref()?.text();
         document::Document::parse(&text, None).ok().map(|parsed| parsed.document)
     }
 
     /// The text that was signed: an overlaid document lost its own signature, what the overlay lies on has one.
-    pub(super) fn signed(&self) -> Option<&CompressedText> {
+    pub(super) fn signed(&self) -> Option<&Compressed> {
         self.layers.as_ref().map(|layers| &layers.base).or(self.text.as_ref())
     }
 
     /// Text of the document that an overlay may lie on, by the digest that the overlay names: this one, or the one below the
     /// overlay.
-    pub(super) fn base(&self, named: &str) -> Option<&CompressedText> {
+    pub(super) fn base(&self, named: &str) -> Option<&Compressed> {
         let below = self.layers.as_ref().filter(|layers| layers.overlay.overlay_of == named);
         below.map(|layers| &layers.base).or(self.text.as_ref())
     }
@@ -138,9 +138,9 @@ impl Layers {
         let overlay = Overlay::parse(&overlay_text, None).ok()?.overlay;
         let base = store.document(&overlay.overlay_of.parse().ok()?).ok().flatten().and_then(text)?;
         Some(Self {
-            base: CompressedText::new(&base),
+            base: Compressed::new(base.as_bytes()),
             overlay,
-            text: CompressedText::new(&overlay_text),
+            text: Compressed::new(overlay_text.as_bytes()),
             digest,
         })
     }

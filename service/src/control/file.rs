@@ -12,7 +12,7 @@ use isotherm_protocol::overlay::Candidate;
 
 use super::decision::unit_of;
 use super::document::Document;
-use crate::control::compressed::CompressedBytes;
+use crate::control::compressed::Compressed;
 use crate::control::watch::read_document;
 use isotherm_document::file;
 
@@ -24,7 +24,7 @@ const MOST_THREADS: usize = 8;
 /// The content of a file, and what was found in it.
 #[derive(Debug)]
 pub(super) struct Read {
-    content: CompressedBytes,
+    content: Compressed,
     /// SHA-256 of the content.
     pub(super) digest: Digest,
     /// Unit that it names, whatever else is wrong with it.
@@ -47,7 +47,7 @@ impl Read {
             _ => std::str::from_utf8(bytes).ok().and_then(unit_of),
         };
         let text = found.as_ref().and_then(|found| found.as_ref().ok()?.text.as_ref());
-        let content = text.map_or_else(|| CompressedBytes::new(bytes), |text| text.bytes().clone());
+        let content = text.cloned().unwrap_or_else(|| Compressed::new(bytes));
         Self { content, digest, hint, found }
     }
 

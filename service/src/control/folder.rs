@@ -169,18 +169,17 @@ impl Worker {
                 }
                 self.look_for_survivor(before.as_ref());
             }
-            FolderEvent::FolderGone { reason } => {
+            FolderEvent::Away(reason) => {
                 let path = self.folder.path.as_deref().unwrap_or(Path::new("")).display();
-                tracing::error!("{path} cannot be read: {reason}; the calibration in force stays");
-                self.folder.gone = Some(reason);
-            }
-            FolderEvent::FolderBack => {
-                tracing::info!("the folder of calibrations can be read again");
-                self.folder.gone = None;
+                if let Some(reason) = &reason {
+                    tracing::error!("{path} cannot be read: {reason}; the calibration in force stays");
+                } else {
+                    tracing::info!("the folder of calibrations can be read again");
+                }
+                self.folder.gone = reason;
             }
             // Told by the watcher, who knows how long its polls are apart.
-            FolderEvent::Deaf { reason } => self.folder.deaf = Some(reason),
-            FolderEvent::Hearing => self.folder.deaf = None,
+            FolderEvent::Deaf(reason) => self.folder.deaf = reason,
         }
     }
 

@@ -15,11 +15,11 @@ use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::{AuditEvent, FirstTick};
 use isotherm_protocol::key::UnitId;
 
-use super::compressed::CompressedText;
+use super::compressed::Compressed;
 use super::control_status::ControlStatus;
 use super::decision::Decision;
 use super::folder::Folder;
-use super::queue::{Inbox, Message, Notice, Queue, Stopped};
+use super::queue::{Inbox, Message, Notice, Stopped};
 use super::refusals::Refusals;
 use super::request::Request;
 use super::revision::Record;
@@ -30,7 +30,7 @@ use crate::receive::intake::Intake;
 /// The running swap manager. Dropped without [`SwapManager::stop`] it ends by itself after what waits.
 #[derive(Debug)]
 pub(crate) struct SwapManager {
-    queue: Arc<Queue>,
+    inbox: Inbox,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -40,17 +40,17 @@ impl SwapManager {
     /// # Errors
     /// Where the system gives no thread.
     pub(crate) fn start(inbox: &Inbox, work: Worker) -> std::io::Result<Self> {
-        let (queue, requests) = (inbox.queue(), inbox.queue());
+        let (inbox, requests) = (inbox.clone(), inbox.clone());
         let thread = std::thread::Builder::new().name("isotherm-control".to_owned()).spawn(move || {
             yield_to_ticks();
             work.run(&requests);
         })?;
-        Ok(Self { queue, thread: Some(thread) })
+        Ok(Self { inbox, thread: Some(thread) })
     }
 
     /// Has it finish what waits and ends it; whether it ended in order.
     pub(crate) fn stop(mut self) -> bool {
-        self.queue.stop();
+        self.inbox.stop();
         self.thread.take().is_some_and(|thread| thread.join().is_ok())
     }
 }
@@ -70,7 +70,7 @@ fn yield_to_ticks() {
 impl Drop for SwapManager {
     fn drop(&mut self) {
         // Units hold a way to it for as long as it holds them: nothing else would ever end it.
-        self.queue.stop();
+        self.inbox.stop();
     }
 }
 
@@ -84,8 +84,6 @@ pub(crate) struct Worker {
     pub(super) certified_names: bool,
     pub(super) intake: Arc<Intake>,
     pub(super) store: Store,
-    /// Number of the last entry of the audit file.
-    pub(super) entries: u64,
     pub(super) records: BTreeMap<UnitId, Record>,
     pub(super) folder: Folder,
     /// Swaps accepted since the service started, those of units that were forgotten too.
@@ -114,9 +112,7 @@ const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 impl Worker {
     /// A swap manager that knows nothing yet; [`Worker::restore`] and [`Worker::read_folder`] tell it what holds.
     pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, store: Store, opened: &Opened) -> Self {
-        let last = store.history(None, 1).unwrap_or_default();
         Self {
-            entries: last.last().map_or(0, |entry| entry.number),
             swap: settings.swap.clone(),
             pre_launch: settings.pre_launch,
             in_standby: settings.unit.in_standby,
@@ -146,7 +142,7 @@ impl Worker {
     }
 
     /// Works until it is told to stop, and then finishes what units still have to tell.
-    pub(super) fn run(mut self, queue: &Queue) {
+    pub(super) fn run(mut self, queue: &Inbox) {
         self.show();
         loop {
             queue.know(self.records.keys());
@@ -186,7 +182,7 @@ impl Worker {
         let layers = kept.clone().filter_map(|document| document.layers.as_ref());
         let bases = layers.clone().map(|layers| &layers.base);
         let documents = kept.filter_map(|document| document.text.as_ref()).chain(bases);
-        let documents = documents.map(CompressedText::read);
+        let documents = documents.map(Compressed::read);
         let overlays = layers.map(|layers| layers.text.read());
         let lost = match self.store.keep(SystemTime::now(), documents, overlays) {
             // A trial that goes well is less than a document that does not.
@@ -272,8 +268,7 @@ impl Worker {
     ) -> Result<(), StoreError> {
         // What was accepted before comes before.
         self.write_group();
-        self.entries = self.store.append(SystemTime::now(), unit, by, event)?;
-        Ok(())
+        self.store.append(SystemTime::now(), unit, by, event).map(drop)
     }
 
     /// Writes down what happens whether or not it can be written down.

@@ -108,16 +108,17 @@ pub(crate) struct PreLaunchEnd {
     pub(crate) end_ns: i64,
 }
 
-/// Asks the swap manager, started or not; never waits, except where it says so.
+/// What waits for the swap manager, started or not. Whoever asks never waits, except where it says so.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Inbox(Arc<Queue>);
 
-impl Inbox {
-    /// What waits.
-    pub(super) fn queue(&self) -> Arc<Queue> {
-        Arc::clone(&self.0)
-    }
+#[derive(Debug, Default)]
+struct Queue {
+    state: Mutex<State>,
+    changed: Condvar,
+}
 
+impl Inbox {
     /// Hands a query over.
     pub(crate) fn ask(&self, asked: Asked, query: Query, origin: Origin) {
         let unit = one_unit(query.key_expr().as_str(), asked).ok();
@@ -132,19 +133,9 @@ impl Inbox {
         self.hand_over(unit, Message::Put(sample), bytes);
     }
 
-    /// Hands over what nobody insists on: where there is no room it is dropped, and no answer comes.
-    pub(crate) fn tell(&self, message: Message) {
-        let _ = self.0.tell(message);
-    }
-
-    /// Hands an event of the folder over; waits for its turn, on the watcher's own thread.
-    pub(crate) fn folder(&self, event: FolderEvent) {
-        self.0.tell_in_turn(Message::Folder(event));
-    }
-
     /// Hands a unit's notice over; gives it back where too much is waiting.
     pub(crate) fn notice(&self, unit: &UnitId, notice: Notice) -> Result<(), Notice> {
-        let Err(not_taken) = self.0.tell(Message::Notice(unit.clone(), notice)) else { return Ok(()) };
+        let Err(not_taken) = self.tell(Message::Notice(unit.clone(), notice)) else { return Ok(()) };
         match *not_taken {
             (Message::Notice(_, notice), Refused::Full) => Err(notice),
             // Where the swap manager has ended nobody wants it.
@@ -155,7 +146,7 @@ impl Inbox {
     /// Hands a request over, or tells its asker why it is not taken.
     fn hand_over(&self, unit: Option<UnitId>, message: Message, bytes: usize) {
         let shown = unit.as_ref().map(ToString::to_string).unwrap_or_default();
-        let Err(not_taken) = self.0.push(unit, message, bytes) else { return };
+        let Err(not_taken) = self.push(unit, message, bytes) else { return };
         let (message, why) = *not_taken;
         let why = match why {
             Refused::Full => "too many requests are waiting, for this unit or for all",
@@ -167,6 +158,94 @@ impl Inbox {
             // The asker may have gone.
             let _ = query.reply_err(words).wait();
         }
+    }
+
+    /// Has these units have a lane of their own; the others share one.
+    pub(super) fn know<'u>(&self, units: impl Iterator<Item = &'u UnitId> + Clone) {
+        let mut state = self.lock();
+        // Mostly nothing has changed.
+        if !state.known.iter().eq(units.clone()) {
+            state.known = units.cloned().collect();
+        }
+    }
+
+    /// Takes a request of `bytes` bytes for a unit, or for several; gives it back with the reason where it is not taken.
+    pub(super) fn push(&self, unit: Option<UnitId>, message: Message, bytes: usize) -> Result<(), NotTaken> {
+        let lane = |state: &State| match unit {
+            Some(unit) if state.known.contains(&unit) => Lane::Unit(unit),
+            Some(_) => Lane::Strangers,
+            None => Lane::Several,
+        };
+        self.enter(lane, message, bytes)
+    }
+
+    /// Takes what the service itself has to tell; gives it back where there is no room.
+    pub(crate) fn tell(&self, message: Message) -> Result<(), NotTaken> {
+        self.enter(|_| Lane::Own, message, 0)
+    }
+
+    /// Takes a request into a lane; gives it back with the reason where it is not taken.
+    fn enter(
+        &self,
+        lane: impl FnOnce(&State) -> Lane,
+        message: Message,
+        bytes: usize,
+    ) -> Result<(), NotTaken> {
+        let mut state = self.lock();
+        let lane = lane(&state);
+        if state.ended || (state.stopping && lane != Lane::Own) {
+            return Err(Box::new((message, Refused::Ended)));
+        }
+        if !state.has_room(&lane, bytes) {
+            return Err(Box::new((message, Refused::Full)));
+        }
+        state.push(lane, message, bytes);
+        self.0.changed.notify_all();
+        Ok(())
+    }
+
+    /// As [`Self::tell`], and waits for room; given up where nobody works any more.
+    pub(crate) fn tell_in_turn(&self, message: Message) {
+        let full = |state: &mut State| !state.ended && !state.has_room(&Lane::Own, 0);
+        let waited = self.0.changed.wait_while(self.lock(), full);
+        let mut state = waited.unwrap_or_else(PoisonError::into_inner);
+        if !state.ended {
+            state.push(Lane::Own, message, 0);
+            self.0.changed.notify_all();
+        }
+    }
+
+    /// The next request, of the lane whose turn it is; waits for one, and gives `None` where nothing was asked for.
+    pub(super) fn take(&self, limit: Duration) -> Result<Option<Message>, Stopped> {
+        let empty = |state: &mut State| state.lanes.is_empty() && !state.stopping;
+        let waited = self.0.changed.wait_timeout_while(self.lock(), limit, empty);
+        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        match state.pop() {
+            Some(message) => {
+                self.0.changed.notify_all();
+                Ok(Some(message))
+            }
+            None if state.stopping => Err(Stopped),
+            None => Ok(None),
+        }
+    }
+
+    /// Has what waits finished, and nothing more taken.
+    pub(super) fn stop(&self) {
+        self.lock().stopping = true;
+        self.0.changed.notify_all();
+    }
+
+    /// Nobody works any more.
+    pub(super) fn end(&self) {
+        let mut state = self.lock();
+        state.ended = true;
+        state.lanes.clear();
+        self.0.changed.notify_all();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -192,7 +271,7 @@ enum Lane {
 
 /// Why a request was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refused {
+pub(crate) enum Refused {
     /// Too much waits in its lane, or in all of them.
     Full,
     /// Nobody works any more.
@@ -204,15 +283,9 @@ pub(super) enum Refused {
 pub(super) struct Stopped;
 
 /// A request that is not taken, and why.
-type NotTaken = Box<(Message, Refused)>;
+pub(crate) type NotTaken = Box<(Message, Refused)>;
 
 /// The lanes.
-#[derive(Debug, Default)]
-pub(super) struct Queue {
-    state: Mutex<State>,
-    changed: Condvar,
-}
-
 #[derive(Debug, Default)]
 struct State {
     /// None of them empty.
@@ -223,99 +296,6 @@ struct State {
     known: BTreeSet<UnitId>,
     stopping: bool,
     ended: bool,
-}
-
-impl Queue {
-    /// Has these units have a lane of their own; the others share one.
-    pub(super) fn know<'u>(&self, units: impl Iterator<Item = &'u UnitId> + Clone) {
-        let mut state = self.lock();
-        // Mostly nothing has changed.
-        if !state.known.iter().eq(units.clone()) {
-            state.known = units.cloned().collect();
-        }
-    }
-
-    /// Takes a request of `bytes` bytes for a unit, or for several; gives it back with the reason where it is not taken.
-    pub(super) fn push(&self, unit: Option<UnitId>, message: Message, bytes: usize) -> Result<(), NotTaken> {
-        let mut state = self.lock();
-        let lane = match unit {
-            Some(unit) if state.known.contains(&unit) => Lane::Unit(unit),
-            Some(_) => Lane::Strangers,
-            None => Lane::Several,
-        };
-        let closed = state.stopping || state.ended;
-        self.enter(&mut state, closed, lane, message, bytes)
-    }
-
-    /// Takes what the service itself has to tell; gives it back where there is no room.
-    pub(super) fn tell(&self, message: Message) -> Result<(), NotTaken> {
-        let mut state = self.lock();
-        let closed = state.ended;
-        self.enter(&mut state, closed, Lane::Own, message, 0)
-    }
-
-    fn enter(
-        &self,
-        state: &mut State,
-        closed: bool,
-        lane: Lane,
-        message: Message,
-        bytes: usize,
-    ) -> Result<(), NotTaken> {
-        if closed {
-            return Err(Box::new((message, Refused::Ended)));
-        }
-        if !state.has_room(&lane, bytes) {
-            return Err(Box::new((message, Refused::Full)));
-        }
-        state.push(lane, message, bytes);
-        self.changed.notify_all();
-        Ok(())
-    }
-
-    /// As [`Self::tell`], and waits for room; given up where nobody works any more.
-    pub(super) fn tell_in_turn(&self, message: Message) {
-        let full = |state: &mut State| !state.ended && !state.has_room(&Lane::Own, 0);
-        let waited = self.changed.wait_while(self.lock(), full);
-        let mut state = waited.unwrap_or_else(PoisonError::into_inner);
-        if !state.ended {
-            state.push(Lane::Own, message, 0);
-            self.changed.notify_all();
-        }
-    }
-
-    /// The next request, of the lane whose turn it is; waits for one, and gives `None` where nothing was asked for.
-    pub(super) fn take(&self, limit: Duration) -> Result<Option<Message>, Stopped> {
-        let empty = |state: &mut State| state.lanes.is_empty() && !state.stopping;
-        let waited = self.changed.wait_timeout_while(self.lock(), limit, empty);
-        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        match state.pop() {
-            Some(message) => {
-                self.changed.notify_all();
-                Ok(Some(message))
-            }
-            None if state.stopping => Err(Stopped),
-            None => Ok(None),
-        }
-    }
-
-    /// Has what waits finished, and nothing more taken.
-    pub(super) fn stop(&self) {
-        self.lock().stopping = true;
-        self.changed.notify_all();
-    }
-
-    /// Nobody works any more.
-    pub(super) fn end(&self) {
-        let mut state = self.lock();
-        state.ended = true;
-        state.lanes.clear();
-        self.changed.notify_all();
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl State {

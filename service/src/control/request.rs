@@ -137,7 +137,7 @@ impl Worker {
             }
             if let Some(text) = record.document().and_then(|document| document.text.as_ref()) {
                 let key = if is_named { asked } else { &*key };
-                reply(query, key, text.read().into_bytes(), Encoding::TEXT_PLAIN);
+                reply(query, key, text.read(), Encoding::TEXT_PLAIN);
                 told = true;
             }
         }

@@ -107,52 +107,30 @@ impl Plan {
 /// Plans by unit.
 #[derive(Debug, Clone, Default)]
 pub struct Calibrations {
-    by_unit: BTreeMap<UnitId, Plan>,
+    pub(crate) plans: BTreeMap<UnitId, Plan>,
 }
 
 impl Calibrations {
     /// Adds or replaces the calibration of one unit by one that is no document, as its first revision.
     pub fn insert(&mut self, unit: UnitId, calibration: Arc<Calibration>, digest: [u8; 8]) {
         let current = Revision::plain(corrected::Revision { counter: 1, digest }, calibration);
-        self.by_unit.insert(unit, Plan { current: Some(Arc::new(current)), ..Plan::default() });
-    }
-
-    /// The plan of one unit, to be changed; an empty one is made where there is none.
-    pub(crate) fn plan_mut(&mut self, unit: &UnitId) -> &mut Plan {
-        self.by_unit.entry(unit.clone()).or_default()
-    }
-
-    /// Forgets what one unit was to be given.
-    pub(crate) fn remove(&mut self, unit: &UnitId) {
-        self.by_unit.remove(unit);
-    }
-
-    /// The plan of one unit.
-    pub(crate) fn get(&self, unit: &UnitId) -> Option<&Plan> {
-        self.by_unit.get(unit)
+        self.plans.insert(unit, Plan { current: Some(Arc::new(current)), ..Plan::default() });
     }
 
     /// The units that have a calibration, or are to be given one at its tick.
     pub(crate) fn units(&self) -> impl Iterator<Item = &UnitId> {
-        self.by_unit.keys().filter(|unit| self.has(unit))
+        self.plans.keys().filter(|unit| self.has(unit))
     }
 
     /// Whether a unit has a calibration, or is to be given one at its tick.
     pub(crate) fn has(&self, unit: &UnitId) -> bool {
-        self.get(unit).is_some_and(|plan| plan.last().is_some())
-    }
-
-    /// Units and their plans.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (&UnitId, &Plan)> {
-        self.by_unit.iter()
+        self.plans.get(unit).is_some_and(|plan| plan.last().is_some())
     }
 }
 
 /// What the swap manager keeps of one unit.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
-    /// Highest revision counter that it was ever given.
-    pub(super) counter: u64,
     /// What it was given, and is to follow. What has come in force since may still stand there as what is to follow.
     pub(super) plan: Plan,
     /// Swaps accepted since the service started: what a unit is given first, from its file, is none.

@@ -17,16 +17,11 @@ use super::revision::{Calibrations, Record, Revision};
 use crate::control::watch::{Known, files_in};
 use crate::signing::check_signature;
 
-/// What was found of each file of the folder, for its watcher.
-pub(crate) type Found = std::collections::BTreeMap<std::path::PathBuf, Known>;
-
 impl Worker {
     /// Takes over calibrations that the program itself was started with.
     pub(crate) fn take_over(&mut self, calibrations: &Calibrations) {
-        for (unit, plan) in calibrations.iter() {
-            let Some(current) = &plan.current else { continue };
-            let counter = current.number.counter;
-            self.records.insert(unit.clone(), Record { counter, plan: plan.clone(), ..Record::default() });
+        for (unit, plan) in &calibrations.plans {
+            self.records.insert(unit.clone(), Record { plan: plan.clone(), ..Record::default() });
         }
     }
 
@@ -38,14 +33,13 @@ impl Worker {
             if let Some(last) = record.last() {
                 tracing::info!(%unit, revision = last.number.counter, "last good calibration restored");
             }
-            self.intake.restore(&unit, record.plan.clone());
-            self.records.insert(unit, record);
+            self.plan_again(&unit, record);
         }
     }
 
     /// What the state folder says of a unit.
     pub(super) fn restored(&self, unit: &UnitId) -> Record {
-        let mut record = Record { counter: self.store.highest_revision(unit), ..Record::default() };
+        let mut record = Record::default();
         let orders = self.store.intent(unit).into_iter().flat_map(Intent::orders);
         // What was carried out once is understood.
         record.plan.intent = orders.filter_map(|order| self.core_command(&order).ok()).collect();
@@ -80,22 +74,22 @@ impl Worker {
     ///
     /// # Errors
     /// Where the folder itself cannot be read.
-    pub(crate) fn read_folder(&mut self) -> std::io::Result<(Found, usize)> {
-        let mut found = Found::new();
+    pub(crate) fn read_folder(&mut self) -> std::io::Result<(Known, usize)> {
+        let mut found = Known::new();
         let Some(folder) = self.folder.path.clone() else { return Ok((found, 0)) };
         let mut contents = Vec::new();
         let mut bad = 0;
         for (file, read) in read_all(&files_in(&folder, "toml")?) {
             match read {
                 Ok(read) => {
-                    found.insert(file.clone(), Known::Content(read.digest));
+                    found.insert(file.clone(), Some(read.digest));
                     self.folder.enter(&file, &read);
                     contents.push((file, read));
                 }
                 Err(error) => {
                     let problem = self.folder.unreadable(&file, &error.to_string());
                     tracing::error!("{problem}");
-                    found.insert(file, Known::Unreadable);
+                    found.insert(file, None);
                     bad += 1;
                 }
             }
@@ -131,7 +125,7 @@ impl Worker {
         if !self.swap.require_signature {
             return None;
         }
-        let signed = document.signed()?.read();
+        let signed = document.signed()?.text();
         let name = format!("revision {revision}");
         let (mut problems, mut warnings) = (Vec::new(), Vec::new());
         check_signature(&self.swap, &signed, &name, &mut problems, &mut warnings);

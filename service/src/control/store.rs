@@ -45,7 +45,7 @@ use index::Index;
 use log::Log;
 use read::likeness;
 
-use crate::control::compressed::CompressedBytes;
+use crate::control::compressed::Compressed;
 
 /// How long an audit file becomes before a new one is begun (bytes).
 const FULL_BYTES: u64 = 64 << 20;
@@ -179,10 +179,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Self::put_document`]; some may be kept then.
-    pub(crate) fn put_documents(
-        &mut self,
-        documents: &[(Digest, CompressedBytes)],
-    ) -> Result<(), StoreError> {
+    pub(crate) fn put_documents(&mut self, documents: &[(Digest, Compressed)]) -> Result<(), StoreError> {
         self.write(|store| store.documents.put_all(documents))
     }
 

@@ -67,32 +67,17 @@ pub(crate) enum FolderEvent {
         /// The file.
         file: PathBuf,
     },
-    /// The folder itself cannot be read for longer than the grace time. Nothing is told of its files until it is back:
-    /// a lost network share does not remove a document. Told once per reason.
-    FolderGone {
-        /// Why, in words that go on after "cannot be read: ".
-        reason: String,
-    },
-    /// The folder can be read again; what has become of its files follows.
-    FolderBack,
-    /// The system grants no events of the folder: changes are found by the poll alone. Told once per reason.
-    Deaf {
-        /// Why.
-        reason: String,
-    },
-    /// Events come again.
-    Hearing,
+    /// Why the folder itself cannot be read for longer than the grace time, in words that go on after "cannot be read: ". Nothing is
+    /// told of its files until it is back, without a reason: a lost network share does not remove a document. Told once per reason.
+    Away(Option<String>),
+    /// Why the system grants no events of the folder, so that changes are found by the poll alone; without a reason, events come again.
+    /// Told once per reason.
+    Deaf(Option<String>),
 }
 
-/// What the owner knows of a file before the watcher starts, so that nothing is told twice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Known {
-    /// It was read: SHA-256 of its bytes, cut as those of [`FolderEvent::Changed`]. Whether it was a good document does
-    /// not matter.
-    Content(Digest),
-    /// It was found and could not be read.
-    Unreadable,
-}
+/// What the owner knows of files before the watcher starts, so that nothing is told twice: SHA-256 of the bytes, cut as those of
+/// [`FolderEvent::Changed`], whether it was a good document or not; nothing of what was found and could not be read.
+pub(crate) type Known = BTreeMap<PathBuf, Option<Digest>>;
 
 /// How long a file, or the folder, may be gone without being called so.
 fn grace(settings: &FolderSettings) -> Duration {
@@ -115,12 +100,12 @@ impl Watcher {
     ///
     /// # Errors
     /// Where the system gives no thread. A folder that cannot be read is none: it is told as
-    /// [`FolderEvent::FolderGone`], and watched when it appears. Where the system grants no events, a warning is logged
+    /// [`FolderEvent::Away`], and watched when it appears. Where the system grants no events, a warning is logged
     /// and the poll does all of the work.
     pub(crate) fn start(
         folder: &Path,
         settings: FolderSettings,
-        known: BTreeMap<PathBuf, Known>,
+        known: Known,
         sink: impl Fn(FolderEvent) + Send + 'static,
     ) -> std::io::Result<Self> {
         Self::start_with(folder, settings, known, sink, events::listener)
@@ -130,7 +115,7 @@ impl Watcher {
     fn start_with(
         folder: &Path,
         settings: FolderSettings,
-        known: BTreeMap<PathBuf, Known>,
+        known: Known,
         sink: impl Fn(FolderEvent) + Send + 'static,
         listener: events::MakeListener,
     ) -> std::io::Result<Self> {
@@ -149,11 +134,7 @@ impl Watcher {
 
     /// Ends the watching; whether the thread ended within a second. One that a dead network share or the sink holds is
     /// left behind, and ends when it is let go.
-    pub(crate) fn stop(self) -> bool {
-        self.end()
-    }
-
-    fn end(&self) -> bool {
+    pub(crate) fn stop(&self) -> bool {
         self.signals.give(|heard| heard.stop = true);
         let limit = Instant::now() + STOP_LIMIT;
         while !self.thread.is_finished() && Instant::now() < limit {
@@ -165,7 +146,7 @@ impl Watcher {
 
 impl Drop for Watcher {
     fn drop(&mut self) {
-        if !self.signals.stopping() && !self.end() {
+        if !self.signals.stopping() && !self.stop() {
             tracing::warn!(
                 "the watcher of the calibration folder did not end within {STOP_LIMIT:?} and is abandoned"
             );

@@ -1,7 +1,7 @@
 //! Subscribers that are behind: Zenoh drops what they have no room for, and tells nobody.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use isotherm_bus::receipt::{Behind, behind};
@@ -11,23 +11,16 @@ use tokio::time::{MissedTickBehavior, interval};
 use zenoh::Session;
 
 use crate::receive::fault::standing;
+use crate::receive::intake::lock;
 
 /// How often receipts are asked for.
 const INTERVAL: Duration = Duration::from_secs(2);
 /// Who has not taken within this what was published is behind.
 const LIMIT: Duration = Duration::from_secs(1);
 
-/// Who was behind, and how often.
+/// The subscriber that was behind last, in words, with the number of all receipts that came late.
 #[derive(Debug, Default)]
-pub(crate) struct Subscribers {
-    late: Mutex<Late>,
-}
-
-#[derive(Debug, Default)]
-struct Late {
-    receipts: u64,
-    latest: Option<Fault>,
-}
+pub(crate) struct Subscribers(Mutex<Option<Fault>>);
 
 impl Subscribers {
     /// Asks for receipts for as long as the task lives.
@@ -50,21 +43,16 @@ impl Subscribers {
     }
 
     fn note(&self, behind: &[Behind]) {
-        let mut late = self.late.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut latest = lock(&self.0);
         for of in behind {
-            late.receipts += 1;
-            late.latest = Some(standing("subscriber_behind", late.receipts, words(of)));
+            let receipts = latest.as_ref().map_or(0, |fault| fault.count) + 1;
+            *latest = Some(standing("subscriber_behind", receipts, words(of)));
         }
     }
 
-    /// Receipts that came late, of all subscribers.
-    pub(crate) fn late_receipts(&self) -> u64 {
-        self.late.lock().unwrap_or_else(PoisonError::into_inner).receipts
-    }
-
-    /// The subscriber that was behind last, in words, with the number of all late receipts.
+    /// The subscriber that was behind last, if there was one.
     pub(crate) fn fault(&self) -> Option<Fault> {
-        self.late.lock().unwrap_or_else(PoisonError::into_inner).latest.clone()
+        lock(&self.0).clone()
     }
 }
 

@@ -36,26 +36,12 @@ const ENTRIES: u32 = 1000;
 /// Where questions are handed in.
 #[derive(Debug, Clone)]
 pub(crate) struct Questions {
-    memories: UnboundedSender<UnitId>,
-    records: UnboundedSender<Option<UnitId>>,
-    takes: UnboundedSender<String>,
-}
-
-impl Questions {
     /// The memory of a unit.
-    pub(super) fn memory(&self, unit: UnitId) {
-        let _ = self.memories.send(unit);
-    }
-
+    pub(super) memories: UnboundedSender<UnitId>,
     /// The histories of a unit, or of all, and the documents in them.
-    pub(super) fn records(&self, unit: Option<UnitId>) {
-        let _ = self.records.send(unit);
-    }
-
+    pub(super) records: UnboundedSender<Option<UnitId>>,
     /// What an instance of another group takes.
-    pub(super) fn takes(&self, instance: String) {
-        let _ = self.takes.send(instance);
-    }
+    pub(super) takes: UnboundedSender<String>,
 }
 
 /// What is asked with; its tasks end with the last [`Questions`].
@@ -252,7 +238,7 @@ impl Asker {
         // A document may lie under an overlay: that is known when the overlay is there.
         for _ in 0..2 {
             let (answer, lacking) = oneshot::channel();
-            self.inbox.tell(Message::Lacks(carried.clone(), answer));
+            let _ = self.inbox.tell(Message::Lacks(carried.clone(), answer));
             for digest in lacking.await.unwrap_or_default() {
                 let found = self.ask(&key::kept("*", &digest)).await;
                 let bytes = found.iter().map(|sample| sample.payload().to_bytes().into_owned());
@@ -262,7 +248,7 @@ impl Asker {
             }
         }
         let (answer, done) = oneshot::channel();
-        self.inbox.tell(Message::Carry(carried, answer));
+        let _ = self.inbox.tell(Message::Carry(carried, answer));
         done.await.is_ok()
     }
 }

@@ -137,10 +137,10 @@ impl Work {
                 let (name, mode, priority) = (member.name.clone(), member.mode.name(), member.priority);
                 let instance = member.instance.clone();
                 if self.pair.come_elsewhere(&member) {
-                    self.questions.takes(instance);
+                    let _ = self.questions.takes.send(instance);
                 } else if self.pair.come(member) {
                     tracing::info!(name, mode, priority, "another service instance has appeared");
-                    self.questions.records(None);
+                    let _ = self.questions.records.send(None);
                     self.intake.each_unit(|actor| actor.introduce(&instance));
                 }
                 self.look(Instant::now());
@@ -176,7 +176,7 @@ impl Work {
             }
         });
         if is_written_down {
-            self.questions.records(Some(unit));
+            let _ = self.questions.records.send(Some(unit));
         }
     }
 
@@ -206,7 +206,7 @@ impl Work {
         let mut spoken = Vec::new();
         for (unit, memory, spoke, alarm) in looked.into_iter().flatten() {
             if memory {
-                self.questions.memory(unit.clone());
+                let _ = self.questions.memories.send(unit.clone());
             }
             if let Some((kind, words)) = alarm {
                 self.intake.alarm(kind, words);

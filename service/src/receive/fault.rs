@@ -1,7 +1,8 @@
 //! Faults of the input and of the service itself: counted by kind; the first of a kind is logged, and then their number.
 
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
+use isotherm_operator::status::unix_ms;
 use isotherm_protocol::codec::CodecError;
 use isotherm_protocol::escape::shown;
 use isotherm_protocol::status::{Counter, Fault};
@@ -123,7 +124,7 @@ struct Kind {
     count: u64,
     first: String,
     /// Time of the last one by the service's clock.
-    last: Option<SystemTime>,
+    last_unix_ms: i64,
     /// When it was last told of, and how many there were then.
     told: Option<(Instant, u64)>,
 }
@@ -160,7 +161,7 @@ impl FaultLog {
         }
         let entry = self.kinds.get_mut(kind as usize)?;
         entry.count += count;
-        entry.last = Some(SystemTime::now());
+        entry.last_unix_ms = unix_ms();
         let Some((told, before)) = entry.told else {
             // The words of a repeated fault are not made anew: a flood of bad messages must stay cheap.
             // Words may quote what came in.
@@ -195,14 +196,11 @@ impl FaultLog {
     /// The kinds that occurred, each with the first of its kind in words.
     pub(crate) fn faults(&self) -> Vec<Fault> {
         let occurred = FaultKind::ALL.iter().zip(&self.kinds).filter(|(_, entry)| entry.count > 0);
-        let fault = |(kind, entry): (&FaultKind, &Kind)| {
-            let since = entry.last.and_then(|last| last.duration_since(SystemTime::UNIX_EPOCH).ok());
-            Fault {
-                kind: kind.name().to_owned(),
-                count: entry.count,
-                first: entry.first.clone(),
-                last_unix_ms: since.and_then(|since| i64::try_from(since.as_millis()).ok()).unwrap_or(0),
-            }
+        let fault = |(kind, entry): (&FaultKind, &Kind)| Fault {
+            kind: kind.name().to_owned(),
+            count: entry.count,
+            first: entry.first.clone(),
+            last_unix_ms: entry.last_unix_ms,
         };
         occurred.map(fault).collect()
     }
@@ -216,9 +214,12 @@ impl FaultLog {
 
 /// A fault that is there now and stays until somebody does something about it.
 pub(crate) fn standing(kind: &str, count: u64, words: String) -> Fault {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    let last_unix_ms = i64::try_from(since.as_millis()).unwrap_or(i64::MAX);
-    Fault { kind: kind.to_owned(), count, first: words, last_unix_ms }
+    Fault { kind: kind.to_owned(), count, first: words, last_unix_ms: unix_ms() }
+}
+
+/// The fault of a kind, if there is one.
+pub(crate) fn of_kind<'f>(faults: &'f [Fault], kind: &str) -> Option<&'f Fault> {
+    faults.iter().find(|fault| fault.kind == kind)
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ impl Intake {
 
     /// Knows nothing more of a unit; it appears anew with its next message.
     pub(crate) fn forget(&self, unit: &UnitId) {
-        self.calibrations.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
+        self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plans.remove(unit);
         self.outlets.drop_prepared(unit);
         let gone = self.units.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
         if let Some(unit) = gone {
@@ -169,7 +169,7 @@ impl Intake {
     pub(crate) fn change(&self, unit: &UnitId, change: Change, account: SwapAccount) -> Option<u64> {
         let before = {
             let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
-            calibrations.plan_mut(unit).change(change.clone())
+            calibrations.plans.entry(unit.clone()).or_default().change(change.clone())
         };
         // Behind the entry above: a unit that appears in between has been given it.
         match self.with(unit, |actor| {
@@ -181,18 +181,10 @@ impl Intake {
         }
     }
 
-    /// Has a unit begin with what it had before the service was restarted.
-    pub(crate) fn restore(&self, unit: &UnitId, plan: Plan) {
-        if plan.last().is_none() && plan.intent.is_empty() {
-            return;
-        }
-        *self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plan_mut(unit) = plan;
-    }
-
     /// The change that waits for its tick: its revision counter, and when it takes effect.
     pub(crate) fn waiting(&self, unit: &UnitId) -> Option<(u64, Schedule)> {
         let seen = self.with(unit, |actor| actor.waiting());
-        let planned = || read(&self.calibrations).get(unit).and_then(Plan::waiting);
+        let planned = || read(&self.calibrations).plans.get(unit).and_then(Plan::waiting);
         seen.unwrap_or_else(planned)
     }
 

@@ -5,15 +5,16 @@ mod arrivals;
 mod journal_writer;
 mod notices;
 mod present;
-mod seen;
 mod speech;
 mod unknown_channels;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use isotherm_correction::observation::Observation;
 use isotherm_correction::operation::{Command, Refusal, State};
-use isotherm_correction::unit::{self, UnitSettings};
+use isotherm_correction::unit::{self, Applied, UnitSettings};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
@@ -33,7 +34,6 @@ use speech::Speech;
 pub(crate) use account::SwapAccount;
 pub use journal_writer::{Journal, JournalOutlet};
 pub(crate) use present::Present;
-pub(crate) use seen::TickSeen;
 pub(crate) use speech::{Footing, Standing, Wants};
 use unknown_channels::UnknownChannels;
 
@@ -105,7 +105,7 @@ impl UnitActor {
 
     /// To whom the unit tells what only the swap manager can write down.
     pub(crate) fn report_to(&mut self, inbox: Inbox) {
-        self.notices.report_to(inbox);
+        self.notices.inbox = Some(inbox);
     }
 
     /// Has a calibration take effect at its tick: the only way by which a unit ever gets one. Gives the revision counter of
@@ -163,7 +163,7 @@ impl UnitActor {
         let repeat = (is_gyro && self.arrivals.is_repeat(frame)).then(|| self.contradicting());
         let received = self.stream.receive(input, frame);
         if let Some(before) = repeat {
-            self.arrivals.note_repeat(self.contradicting() - before);
+            self.arrivals.repeated += self.contradicting() - before;
         }
         let series = (is_gyro && received.is_ok()).then(|| self.stream.incoming_series());
         self.arrivals.note(input, series, arrival);
@@ -244,15 +244,17 @@ impl UnitActor {
             // It goes away: nothing is given back for it.
             match self.let_out(std::mem::take(&mut frame)) {
                 Ok(()) => published = true,
-                Err(error) => self.fault(FaultKind::Unpublished, ticks as u64, || {
-                    format!("corrected: {}", isotherm_bus::words(&error))
-                }),
+                Err(error) => self.note_unpublished(ticks as u64, &error),
             }
         }
         published
     }
 
     /// Counts a fault, and logs the first of its kind; of those that follow, their number once a minute.
+    fn note_unpublished(&mut self, count: u64, error: &zenoh::Error) {
+        self.fault(FaultKind::Unpublished, count, || format!("corrected: {}", isotherm_bus::words(error)));
+    }
+
     fn fault(&mut self, kind: FaultKind, count: u64, words: impl FnOnce() -> String) {
         let Some(telling) = self.faults.note(kind, count, words) else { return };
         self.status_due |= matches!(telling, Telling::First(_));
@@ -295,13 +297,19 @@ impl UnitActor {
     }
 
     /// What is left to tell when the swap manager ends.
-    pub(crate) fn take_untold(&mut self) -> Vec<Notice> {
-        self.notices.take_untold()
+    pub(crate) fn take_untold(&mut self) -> VecDeque<Notice> {
+        std::mem::take(&mut self.notices.untold)
     }
 
     /// What the unit is like at this moment.
     pub(crate) fn present(&self) -> Present {
         Present::of(self.stream.unit())
+    }
+
+    /// The last tick that was corrected, and what was subtracted from it; `None` before the first, and without a calibration.
+    pub(crate) fn tick_seen(&self) -> Option<(Observation, Applied)> {
+        let unit = self.stream.unit();
+        Some((unit.observation()?.clone(), unit.applied()?))
     }
 
     /// The change that waits for its tick: its revision counter, and when it takes effect.

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_cli::{Exit, failed, json, print};
+use isotherm_document::file::create;
 use isotherm_protocol::signature::{KeyError, PrivateKey};
 use serde::Serialize;
 use thiserror::Error;
-
-use super::files;
 
 /// Arguments of `keygen`.
 #[derive(Debug, Clone, Args)]
@@ -94,7 +93,7 @@ fn make(name: &str, folder: &Path) -> Result<Made, KeygenError> {
 }
 
 fn write(path: &Path, pem: &str, mode: u32) -> Result<(), KeygenError> {
-    files::create(path, pem, mode).map_err(|source| match source.kind() {
+    create(path, pem.as_bytes(), mode).map_err(|source| match source.kind() {
         std::io::ErrorKind::AlreadyExists => KeygenError::Exists(path.to_owned()),
         _ => KeygenError::Write { path: path.to_owned(), source },
     })

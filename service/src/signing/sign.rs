@@ -11,9 +11,9 @@ use isotherm_protocol::overlay::{Overlay, is_overlay};
 use isotherm_protocol::signature::{self, Existing, KeyId, PrivateKey, Wrong};
 use serde::Serialize;
 
-use super::{files, private_key};
+use super::private_key;
 use crate::check::say_problems;
-use isotherm_document::file::{read_bounded, text};
+use isotherm_document::file::{read_bounded, replace, text};
 
 /// Arguments of `sign`.
 #[derive(Debug, Clone, Args)]
@@ -158,7 +158,7 @@ fn unit_and_warnings(text: &str, file: &str) -> Result<(String, Vec<Problem>), V
 }
 
 fn write(outcome: &mut Outcome) {
-    match files::replace(Path::new(&outcome.output), outcome.text.as_deref().unwrap_or_default()) {
+    match replace(Path::new(&outcome.output), outcome.text.as_deref().unwrap_or_default().as_bytes()) {
         Ok(()) => outcome.signed = true,
         Err(error) => outcome.failure = Some(format!("cannot write {}: {error}", outcome.output)),
     }

@@ -16,7 +16,7 @@ use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::stream::Label;
 use isotherm_service::Settings;
 use isotherm_service::control::change::Change;
-use isotherm_service::control::compressed::CompressedText;
+use isotherm_service::control::compressed::Compressed;
 use isotherm_service::control::document;
 use isotherm_service::control::revision::{Calibrations, Revision};
 use isotherm_service::receive::intake::Intake;
@@ -90,7 +90,7 @@ fn act(actor: &mut UnitActor, event: &JournalEvent, now: Instant) -> String {
             let text = document.as_deref().unwrap();
             let parsed = Document::parse(text, None).unwrap();
             let label = Label { overlay: *overlay, ..Label::of(&parsed.document, Digest(parsed.digest), "") };
-            let (calibration, text) = (Arc::new(parsed.calibration), CompressedText::new(text));
+            let (calibration, text) = (Arc::new(parsed.calibration), Compressed::new(text.as_bytes()));
             let document = Arc::new(document::Document::new(calibration, label, text));
             let next = Revision::new(revision.counter, document, &Source::Bus);
             let change = Change { next: Arc::new(next), at: *at, slew: Span::from_ns(*slew_ns) };

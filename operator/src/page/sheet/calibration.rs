@@ -1,8 +1,7 @@
 //! The calibration in force, the one that waits, and what is subtracted.
 
-use std::time::{Duration, SystemTime};
-
 use isotherm_cli::grouped;
+use isotherm_protocol::history::WallTime;
 use isotherm_protocol::status::{ActiveCalibration, Output, Status};
 use ratatui::text::Span;
 
@@ -72,11 +71,9 @@ fn age(calibration: &ActiveCalibration) -> Option<String> {
 
 /// The day of a time (s since 1970-01-01 UTC); `None` before that, and beyond the year 9999.
 fn day(unix_s: i64) -> Option<String> {
-    /// Start of the year 10 000.
-    const END_S: u64 = 253_402_300_800;
-    let unix_s = u64::try_from(unix_s).ok().filter(|unix_s| *unix_s < END_S)?;
-    let time = SystemTime::UNIX_EPOCH.checked_add(Duration::from_secs(unix_s))?;
-    Some(humantime::format_rfc3339_seconds(time).to_string().chars().take(10).collect())
+    let time = WallTime::from_unix_ms(unix_s.checked_mul(1000)?);
+    // Beyond what it holds, it is another time.
+    (time.unix_ms() / 1000 == unix_s).then(|| time.to_string().chars().take(10).collect())
 }
 
 /// What is subtracted at present, by case axis.

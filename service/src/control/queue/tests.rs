@@ -16,7 +16,7 @@ fn request(serial: &str) -> Message {
 }
 
 /// Whose requests come out, in their order.
-fn served(queue: &Queue) -> Vec<String> {
+fn served(queue: &Inbox) -> Vec<String> {
     let mut order = Vec::new();
     while let Ok(Some(Message::Notice(unit, _))) = queue.take(Duration::ZERO) {
         order.push(unit.to_string());
@@ -26,7 +26,7 @@ fn served(queue: &Queue) -> Vec<String> {
 
 #[test]
 fn a_flood_for_one_unit_or_for_invented_ones_makes_no_other_wait() {
-    let queue = Queue::default();
+    let queue = Inbox::default();
     queue.know([unit("A"), unit("B")].iter());
     let mut refused = 0;
     for n in 0..1500 {
@@ -48,7 +48,7 @@ fn a_flood_for_one_unit_or_for_invented_ones_makes_no_other_wait() {
 
 #[test]
 fn what_waits_is_finished_and_nothing_more_is_taken() {
-    let queue = Queue::default();
+    let queue = Inbox::default();
     queue.push(Some(unit("A")), request("A"), 0).unwrap();
     queue.stop();
     assert_eq!(queue.push(Some(unit("A")), request("A"), 0).unwrap_err().1, Refused::Ended);

@@ -9,7 +9,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::MAX_DOCUMENT_BYTES;
 
 use super::{StoreError, folder};
-use crate::control::compressed::CompressedBytes;
+use crate::control::compressed::Compressed;
 use isotherm_document::file::{check_regular, read_bounded};
 
 /// Most bytes of documents that are kept in memory; beyond it the oldest go.
@@ -27,7 +27,7 @@ pub(super) enum BlobStore {
 /// Documents in memory.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
-    by_digest: BTreeMap<Digest, CompressedBytes>,
+    by_digest: BTreeMap<Digest, Compressed>,
     /// The oldest first.
     order: VecDeque<Digest>,
     bytes: usize,
@@ -56,7 +56,7 @@ impl BlobStore {
     /// [`StoreError::TooLong`], or [`StoreError::Write`].
     pub(super) fn put(&mut self, bytes: &[u8]) -> Result<Digest, StoreError> {
         let digest = Digest::of(bytes);
-        self.put_all(&[(digest, CompressedBytes::new(bytes))])?;
+        self.put_all(&[(digest, Compressed::new(bytes))])?;
         Ok(digest)
     }
 
@@ -65,7 +65,7 @@ impl BlobStore {
     ///
     /// # Errors
     /// As [`Self::put`]; some may be kept then.
-    pub(super) fn put_all(&mut self, documents: &[(Digest, CompressedBytes)]) -> Result<(), StoreError> {
+    pub(super) fn put_all(&mut self, documents: &[(Digest, Compressed)]) -> Result<(), StoreError> {
         if let Some((_, kept)) = documents.iter().find(|(_, kept)| kept.len() > MAX_DOCUMENT_BYTES) {
             return Err(StoreError::TooLong { bytes: kept.len() });
         }
@@ -74,7 +74,7 @@ impl BlobStore {
         match self {
             Self::Folder(folder) => {
                 let files = new.into_iter().map(|(digest, kept)| (name(digest), kept));
-                folder::write_all(folder, files, CompressedBytes::read)
+                folder::write_all(folder, files, Compressed::read)
                     .map_err(|(name, source)| StoreError::Write { path: folder.join(name), source })
             }
             Self::Memory(memory) => {
@@ -93,7 +93,7 @@ impl BlobStore {
     pub(super) fn get(&self, digest: &Digest) -> Result<Option<Vec<u8>>, StoreError> {
         match self {
             Self::Folder(folder) => read(&folder.join(name(digest)), digest),
-            Self::Memory(memory) => Ok(memory.by_digest.get(digest).map(CompressedBytes::read)),
+            Self::Memory(memory) => Ok(memory.by_digest.get(digest).map(Compressed::read)),
         }
     }
 
@@ -133,7 +133,7 @@ impl BlobStore {
 }
 
 impl Memory {
-    fn put(&mut self, digest: Digest, kept: CompressedBytes) {
+    fn put(&mut self, digest: Digest, kept: Compressed) {
         self.bytes += kept.len();
         if let Some(before) = self.by_digest.insert(digest, kept) {
             // The same once more, in one go.

@@ -52,26 +52,9 @@ struct OfUnit {
     /// What an operator wants of it.
     intent: Intent,
     /// The last command that its stream took.
-    command: Option<TakenCommand>,
+    command: Option<CommandRecord>,
     /// Highest revision that was given and whose acceptance cannot be read.
     lost: Option<u64>,
-}
-
-/// A command that a unit's stream took, and what the unit did then.
-#[derive(Debug)]
-pub(crate) struct TakenCommand {
-    pub(crate) command: String,
-    pub(crate) state_after: String,
-}
-
-impl TakenCommand {
-    /// `None` for what is done to a unit's calibration, and for what a pre-launch calibration came to.
-    fn of(record: &CommandRecord) -> Option<Self> {
-        let other = matches!(record.order, Some(Order::Rollback { .. } | Order::Forget));
-        let taken = !other && record.command != PRE_LAUNCH_ENDED;
-        let CommandRecord { command, state_after, .. } = record;
-        taken.then(|| Self { command: command.clone(), state_after: state_after.clone() })
-    }
 }
 
 impl Index {
@@ -139,7 +122,10 @@ impl Index {
                 } else {
                     let of_unit = self.units.entry(unit).or_default();
                     of_unit.intent.note(record);
-                    of_unit.command = TakenCommand::of(record).or_else(|| of_unit.command.take());
+                    let is_rollback = matches!(record.order, Some(Order::Rollback { .. }));
+                    if !is_rollback && record.command != PRE_LAUNCH_ENDED {
+                        of_unit.command = Some(record.clone());
+                    }
                 }
             }
             AuditEvent::CarriedFile(carried) => {
@@ -231,6 +217,11 @@ impl Index {
 
 /// What holds by the entries so far.
 impl Store {
+    /// Number of the last entry; 0 where there is none.
+    pub(crate) fn last_number(&self) -> u64 {
+        self.index.last_number
+    }
+
     /// What an operator wants of a unit, by the commands that were carried out.
     pub(crate) fn intent(&self, unit: &UnitId) -> Option<&Intent> {
         self.index.units.get(unit).map(|of_unit| &of_unit.intent)
@@ -274,7 +265,7 @@ impl Store {
     }
 
     /// The last command that a unit's stream took, as far as it stands in this audit file.
-    pub(crate) fn last_command(&self, unit: &UnitId) -> Option<&TakenCommand> {
+    pub(crate) fn last_command(&self, unit: &UnitId) -> Option<&CommandRecord> {
         self.index.units.get(unit)?.command.as_ref()
     }
 

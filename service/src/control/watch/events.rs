@@ -25,7 +25,7 @@ pub(super) struct FsEvents {
     make: MakeListener,
     listener: Option<Listener>,
     /// Why there are no events, as it was logged.
-    complaint: Option<String>,
+    pub(super) complaint: Option<String>,
 }
 
 impl FsEvents {
@@ -41,55 +41,50 @@ impl FsEvents {
         self.listener.is_none()
     }
 
-    /// Why there are no events, as it was logged.
-    pub(super) fn complaint(&self) -> Option<&str> {
-        self.complaint.as_deref()
-    }
-
     /// The watch has ended.
     pub(super) fn deafen(&mut self) {
         self.listener = None;
     }
 
-    /// Sees to it that events come, and come from the folder that the path leads to now.
-    pub(super) fn tend(&mut self) {
-        // What keeps the folder from being looked at is told by the look itself.
-        let Ok(identity) = identity(&self.folder) else { return self.deafen() };
+    /// Sees to it that events come, and come from the folder that the path leads to now; whether there is another complaint than before.
+    pub(super) fn tend(&mut self) -> bool {
+        let Ok(identity) = identity(&self.folder) else {
+            // What keeps the folder from being looked at is told by the look itself.
+            self.deafen();
+            return false;
+        };
         if self.listener.as_ref().is_some_and(|listener| listener.identity != identity) {
             self.deafen();
         }
-        match self.listen(identity) {
-            Ok(()) => {
-                if self.complaint.take().is_some() {
-                    tracing::info!(folder = %self.folder.display(), "the folder sends events again");
-                }
-            }
-            Err(error) => {
-                self.deafen();
-                self.complain(&error);
-            }
+        let complaint = self.listen(identity).err().map(|error| reason(&error));
+        if complaint.is_some() {
+            self.deafen();
         }
+        if complaint == self.complaint {
+            return false;
+        }
+        let (folder, poll) = (self.folder.display(), self.poll);
+        if let Some(reason) = &complaint {
+            tracing::warn!(%folder, "the folder sends no events, it is polled every {poll:?}: {reason}");
+        } else {
+            tracing::info!(%folder, "the folder sends events again");
+        }
+        self.complaint = complaint;
+        true
     }
 
     fn listen(&mut self, identity: (u64, u64)) -> notify::Result<()> {
-        let listener = if let Some(listener) = &mut self.listener {
-            listener
-        } else {
+        if self.listener.is_none() {
             let watcher = (self.make)(self.folder.clone(), Arc::clone(&self.signals))?;
-            self.listener.insert(Listener { watcher: Some(watcher), identity })
-        };
+            self.listener = Some(Listener { watcher: Some(watcher), identity });
+        }
+        let listener = self.listener.as_mut();
+        let Some(watcher) = listener.and_then(|listener| listener.watcher.as_mut()) else { return Ok(()) };
+        // Where the library's thread is gone everything but this panics.
+        watcher.configure(Config::default())?;
         // Also where there is a watch: for one that is alive this changes nothing, and a folder that was unmounted and
         // mounted again looks the same while its watch is gone.
-        listener.watch(&self.folder)
-    }
-
-    fn complain(&mut self, error: &notify::Error) {
-        let reason = reason(error);
-        if self.complaint.as_ref() != Some(&reason) {
-            let (folder, poll) = (self.folder.display(), self.poll);
-            tracing::warn!(%folder, "the folder sends no events, it is polled every {poll:?}: {reason}");
-            self.complaint = Some(reason);
-        }
+        watcher.watch(&self.folder, RecursiveMode::NonRecursive)
     }
 }
 
@@ -112,15 +107,6 @@ struct Listener {
     /// `None` only while it is dropped.
     watcher: Option<RecommendedWatcher>,
     identity: (u64, u64),
-}
-
-impl Listener {
-    fn watch(&mut self, folder: &Path) -> notify::Result<()> {
-        let Some(watcher) = &mut self.watcher else { return Ok(()) };
-        // Where the library's thread is gone everything but this panics.
-        watcher.configure(Config::default())?;
-        watcher.watch(folder, RecursiveMode::NonRecursive)
-    }
 }
 
 impl Drop for Listener {

@@ -48,15 +48,12 @@ pub(super) struct FileStates {
 
 impl FileStates {
     /// With what the owner knows already.
-    pub(super) fn new(settings: FolderSettings, known: BTreeMap<PathBuf, Known>) -> Self {
+    pub(super) fn new(settings: FolderSettings, known: Known) -> Self {
         let now = Instant::now();
         // Restless from the start: whether it still is what the owner read has to be seen.
         let unrest = Some(Unrest { first: now, last: now });
         let entries = known.into_iter().map(|(file, known)| {
-            let told = match known {
-                Known::Content(digest) => Told::Content(digest),
-                Known::Unreadable => Told::Unreadable(None),
-            };
+            let told = known.map_or(Told::Unreadable(None), Told::Content);
             (file, Entry { sight: Sight::Absent, told, unrest })
         });
         Self { settings, entries: entries.collect(), compared: None }

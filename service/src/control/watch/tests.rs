@@ -101,7 +101,7 @@ impl Scene {
     fn next(&self) -> FolderEvent {
         loop {
             match self.next_of_all() {
-                FolderEvent::Deaf { .. } | FolderEvent::Hearing => {}
+                FolderEvent::Deaf(_) => {}
                 told => return told,
             }
         }

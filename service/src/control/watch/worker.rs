@@ -25,8 +25,6 @@ pub(super) struct Worker<S> {
     states: FileStates,
     sink: S,
     outage: Option<Outage>,
-    /// Why no events come, as it was told.
-    deaf: Option<String>,
     /// A look that an event, or the start, asked for.
     asked: Option<Instant>,
     /// The next look compares every file.
@@ -58,7 +56,6 @@ impl<S: Fn(FolderEvent)> Worker<S> {
             states,
             sink,
             outage: None,
-            deaf: None,
             asked: Some(now),
             reread: false,
             last_look: now,
@@ -104,11 +101,10 @@ impl<S: Fn(FolderEvent)> Worker<S> {
     fn look(&mut self) {
         let now = Instant::now();
         let polling = now >= self.next_poll;
-        if polling || self.events.are_deaf() {
-            // Before the look, so that what happens after it is heard.
-            self.events.tend();
+        // Before the look, so that what happens after it is heard.
+        if (polling || self.events.are_deaf()) && self.events.tend() {
+            (self.sink)(FolderEvent::Deaf(self.events.complaint.clone()));
         }
-        self.tell_ears();
         self.asked = None;
         match files_in(&self.folder, "toml") {
             Ok(files) => {
@@ -129,30 +125,20 @@ impl<S: Fn(FolderEvent)> Worker<S> {
         }
     }
 
-    /// Tells whether events come, where that has changed.
-    fn tell_ears(&mut self) {
-        let deaf = self.events.complaint();
-        if deaf == self.deaf.as_deref() {
-            return;
-        }
-        self.deaf = deaf.map(ToOwned::to_owned);
-        (self.sink)(self.deaf.clone().map_or(FolderEvent::Hearing, |reason| FolderEvent::Deaf { reason }));
-    }
-
     /// The folder cannot be read.
     fn away(&mut self, now: Instant, reason: String) {
         let grace = grace(&self.settings);
         let outage = self.outage.get_or_insert(Outage { since: now, told: None });
         if now >= outage.since + grace && outage.told.as_ref() != Some(&reason) {
             outage.told = Some(reason.clone());
-            (self.sink)(FolderEvent::FolderGone { reason });
+            (self.sink)(FolderEvent::Away(Some(reason)));
         }
     }
 
     /// The folder can be read.
     fn back(&mut self) {
         if self.outage.take().is_some_and(|outage| outage.told.is_some()) {
-            (self.sink)(FolderEvent::FolderBack);
+            (self.sink)(FolderEvent::Away(None));
         }
     }
 

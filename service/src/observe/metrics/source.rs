@@ -5,15 +5,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use isotherm_protocol::pair::UnitRole;
-use isotherm_protocol::service_status::UnitSummary;
+use isotherm_protocol::service_status::{ServiceStatus, UnitSummary};
 use isotherm_protocol::status::{Fault, Output, State, Status};
 use serde::Serialize;
 
 use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
-use crate::control::{ControlStatus, Posted, STATE_FOLDER, UNWRITTEN};
+use crate::control::{ControlStatus, STATE_FOLDER, UNWRITTEN};
 use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
+use crate::receive::fault::of_kind;
 use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
 use crate::receive::unit::{UnitActor, pairing_window};
@@ -50,7 +51,7 @@ pub(super) struct Look {
     /// Receipts of subscribers that came late.
     pub(super) late_receipts: u64,
     /// What the swap manager has posted.
-    pub(super) posted: Arc<Posted>,
+    pub(super) posted: Arc<ServiceStatus>,
     /// The units, in the order of their serials.
     pub(super) units: Vec<UnitLook>,
 }
@@ -182,7 +183,7 @@ impl Source {
             instances: self.pair.others().len() as u64 + 1,
             faults: self.intake.faults(),
             log_lines_dropped: dropped_lines(),
-            late_receipts: self.subscribers.late_receipts(),
+            late_receipts: self.subscribers.fault().map_or(0, |fault| fault.count),
             posted: self.control_status.read(),
             units,
         }
@@ -204,7 +205,7 @@ impl Source {
         let standing = [(STATE_FOLDER, Kind::StateFolder), (UNWRITTEN, Kind::UnwrittenDocument)];
         let standing = standing
             .into_iter()
-            .filter_map(|(told, kind)| Some(of_service(kind, &posted.standing(told)?.words)));
+            .filter_map(|(told, kind)| Some(of_service(kind, &of_kind(&posted.faults, told)?.first)));
         stopping.into_iter().chain(standing).chain(watch.reasons(now, self.held_back)).collect()
     }
 }

@@ -9,7 +9,7 @@ use isotherm_protocol::service_status::{MAX_UNITS, ServiceStatus};
 use isotherm_protocol::status::MAX_FAULTS;
 use zenoh::Session;
 
-use crate::control::{ControlStatus, Posted};
+use crate::control::ControlStatus;
 use crate::observe::subscribers::Subscribers;
 use crate::receive::fault::standing;
 use crate::receive::intake::Intake;
@@ -36,7 +36,7 @@ pub(super) struct Instance {
     /// What was said last, as far as a change of it is news.
     said: Option<ServiceStatus>,
     /// What the swap manager had posted then.
-    posted: Option<Arc<Posted>>,
+    posted: Option<Arc<ServiceStatus>>,
 }
 
 impl Instance {
@@ -75,24 +75,20 @@ impl Instance {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             pid: Some(std::process::id()),
             started_unix_ms: self.started.1,
-            uptime_s: 0.0,
             units,
-            calibrations: posted.folder.clone(),
-            bad_documents: posted.bad_documents.clone(),
-            store: posted.store.clone(),
-            faults: Vec::new(),
             settings_digest: self.settings_digest,
-            swaps_accepted: posted.accepted,
-            swaps_refused: posted.refused,
+            ..(*posted).clone()
         };
-        let before = self.posted.replace(Arc::clone(&posted));
-        let same_problems = before.is_some_and(|before| before.problems == posted.problems);
-        if look != Look::Always && self.said.as_ref() == Some(&news) && same_problems {
+        self.posted = Some(posted);
+        if look != Look::Always && self.said.as_ref() == Some(&news) {
             return None;
         }
         self.said = Some(news.clone());
-        let mut faults: Vec<_> =
-            posted.problems.iter().map(|it| standing(it.kind, it.count, it.words.clone())).collect();
+        let now_unix_ms = unix_ms();
+        let mut faults = news.faults.clone();
+        for fault in &mut faults {
+            fault.last_unix_ms = now_unix_ms;
+        }
         faults.extend(intake.missing_other());
         faults.extend(intake.faults());
         faults.extend(intake.awaited());
@@ -103,7 +99,7 @@ impl Instance {
         }
         faults.extend(self.subscribers.fault());
         faults.truncate(MAX_FAULTS);
-        // Time and faults go on all the time: no news by themselves.
+        // Time and other faults go on all the time: no news by themselves.
         Some(ServiceStatus { uptime_s: self.started.0.elapsed().as_secs_f64(), faults, ..news })
     }
 }

@@ -14,14 +14,9 @@ use zenoh::{Session, Wait};
 /// Where statuses go.
 pub(super) struct Outlets {
     session: Session,
-    units: HashMap<UnitId, UnitOutlet>,
+    /// A unit that has a status is alive for as long as its token.
+    units: HashMap<UnitId, (Publisher<'static>, LivelinessToken)>,
     service: Option<Publisher<'static>>,
-}
-
-/// A unit's status topic, and the token that says that somebody looks after the unit.
-struct UnitOutlet {
-    status: Publisher<'static>,
-    _alive: LivelinessToken,
 }
 
 impl Outlets {
@@ -32,14 +27,12 @@ impl Outlets {
     /// Publishes a unit's status; with its first one the unit is alive.
     pub(super) fn unit(&mut self, unit: &UnitId, status: &Status) -> Result<(), zenoh::Error> {
         if !self.units.contains_key(unit) {
-            let outlet = UnitOutlet {
-                status: publisher(&self.session, key::status(unit))?,
-                _alive: self.session.liveliness().declare_token(key::unit_alive(unit)).wait()?,
-            };
-            self.units.insert(unit.clone(), outlet);
+            let publisher = publisher(&self.session, key::status(unit))?;
+            let alive = self.session.liveliness().declare_token(key::unit_alive(unit)).wait()?;
+            self.units.insert(unit.clone(), (publisher, alive));
         }
-        let Some(outlet) = self.units.get(unit) else { return Ok(()) };
-        outlet.status.put(codec::encode(status)?).wait()
+        let Some((publisher, _)) = self.units.get(unit) else { return Ok(()) };
+        publisher.put(codec::encode(status)?).wait()
     }
 
     /// Gives up the topics of the units that are not there any more, and the tokens of their life with them.

@@ -5,11 +5,12 @@
 
 use std::time::{Duration, Instant};
 
+use isotherm_correction::observation::Observation;
+use isotherm_correction::unit::Applied;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 use crate::receive::intake::Intake;
-use crate::receive::unit::TickSeen;
 
 /// How long is looked for one answer.
 const WATCH: Duration = Duration::from_millis(500);
@@ -81,18 +82,18 @@ impl Bin {
         }
     }
 
-    fn add(&mut self, tick: &TickSeen) {
+    fn add(&mut self, tick: &Observation, subtracted: &Applied) {
         fn put(spreads: &mut [Spread; 3], values: [f64; 3]) {
             spreads.iter_mut().zip(values).for_each(|(spread, value)| spread.add(value));
         }
         let raw =
             |corrected: [f64; 3], subtracted: [f64; 3]| std::array::from_fn(|i| corrected[i] + subtracted[i]);
         self.ticks += 1;
-        put(&mut self.raw_rad_per_s, raw(tick.angular_rate_rad_per_s, tick.subtracted_rad_per_s));
-        put(&mut self.corrected_rad_per_s, tick.angular_rate_rad_per_s);
-        if let Some(force) = tick.specific_force_m_per_s2 {
+        put(&mut self.raw_rad_per_s, raw(tick.angular_rate, subtracted.angular_rate));
+        put(&mut self.corrected_rad_per_s, tick.angular_rate);
+        if let Some(force) = tick.specific_force {
             let empty = [Spread::EMPTY; 3];
-            put(self.raw_m_per_s2.get_or_insert(empty), raw(force, tick.subtracted_m_per_s2));
+            put(self.raw_m_per_s2.get_or_insert(empty), raw(force, subtracted.specific_force));
             put(self.corrected_m_per_s2.get_or_insert(empty), force);
         }
     }
@@ -102,7 +103,8 @@ impl Bin {
 pub(super) fn watch(intake: &Intake, unit: &UnitId) -> Option<Live> {
     intake.has(unit).then_some(())?;
     let start = Instant::now();
-    let mut last = intake.with(unit, |actor| actor.tick_seen())?.map(|tick| tick.place);
+    let place = |tick: &Observation| (tick.end_time, tick.sequence);
+    let mut last = intake.with(unit, |actor| actor.tick_seen())?.map(|(tick, _)| place(&tick));
     let mut bins: Vec<(Instant, Bin)> = Vec::new();
     while start.elapsed() < WATCH {
         let mut bin = Bin::new();
@@ -110,9 +112,9 @@ pub(super) fn watch(intake: &Intake, unit: &UnitId) -> Option<Live> {
             std::thread::sleep(LOOK);
             // A unit that starts anew after an alarm is looked at again.
             let seen = intake.with(unit, |actor| actor.tick_seen()).flatten();
-            if let Some(tick) = seen.filter(|tick| Some(tick.place) != last) {
-                last = Some(tick.place);
-                bin.add(&tick);
+            if let Some((tick, subtracted)) = seen.filter(|(tick, _)| Some(place(tick)) != last) {
+                last = Some(place(&tick));
+                bin.add(&tick, &subtracted);
             }
         }
         if bin.ticks > 0 {
@@ -133,14 +135,10 @@ mod tests {
     #[test]
     fn a_bin_holds_smallest_mean_and_largest_and_null_for_what_is_not_there() {
         let mut bin = Bin::new();
-        for (place, rate) in [1.0, 3.0, f64::NAN].into_iter().enumerate() {
-            bin.add(&TickSeen {
-                place: (0, place as u64),
-                angular_rate_rad_per_s: [rate, 0.0, -rate],
-                subtracted_rad_per_s: [0.5, 0.0, 0.0],
-                specific_force_m_per_s2: None,
-                subtracted_m_per_s2: [0.0; 3],
-            });
+        let subtracted = Applied { angular_rate: [0.5, 0.0, 0.0], ..Applied::default() };
+        for rate in [1.0, 3.0, f64::NAN] {
+            let tick = Observation { angular_rate: [rate, 0.0, -rate], ..Observation::default() };
+            bin.add(&tick, &subtracted);
         }
         let json = serde_json::to_value(&bin).unwrap();
         assert_eq!(json["corrected_rad_per_s"][0], serde_json::json!([1.0, 2.0, 3.0]));

@@ -12,8 +12,7 @@ use isotherm_protocol::digest::Digest;
 
 use crate::ServiceError;
 use crate::config::Settings;
-use crate::signing::create;
-use isotherm_document::file::{check_regular, read_bounded};
+use isotherm_document::file::{check_regular, create, read_bounded};
 
 /// Its name in the state folder.
 const FILE: &str = "web-token";
@@ -106,7 +105,7 @@ pub(super) fn of_service(settings: &Settings) -> Result<String, ServiceError> {
     let refused = |source| ServiceError::Token { path: file.clone(), source };
     if !file.try_exists().map_err(refused)? {
         let token = made().map_err(refused)?;
-        if let Err(error) = create(&file, &format!("{token}\n"), 0o600) {
+        if let Err(error) = create(&file, format!("{token}\n").as_bytes(), 0o600) {
             tracing::error!(
                 "the token of the console cannot be written to {}: {error}; until the service ends: open /#token={token} at \
                  the address of the metrics",

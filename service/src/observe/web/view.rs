@@ -6,7 +6,7 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::{PairReport, UnitRole};
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::Web;
 use isotherm_operator::page::{
@@ -65,17 +65,15 @@ struct Row {
     correction_mg: Option<f64>,
     raw_ticks_per_s: Option<f64>,
     p99_ns: u64,
-    gaps: u64,
-    duplicates: u64,
-    late: u64,
-    bad: u64,
+    /// Counted since the service started.
+    #[serde(flatten)]
+    counted: Lately,
 }
 
 impl Row {
     fn of(unit: &Unit<'_>) -> Self {
         let status = unit.status;
         let (channel, applied) = (channel_in_view(status), applied(status));
-        let counted = Lately::counted(status);
         Self {
             unit: status.unit.clone(),
             instance: status.instance.clone(),
@@ -93,10 +91,7 @@ impl Row {
             correction_mg: applied.map(|[_, force]| force),
             raw_ticks_per_s: knows_rates(status).then_some(status.input_rates.gyro_ticks_per_s),
             p99_ns: status.latency.p99_ns,
-            gaps: counted.gaps,
-            duplicates: counted.duplicates,
-            late: counted.late,
-            bad: counted.bad,
+            counted: Lately::counted(status),
         }
     }
 }
@@ -133,7 +128,8 @@ struct Instance<'f> {
     /// Commands that its state takes now, by name.
     allowed: &'static [&'static str],
     status: &'f Status,
-    past: Vec<Past<'f>>,
+    /// Temperatures some time ago: age (s), and that of each channel (°C).
+    past: Vec<Vec<f64>>,
 }
 
 /// A line in columns.
@@ -141,22 +137,6 @@ struct Instance<'f> {
 struct Columns {
     level: Level,
     columns: Vec<String>,
-}
-
-/// Temperatures some time ago.
-#[derive(Debug)]
-struct Past<'f> {
-    age_s: f64,
-    of: &'f isotherm_operator::page::Past,
-}
-
-impl Serialize for Past<'_> {
-    /// As a list: age (s), and the temperature of each channel (°C).
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let rounded = |value: f64| (value * 1e3).round() / 1e3;
-        let temperatures = self.of.channels.iter().map(|(_, temperature, _)| rounded(*temperature));
-        serializer.collect_seq(std::iter::once(rounded(self.age_s)).chain(temperatures))
-    }
 }
 
 impl Web {
@@ -220,9 +200,11 @@ impl Web {
         // Under another calibration there may have been other channels.
         let channels = || unit.status.channels.iter().map(|channel| channel.name);
         let same = unit.past.iter().filter(|of| of.channels.iter().map(|(name, ..)| *name).eq(channels()));
+        let rounded = |value: f64| (value * 1e3).round() / 1e3;
         let past = same.map(|of| {
             let age_s = now.saturating_duration_since(of.at).as_secs_f64();
-            Past { age_s, of }
+            let temperatures = of.channels.iter().map(|(_, temperature, _)| rounded(*temperature));
+            std::iter::once(rounded(age_s)).chain(temperatures).collect()
         });
         Instance {
             own: unit.status.instance == self.instance,

@@ -66,7 +66,7 @@ impl Intake {
         };
         let mut actor = self.make(&id, outlet);
         // Read while nobody else may write the units: what is changed behind this finds the unit there.
-        let plan = read(&self.calibrations).get(&id).cloned().unwrap_or_default();
+        let plan = read(&self.calibrations).plans.get(&id).cloned().unwrap_or_default();
         for change in plan.changes() {
             actor.change(change);
         }

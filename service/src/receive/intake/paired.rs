@@ -81,10 +81,10 @@ impl Intake {
         self.fault(kind, || words);
     }
 
-    /// Has a unit, seen or not, begin anew with what another instance has written down.
+    /// Has a unit, seen or not, begin with what it had before a restart, or with what another instance has written down.
     pub(crate) fn plan_again(&self, unit: &UnitId, plan: Plan) {
         let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
-        *calibrations.plan_mut(unit) = plan.clone();
+        calibrations.plans.insert(unit.clone(), plan.clone());
         drop(calibrations);
         self.with(unit, |actor| actor.plan_again(plan));
     }

@@ -72,7 +72,7 @@ impl UnitActor {
             instance,
             version: env!("CARGO_PKG_VERSION"),
             now_unix_s: now.ok().and_then(|since| i64::try_from(since.as_secs()).ok()),
-            input_rates: self.arrivals.rates(),
+            input_rates: self.arrivals.rates,
             latency: self.latency(),
             swaps: self.account.swaps.clone(),
             overlay: self.account.overlay,
@@ -89,7 +89,7 @@ impl UnitActor {
             status.faults.push(fault);
         }
         // The core knows that it was given up, not what for.
-        if let (Some(outcome), Some(reason)) = (&mut status.pre_launch_outcome, self.notices.given_up())
+        if let (Some(outcome), Some(reason)) = (&mut status.pre_launch_outcome, &self.notices.given_up)
             && outcome.verdict == PreLaunchVerdict::Aborted
         {
             outcome.verdict = PreLaunchVerdict::Refused(vec![format!("given up: {reason}")]);

@@ -47,7 +47,7 @@ pub(super) struct Arrivals {
     messages: u64,
     /// The counters at the last look, and the rates between the last two looks.
     looked: (Instant, [u64; 4]),
-    rates: InputRates,
+    pub(super) rates: InputRates,
     /// The runs of the producer that were heard last.
     series: Option<u64>,
     previous: Option<(u64, Instant)>,
@@ -56,7 +56,7 @@ pub(super) struct Arrivals {
     contradicting: u64,
     /// Length and checksum of the gyro frames that were heard last, and ticks since the last look that were in repeats of them.
     frames: VecDeque<(usize, [u8; 4])>,
-    repeated: u64,
+    pub(super) repeated: u64,
 }
 
 impl Arrivals {
@@ -88,11 +88,6 @@ impl Arrivals {
             self.frames.push_front(mark);
         }
         is_repeat
-    }
-
-    /// So many ticks contradicted others since they came in a repeat.
-    pub(super) fn note_repeat(&mut self, ticks: u64) {
-        self.repeated += ticks;
     }
 
     /// A message has come; `series` is the producer's run that gyro ticks are of, where they could be read.
@@ -179,11 +174,6 @@ impl Arrivals {
             )
         })
     }
-
-    /// The rates between the last two looks.
-    pub(super) fn rates(&self) -> InputRates {
-        self.rates
-    }
 }
 
 /// Ticks that contradict others.
@@ -236,13 +226,13 @@ mod tests {
         let mut arrivals = arrivals(100, 50, start);
         (0..50).for_each(|_| arrivals.note(Input::Reference, None, start));
         arrivals.look(start + Duration::from_millis(500), &counters(100, 0));
-        assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (200.0, 100.0));
+        assert_eq!((arrivals.rates.gyro_ticks_per_s, arrivals.rates.messages_per_s), (200.0, 100.0));
         arrivals.look(start + Duration::from_millis(1500), &counters(110, 0));
-        assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (10.0, 0.0));
+        assert_eq!((arrivals.rates.gyro_ticks_per_s, arrivals.rates.messages_per_s), (10.0, 0.0));
         // What the counters of another instance had before did not come here.
         arrivals.go_on_from(start + Duration::from_millis(1500), &counters(9000, 50));
         assert_eq!(arrivals.look(start + Duration::from_millis(2500), &counters(9020, 50)), None);
-        assert_eq!((arrivals.rates().gyro_ticks_per_s, arrivals.rates().messages_per_s), (20.0, 0.0));
+        assert_eq!((arrivals.rates.gyro_ticks_per_s, arrivals.rates.messages_per_s), (20.0, 0.0));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use isotherm_protocol::stream::UnitStream;
 
 use super::UnitActor;
 use crate::control::change::Change;
-use crate::control::compressed::CompressedText;
+use crate::control::compressed::Compressed;
 use crate::control::revision::Revision;
 use crate::receive::fault::FaultKind;
 
@@ -55,7 +55,7 @@ impl UnitActor {
     /// Everything that the unit's stream knows at this moment, as the journal's entry; `instance` is the service's name for
     /// itself.
     pub(crate) fn memory(&self, instance: &str) -> JournalEntry {
-        let text = |next: &Arc<Revision>| next.document.text.as_ref().map(CompressedText::read);
+        let text = |next: &Arc<Revision>| next.document.text.as_ref().map(Compressed::text);
         let event = JournalEvent::Memory {
             memory: self.stream.memory(),
             document: self.plan.current.as_ref().and_then(text),
@@ -135,7 +135,7 @@ pub(super) fn changed(change: &Change) -> JournalEvent {
         revision: next.number,
         at: *at,
         slew_ns: slew.as_ns(),
-        document: next.document.text.as_ref().map(CompressedText::read),
+        document: next.document.text.as_ref().map(Compressed::text),
         overlay: next.document.label.overlay,
         source: next.source.clone(),
     }

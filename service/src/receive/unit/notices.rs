@@ -12,23 +12,19 @@ use crate::control::{Inbox, Notice, PreLaunchEnd};
 /// Watches a stream for what the swap manager and the readers of the status should hear of.
 #[derive(Debug, Default)]
 pub(super) struct NoticeCollector {
-    inbox: Option<Inbox>,
+    /// To whom notices go.
+    pub(super) inbox: Option<Inbox>,
     /// Not taken yet: the swap manager had too much waiting.
-    untold: VecDeque<Notice>,
+    pub(super) untold: VecDeque<Notice>,
     state: Option<State>,
     revision: u64,
     /// End of the last tick before a pre-launch calibration began (ns on the producer's clock).
     pre_launch_start_ns: Option<i64>,
     /// What the last pre-launch calibration was given up for, where no command did it.
-    given_up: Option<String>,
+    pub(super) given_up: Option<String>,
 }
 
 impl NoticeCollector {
-    /// To whom notices go.
-    pub(super) fn report_to(&mut self, inbox: Inbox) {
-        self.inbox = Some(inbox);
-    }
-
     /// Looks at the stream; whether state or revision are others than at the last look.
     pub(super) fn look(&mut self, stream: &mut UnitStream) -> bool {
         while let Some(first) = stream.take_in_force() {
@@ -78,11 +74,6 @@ impl NoticeCollector {
         }));
     }
 
-    /// Something else is to be told.
-    pub(super) fn push(&mut self, notice: Notice) {
-        self.untold.push_back(notice);
-    }
-
     /// Hands over what is untold, as far as it is taken.
     pub(super) fn tell(&mut self, stream: &UnitStream) {
         let Some(inbox) = &self.inbox else {
@@ -95,15 +86,5 @@ impl NoticeCollector {
                 return;
             }
         }
-    }
-
-    /// What the last pre-launch calibration was given up for, where no command did it.
-    pub(super) fn given_up(&self) -> Option<&str> {
-        self.given_up.as_deref()
-    }
-
-    /// What is untold, for a swap manager that is about to end.
-    pub(super) fn take_untold(&mut self) -> Vec<Notice> {
-        self.untold.drain(..).collect()
     }
 }

@@ -6,7 +6,6 @@
 mod following;
 mod heard;
 mod kept;
-mod output;
 
 use std::time::{Duration, Instant};
 
@@ -145,12 +144,32 @@ impl UnitActor {
         due.into_iter().map(|frame| (self.outlet)(frame)).fold(Ok(()), Result::and)
     }
 
+    /// An active instance publishes what its stream makes as soon as that has joined, and what it made until then: the other may have
+    /// stood still meanwhile, and published nothing.
+    fn publish_owed(&mut self, now: Instant, active: bool) {
+        let Some(following) = &mut self.speech.following else { return };
+        following.also_out = active && following.follower.has_joined();
+        if following.also_out {
+            let owed = following.kept.due(now, REPEATED);
+            self.publish_kept(owed);
+        }
+    }
+
+    /// Publishes frames that were kept.
+    fn publish_kept(&mut self, frames: Vec<Vec<u8>>) {
+        for frame in frames {
+            if let Err(error) = (self.outlet)(frame) {
+                self.note_unpublished(1, &error);
+            }
+        }
+    }
+
     /// Goes on as the journal says, as far as frames and entries have come.
     fn catch_up(&mut self, now: Instant) {
         let Some(following) = &mut self.speech.following else { return };
         let ns = following.ns(now);
         let had_joined = following.follower.has_joined();
-        let (rebuilt, stuck) = following.follower.advance(&self.stream, following.kept.made(), ns);
+        let (rebuilt, stuck) = following.follower.advance(&self.stream, following.kept.made, ns);
         if stuck {
             following.lose();
         }
@@ -254,9 +273,9 @@ impl UnitActor {
             self.speech.memory_due = true;
         }
         for order in orders {
-            self.notices.push(Notice::Followed(Box::new(order)));
+            self.notices.untold.push_back(Notice::Followed(Box::new(order)));
         }
-        self.notices.push(Notice::Speaks);
+        self.notices.untold.push_back(Notice::Speaks);
         self.status_due = true;
         self.look();
     }

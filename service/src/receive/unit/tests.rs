@@ -13,7 +13,7 @@ use isotherm_protocol::stream::Label;
 
 use super::*;
 use crate::UnitTotals;
-use crate::control::compressed::CompressedText;
+use crate::control::compressed::Compressed;
 use crate::control::document::Document as Compiled;
 use crate::control::revision::Revision as Given;
 
@@ -220,7 +220,7 @@ fn a_reset_keeps_a_change_that_waits_and_the_state() {
     actor.command(&Command::Standby).unwrap();
     let revision = Revision { counter: 2, digest: [9; 8] };
     let label = Label { digest: Some(Digest([9; 32])), ..Label::default() };
-    let document = Arc::new(Compiled::new(calibration, label, CompressedText::new("")));
+    let document = Arc::new(Compiled::new(calibration, label, Compressed::new(b"")));
     let next = Arc::new(Given { number: revision, document, source: String::new() });
     actor.change(Change { next, at: Schedule::Sequence(70), slew: Span::ZERO });
     actor.reset("a test says so");

@@ -72,7 +72,7 @@ fn a_file_that_is_written_while_it_is_read_settles_anew() {
 #[test]
 fn a_file_that_is_away_within_the_grace_time_was_never_gone() {
     let (start, file) = (Instant::now(), Path::new("a.toml"));
-    let known = BTreeMap::from([(file.to_owned(), Known::Content(Digest([1; 32])))]);
+    let known = BTreeMap::from([(file.to_owned(), Some(Digest([1; 32])))]);
     let mut states = FileStates::new(settings(), known);
     states.see(start, file, sight(1));
     assert_eq!(states.read(start + MS * 100, file, Ok(content(1))), None, "the owner knows it");

@@ -51,10 +51,9 @@ fn where_no_watch_is_granted_the_poll_does_the_work_until_one_is() {
         |_| {},
     );
     let told: Vec<_> = std::iter::repeat_with(|| scene.next_of_all()).take(3).collect();
-    let words =
-        |event: &FolderEvent, words| matches!(event, FolderEvent::Deaf { reason } if reason.contains(words));
+    let words = |event: &FolderEvent, words| matches!(event, FolderEvent::Deaf(Some(reason)) if reason.contains(words));
     assert!(words(&told[0], "max_user_watches") && words(&told[1], "max_user_instances"), "{told:?}");
-    assert_eq!(told[2], FolderEvent::Hearing);
+    assert_eq!(told[2], FolderEvent::Deaf(None));
     made_at_least(&MADE, 4, &scene);
     let made = MADE.load(Ordering::SeqCst);
     scene.expect_nothing();

@@ -31,12 +31,12 @@ fn a_folder_that_is_away_removes_no_file() {
         let scene = Scene::new(by, &[("a.toml", "same"), ("b.toml", "old"), ("c.toml", "gone")]);
         fs::remove_dir_all(&scene.folder).unwrap();
         match scene.next() {
-            FolderEvent::FolderGone { reason } => assert!(reason.contains("os error 2)"), "{reason}"),
+            FolderEvent::Away(Some(reason)) => assert!(reason.contains("os error 2)"), "{reason}"),
             other => panic!("{other:?}"),
         }
         fs::write(&scene.folder, "a file").unwrap();
         match scene.next() {
-            FolderEvent::FolderGone { reason } => assert!(reason.contains("os error 20)"), "{reason}"),
+            FolderEvent::Away(Some(reason)) => assert!(reason.contains("os error 20)"), "{reason}"),
             other => panic!("{other:?}"),
         }
         fs::remove_file(&scene.folder).unwrap();
@@ -46,7 +46,7 @@ fn a_folder_that_is_away_removes_no_file() {
             fs::write(beside.join(name), text).unwrap();
         }
         fs::rename(&beside, &scene.folder).unwrap();
-        scene.expect(&FolderEvent::FolderBack);
+        scene.expect(&FolderEvent::Away(None));
         // Two files that have nothing to do with each other: a watcher that was held up tells them in either order.
         let (changed, removed) = (scene.changed("b.toml", "new"), scene.removed("c.toml"));
         let told = [scene.next(), scene.next()];
@@ -99,9 +99,9 @@ fn a_folder_that_is_a_link_may_be_switched() {
 fn a_folder_that_is_missing_at_the_start_is_watched_when_it_appears() {
     either_way(|by| {
         let scene = Scene::with(by.settings(), by.listener(), |folder| fs::remove_dir(folder).unwrap());
-        assert!(matches!(scene.next(), FolderEvent::FolderGone { .. }));
+        assert!(matches!(scene.next(), FolderEvent::Away(Some(_))));
         fs::create_dir(&scene.folder).unwrap();
-        scene.expect(&FolderEvent::FolderBack);
+        scene.expect(&FolderEvent::Away(None));
         scene.write("a.toml", "text");
         scene.expect(&scene.changed("a.toml", "text"));
     });
@@ -112,7 +112,7 @@ fn what_the_owner_knows_is_not_told_again() {
     either_way(|by| {
         let temporary = TempDir::new().unwrap();
         let path = |name: &str| temporary.path().join(name);
-        let digest = |text: &str| Known::Content(Digest::of(text.as_bytes()));
+        let digest = |text: &str| Some(Digest::of(text.as_bytes()));
         for (name, text) in [("a.toml", "same"), ("b.toml", "new"), ("d.toml", "unknown")] {
             fs::write(path(name), text).unwrap();
         }
@@ -123,12 +123,12 @@ fn what_the_owner_knows_is_not_told_again() {
             (path("a.toml"), digest("same")),
             (path("b.toml"), digest("old")),
             (path("c.toml"), digest("gone")),
-            (path("e.toml"), Known::Unreadable),
+            (path("e.toml"), None),
             (path("f.toml"), digest("readable")),
         ]);
         let (sink, told) = channel();
         let sink = move |event| match event {
-            FolderEvent::Deaf { .. } => {}
+            FolderEvent::Deaf(_) => {}
             event => sink.send(event).unwrap(),
         };
         let watcher =

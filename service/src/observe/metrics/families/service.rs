@@ -5,7 +5,7 @@ use isotherm_protocol::service_status::FolderState;
 use super::{Family, Sample, Source, Type, Value, each, families, known, one};
 use crate::control::STATE_FOLDER;
 use crate::observe::metrics::source::Look;
-use crate::receive::fault::FaultKind;
+use crate::receive::fault::{FaultKind, of_kind};
 
 families! { Service "isotherm_":
     Gauge "build_info" "" ["version", "instance_id"] "Always 1; version and Zenoh id of the service"
@@ -23,23 +23,23 @@ families! { Service "isotherm_":
     Counter "refused_messages" "" ["kind"] "Messages refused that belong to no known unit"
         |look| faults(look, FaultKind::ALL.iter().copied().filter(|kind| kind.is_refusal()));
     Counter "swaps" "" ["outcome"] "Swaps accepted and refused, of all units, unknown ones included; dry runs and a first document from a file are not counted"
-        |look| each([("accepted", look.posted.accepted), ("refused", look.posted.refused)]);
+        |look| each([("accepted", look.posted.swaps_accepted), ("refused", look.posted.swaps_refused)]);
     Counter "log_lines_dropped" "" [] "Log lines dropped because stderr was blocked: a stopped terminal, a full pipe"
         |look| one(look.log_lines_dropped);
     Counter "late_receipts" "" [] "Receipts that took over 1 s: meanwhile ticks are dropped for that subscriber; the status names it"
         |look| one(look.late_receipts);
     Gauge "calibration_folder_readable" "" [] "1 if the folder of calibration documents can be read; absent without one"
-        |look| known(look.posted.folder.as_ref().map(|folder| folder.state != FolderState::Gone));
+        |look| known(look.posted.calibrations.as_ref().map(|folder| folder.state != FolderState::Gone));
     Gauge "bad_documents" "" [] "Refused documents of that folder, at most 64"
         |look| one(look.posted.bad_documents.len() as u64);
     Gauge "state_folder_writable" "" [] "1 if the state folder can be written, 0 if every swap is refused; absent without one"
-        |look| known(look.posted.store.as_ref().map(|_| look.posted.standing(STATE_FOLDER).is_none()));
+        |look| known(look.posted.store.as_ref().map(|_| of_kind(&look.posted.faults, STATE_FOLDER).is_none()));
     Gauge "audit_entries" "" [] "Number of the last entry of the audit file; absent without a state folder"
         |look| known(look.posted.store.as_ref().map(|store| store.audit_entries));
 }
 
 /// How often messages were refused, by reason.
 fn faults(look: &Look, kinds: impl IntoIterator<Item = FaultKind>) -> Vec<Sample<'_>> {
-    let count = |kind: FaultKind| look.faults.iter().find(|fault| fault.kind == kind.name());
-    each(kinds.into_iter().map(|kind| (kind.name(), count(kind).map_or(0, |fault| fault.count))))
+    let count = |kind: &str| of_kind(&look.faults, kind).map_or(0, |fault| fault.count);
+    each(kinds.into_iter().map(|kind| (kind.name(), count(kind.name()))))
 }

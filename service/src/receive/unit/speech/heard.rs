@@ -158,7 +158,7 @@ impl UnitActor {
         if is_change || self.stream.unit().state() != before {
             tracing::info!(%unit, instance = entry.instance, "an order of another instance ({name}) holds here too");
             self.journal(|_| entry.event.clone());
-            self.notices.push(Notice::Followed(Box::new(entry)));
+            self.notices.untold.push_back(Notice::Followed(Box::new(entry)));
         }
         self.status_due = true;
         self.look();

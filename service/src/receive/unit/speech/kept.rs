@@ -56,7 +56,7 @@ pub(super) struct Settled {
 pub(super) struct Kept {
     frames: VecDeque<Frame>,
     /// How many there were, those that are given up with them.
-    made: u64,
+    pub(super) made: u64,
     heard: BTreeMap<Id, Heard>,
     last_heard: Option<Id>,
     /// When something was last heard, or else first computed.
@@ -97,11 +97,6 @@ impl Kept {
         for tick in batch.ticks {
             self.heard.insert(id(&tick), Heard { tick, revision, at: now });
         }
-    }
-
-    /// How many frames were computed.
-    pub(super) fn made(&self) -> u64 {
-        self.made
     }
 
     /// The stream has been taken back: these are the frames that it has made again, and so many of those that it made before hold. Of a
@@ -310,7 +305,7 @@ mod tests {
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [2, 3, 4, 5]);
         // What the other says now it need not say again, nor does this one.
         kept.heard(batch(5), late);
-        kept.replace((2..7).map(frame).collect(), Some(kept.made() - 4), late);
+        kept.replace((2..7).map(frame).collect(), Some(kept.made - 4), late);
         assert_eq!(sequences(&kept.due(late, TAKEOVER)), [6]);
         assert!(kept.due(late, TAKEOVER).is_empty());
     }

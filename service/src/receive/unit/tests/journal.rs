@@ -91,7 +91,7 @@ impl Bench {
         let parsed = Document::parse(EXAMPLE, None).unwrap();
         let digest = Digest(parsed.digest);
         let label = Label { overlay: Some(Digest([3; 32])), ..Label::of(&parsed.document, digest, "") };
-        let text = CompressedText::new(EXAMPLE);
+        let text = Compressed::new(EXAMPLE.as_bytes());
         let next = Given::new(
             self.actor.stream.next_counter(),
             Arc::new(Compiled::new(Arc::new(parsed.calibration), label, text)),
