@@ -64,28 +64,22 @@ fn servo(found: &ServoFit, old: &GyroSensor, reference: f64) -> Servo {
     }
 }
 
-/// The document with everything that was found. `constants` are those of static biases that are not to be touched.
-pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Document {
+/// The document with everything that was found. `constants` are those of static biases that are not to be touched. Gyros without a fit
+/// keep what the base has.
+pub fn fitted(stripped: &Document, base: &Document, made: &Made, constants: &[Option<f64>]) -> Document {
     let mut document = stripped.clone();
-    for ((sensor, found), constant) in document.gyro.sensor.iter_mut().zip(&made.gyros).zip(constants) {
-        let Ok(found) = found else { continue };
+    let sensors = document.gyro.sensor.iter_mut().zip(&base.gyro.sensor);
+    for ((sensor, old), (found, constant)) in sensors.zip(made.gyros.iter().zip(constants)) {
+        let Ok(found) = found else {
+            FITTED.into_iter().for_each(|feature| sensor.set(feature, old.terms.curve(feature).cloned()));
+            continue;
+        };
         let reference = made.reference_deg_c;
         sensor.set(Feature::One, curve(found, Term::Static, reference, *constant));
         sensor.set(Feature::LasingMode, curve(found, Term::Magnetic, reference, None));
         sensor.set(Feature::Meander, curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None));
     }
     document
-}
-
-/// Gyros without a fit keep what the base has.
-pub fn keep_old(document: &mut Document, base: &Document, gyros: &[Result<GyroFit, String>]) {
-    for ((sensor, old), found) in document.gyro.sensor.iter_mut().zip(&base.gyro.sensor).zip(gyros) {
-        if found.is_err() {
-            for feature in FITTED {
-                sensor.set(feature, old.terms.curve(feature).cloned());
-            }
-        }
-    }
 }
 
 /// A term as a curve, its constant as it was found or as it is given.

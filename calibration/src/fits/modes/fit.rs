@@ -194,8 +194,7 @@ impl Made {
         earth: Option<[f64; 3]>,
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
-        let document = document::fitted(&self.before.document, self, constants);
-        self.write(&document, wanted, earth, watch)?;
+        self.write(wanted, constants, earth, watch)?;
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::refused(format!(
@@ -204,29 +203,26 @@ impl Made {
                 self.window_s
             )));
         }
-        if verdicts.iter().all(|verdict| verdict.accepted) {
-            return Ok(());
-        }
-        for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
+        let mut any_worse = false;
+        for (fit, row) in self.gyros.iter_mut().zip(&wanted.base.gyro.orientation.rows) {
             let axis = output_name(true, main_axis(row));
-            if verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == axis) {
-                self.gyros[sensor] = Err(format!("its terms make {axis} worse: it keeps the old ones"));
+            if fit.is_ok() && verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == axis) {
+                *fit = Err(format!("its terms make {axis} worse: it keeps the old ones"));
+                any_worse = true;
             }
         }
-        let mut document = document::fitted(&self.before.document, self, constants);
-        document::keep_old(&mut document, wanted.base, &self.gyros);
-        self.write(&document, wanted, earth, watch)
+        if any_worse { self.write(wanted, constants, earth, watch) } else { Ok(()) }
     }
 
-    /// Writes a document, and judges what is written.
+    /// Writes the document, and judges what is written.
     fn write(
         &mut self,
-        document: &Document,
         wanted: &Wanted<'_>,
+        constants: &[Option<f64>],
         earth: Option<[f64; 3]>,
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
-        self.written = Written::of(document)?;
+        self.written = Written::of(&document::fitted(&self.before.document, wanted.base, self, constants))?;
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
         let rest = Rest { rate_deg_per_h, ..Rest::default() };
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };

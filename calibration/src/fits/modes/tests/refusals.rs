@@ -13,6 +13,7 @@ use isotherm_simulator::chamber::Profile;
 use super::fixture::{base, cycle, fitted, scenario, wanted, zeeman};
 use crate::document::Written;
 use crate::error::Error;
+use crate::fits::modes::document;
 use crate::fits::modes::fit::{Made, Wanted, make};
 use crate::fits::modes::model::Term;
 use crate::fixture::events;
@@ -228,7 +229,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
         assert!(got.abs() > 100.0 * sigma);
     }
     let names: Vec<String> = made.report().coefficients.into_iter().map(|one| one.name).collect();
-    let sigmas = crate::fits::modes::document::sigmas(&made);
+    let sigmas = document::sigmas(&made);
     assert!(
         sigmas.get("gyro", "x", "static_bias").unwrap()[0] <= 0.0,
         "of what was not fitted nothing is known"
@@ -237,6 +238,21 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
     let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
     insta::assert_snapshot!([names, made.report().warnings].concat().join("\n"));
+}
+
+#[test]
+fn a_gyro_without_a_fit_keeps_the_terms_of_the_document_though_no_axis_is_worse() {
+    let old = fitted(&short(), &base()).written.document;
+    let mut made = fitted(&short(), &old);
+    assert!(made.report().accepted());
+    made.gyros[1] = Err("its means are far off".to_owned());
+    let new = document::fitted(&made.before.document, &old, &made, &[None; 3]);
+    for feature in [Feature::One, Feature::LasingMode, Feature::Meander] {
+        let [kept, old, without] = [&new, &old, &made.before.document]
+            .map(|document| document.gyro.sensor[1].terms.curve(feature).cloned());
+        assert!(old.is_some() && without.is_none(), "{feature:?}");
+        assert_eq!(kept, old);
+    }
 }
 
 #[test]
