@@ -96,7 +96,7 @@ fn judging_a_run_shows_what_the_terms_do() {
     let before = Written::of(&after.document.nominal()).unwrap();
     let judged = |rest: Rest| {
         let of_run = |_, _: &Run| Ok((rest, Rows::valid(5.0), ""));
-        judge((&[], std::slice::from_ref(&run)), [&before, &after], of_run, ()).unwrap()
+        judge((&[], std::slice::from_ref(&run)), [&before, &after], of_run).unwrap()
     };
     let means = judged(Rest::default());
     let names: Vec<&str> = means.curves.iter().map(|curve| curve.of.as_str()).collect();

@@ -17,8 +17,8 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::{median, real};
 use crate::report::{Curve as Residual, Rest, judge};
+use crate::runs::Run;
 use crate::runs::table::{Rows, Takes};
-use crate::runs::{Run, Watch};
 
 /// About so many cells are made of a fit's runs, none shorter than [`SHORTEST_S`].
 const CELLS: f64 = 400.0;
@@ -83,8 +83,8 @@ pub struct Made {
 ///
 /// # Errors
 /// [`Error::Refused`] with every reason why the log does not allow it; [`Error::Log`], [`Error::Document`].
-pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
-    let switches = Switches::of(wanted.runs, watch)?;
+pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
+    let switches = Switches::of(wanted.runs)?;
     let reasons = checks::before(&switches, wanted.base, wanted.asked.transition_ticks);
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
@@ -110,15 +110,15 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     let mut servos: Vec<Result<ServoFit, String>> = vec![Err(String::new()); switches.sensors];
     let mut earth_case = None;
     for group in groups(switches.sensors) {
-        let gathered = gather(wanted.runs, &bare, group, cut, watch)?;
+        let gathered = gather(wanted.runs, &bare, group, cut)?;
         let earth = earth_rate(wanted, &gathered)?;
         earth_case = earth;
-        let doubts = check(wanted, &gathered, (&bare, group), earth, watch)?;
+        let doubts = check(wanted, &gathered, (&bare, group), earth)?;
         // Gaps, gravity and temperatures are the same for every group of gyros.
         if group[0] == 0 {
             gaps(&gathered, &mut warnings);
             warnings.extend(doubts);
-            warnings.extend(temperatures::freezing(wanted.runs, &bare, watch)?);
+            warnings.extend(temperatures::freezing(wanted.runs, &bare)?);
             let deg_c: Vec<f64> =
                 gathered.cells.iter().map(|cell| cell.powers[0][0] + reference_deg_c).collect();
             warnings.extend(units::other_dither(&switches, wanted.base, median(&deg_c)));
@@ -181,7 +181,7 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         residuals: Vec::new(),
         warnings,
     };
-    made.settle(wanted, &constants, earth_case, watch)?;
+    made.settle(wanted, &constants, earth_case)?;
     Ok(made)
 }
 
@@ -192,9 +192,8 @@ impl Made {
         wanted: &Wanted<'_>,
         constants: &[Option<f64>],
         earth: Option<[f64; 3]>,
-        watch: &mut dyn Watch,
     ) -> Result<(), Error> {
-        self.write(wanted, constants, earth, watch)?;
+        self.write(wanted, constants, earth)?;
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::refused(format!(
@@ -211,7 +210,7 @@ impl Made {
                 any_worse = true;
             }
         }
-        if any_worse { self.write(wanted, constants, earth, watch) } else { Ok(()) }
+        if any_worse { self.write(wanted, constants, earth) } else { Ok(()) }
     }
 
     /// Writes the document, and judges what is written.
@@ -220,7 +219,6 @@ impl Made {
         wanted: &Wanted<'_>,
         constants: &[Option<f64>],
         earth: Option<[f64; 3]>,
-        watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         self.written = Written::of(&document::fitted(&self.before.document, wanted.base, self, constants))?;
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
@@ -228,7 +226,7 @@ impl Made {
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };
         let documents = [&self.before, &self.written];
         let of_run = |_, _: &Run| Ok((rest, rows, "gyro"));
-        self.residuals = judge((wanted.runs, wanted.judge), documents, of_run, watch)?.curves;
+        self.residuals = judge((wanted.runs, wanted.judge), documents, of_run)?.curves;
         Ok(())
     }
 }

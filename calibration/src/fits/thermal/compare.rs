@@ -16,8 +16,8 @@ use crate::finding::ThermalKind;
 use crate::numbers::{Size, real, scatter_of_steps};
 use crate::report::curve::{Judging, channel_of, column};
 use crate::report::{Curve, Rest, is_worse, or_dash, short};
+use crate::runs::Run;
 use crate::runs::table::Table;
-use crate::runs::{Run, Watch};
 
 /// Axes: gyros, then accelerometers.
 const AXES: usize = 6;
@@ -53,13 +53,12 @@ impl Compared {
         documents: [&Document; DOCUMENTS],
         fitted: &[Stage<'_>],
         judging: &[Stage<'_>],
-        mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let loaded: Vec<Loaded> =
             documents.iter().copied().map(Written::compiled).collect::<Result<_, _>>()?;
         let mut levels = [[(0.0, 0.0); DOCUMENTS]; AXES];
         for (run, (rest, rows, counts)) in fitted {
-            let tables = Table::together(run, &loaded, *rows, &mut watch)?;
+            let tables = Table::together(run, &loaded, *rows)?;
             for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| takes_part(counts, *axis))
             {
                 let truth = rest.truth(axis).unwrap_or(0.0);
@@ -74,7 +73,7 @@ impl Compared {
         let mut sums: [[Sum; HEAD.len()]; AXES] = Default::default();
         let mut left: [[Vec<f64>; 2]; AXES] = Default::default();
         for (run, (rest, rows, counts)) in judging {
-            let tables = Table::together(run, &loaded, *rows, &mut watch)?;
+            let tables = Table::together(run, &loaded, *rows)?;
             let shared = fitted.iter().any(|(other, _)| run.shares_log(other));
             let judges = |axis: &usize| takes_part(counts, *axis) && moves(&tables, documents[0], *axis);
             for axis in (0..AXES).filter(judges) {
@@ -142,7 +141,6 @@ impl Outcome {
         document: &Document,
         (runs, judges): (&[Run], &[Run]),
         rest: &impl Fn(&Run, &Stand) -> Result<Rest, Error>,
-        watch: impl Watch,
     ) -> Result<Compared, Error> {
         if judges.is_empty() {
             return Ok(Compared::default());
@@ -154,7 +152,7 @@ impl Outcome {
         let [cubic, with_rate] = [1, 2].map(|rival: usize| {
             self.document(|found| found.rivals.as_ref().map_or(&found.terms, |rivals| &rivals[rival]))
         });
-        Compared::of([&self.plain(), &cubic, &with_rate, document, &self.base], fitted, judging, watch)
+        Compared::of([&self.plain(), &cubic, &with_rate, document, &self.base], fitted, judging)
     }
 
     /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.

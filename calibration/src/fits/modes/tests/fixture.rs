@@ -75,7 +75,7 @@ pub(super) fn wanted<'a>(runs: &'a [Run], base: &'a Document) -> Wanted<'a> {
 
 pub(super) fn fitted(scenario: &Scenario, base: &Document) -> Made {
     let runs = [run(scenario)];
-    make(&wanted(&runs, base), &mut ()).unwrap()
+    make(&wanted(&runs, base)).unwrap()
 }
 
 /// The true constants of a gyro (°/h): term, power, value.

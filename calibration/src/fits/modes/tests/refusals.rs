@@ -38,7 +38,7 @@ fn changed(scenario: &Scenario, mut change: impl FnMut(&mut GyroTick) -> bool) -
 
 fn made(run: Run, base: &Document) -> Result<Made, Error> {
     let runs = [run];
-    make(&wanted(&runs, base), &mut ())
+    make(&wanted(&runs, base))
 }
 
 /// Why nothing can be made of a run.
@@ -147,7 +147,7 @@ fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
             tick.mode.map(|mode| if mode == LasingMode::Plus { LasingMode::Minus } else { LasingMode::Plus });
         true
     });
-    let again = make(&wanted(&[turned], &made.written.document), &mut ()).unwrap();
+    let again = make(&wanted(&[turned], &made.written.document)).unwrap();
     insta::assert_snapshot!(format!(
         "as it is\n{}\nturned\n{}",
         made.warnings.join("\n"),
@@ -215,7 +215,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     zeeman(&mut scenario).reversal.meander_half_period_s = 0.0;
     let base = base();
     let runs = [changed(&scenario, |_| true)];
-    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }, &mut ()).unwrap();
+    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }).unwrap();
     insta::assert_snapshot!(made.warnings.join("\n"));
     for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let fit = fit.as_ref().unwrap();
@@ -236,7 +236,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     );
     // Orders that the run cannot tell are not invented.
     let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
-    let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
+    let made = make(&Wanted { asked, ..wanted(&runs, &base) }).unwrap();
     insta::assert_snapshot!([names, made.report().warnings].concat().join("\n"));
 }
 
@@ -261,7 +261,7 @@ fn a_latitude_that_the_gyros_contradict_is_told() {
     let runs = [changed(&short(), |_| true)];
     let told = |latitude_deg: f64| {
         let place = Place::new(latitude_deg, 30.0, Some([0.0, 0.0])).unwrap();
-        let made = make(&Wanted { place: Some(place), ..wanted(&runs, &base) }, &mut ()).unwrap();
+        let made = make(&Wanted { place: Some(place), ..wanted(&runs, &base) }).unwrap();
         made.warnings.join("\n")
     };
     insta::assert_snapshot!([55.75, 15.75].map(told).join("\n\n"));
