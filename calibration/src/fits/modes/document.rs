@@ -64,18 +64,19 @@ fn servo(found: &ServoFit, old: &GyroSensor, reference: f64) -> Servo {
     }
 }
 
-/// The document with everything that was found. `constants` are those of static biases that are not to be touched. Gyros without a fit
-/// keep what the base has.
-pub fn fitted(stripped: &Document, base: &Document, made: &Made, constants: &[Option<f64>]) -> Document {
-    let mut document = stripped.clone();
+/// The document with everything that was found. Gyros without a fit keep what the base has.
+pub fn fitted(base: &Document, made: &Made) -> Document {
+    let mut document = made.before.document.clone();
     let sensors = document.gyro.sensor.iter_mut().zip(&base.gyro.sensor);
-    for ((sensor, old), (found, constant)) in sensors.zip(made.gyros.iter().zip(constants)) {
+    for ((sensor, old), found) in sensors.zip(&made.gyros) {
         let Ok(found) = found else {
             FITTED.into_iter().for_each(|feature| sensor.set(feature, old.terms.curve(feature).cloned()));
             continue;
         };
         let reference = made.reference_deg_c;
-        sensor.set(Feature::One, curve(found, Term::Static, reference, *constant));
+        let at_reference = old.terms.curve(Feature::One).and_then(|curve| curve.shape().at(reference));
+        let kept = made.keeps_constants.then(|| at_reference.unwrap_or(0.0));
+        sensor.set(Feature::One, curve(found, Term::Static, reference, kept));
         sensor.set(Feature::LasingMode, curve(found, Term::Magnetic, reference, None));
         sensor.set(Feature::Meander, curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None));
     }
@@ -106,12 +107,6 @@ pub fn reference_of(base: &Document) -> f64 {
         curves.into_iter().find_map(about)
     };
     base.gyro.sensor.iter().find_map(of).unwrap_or(REFERENCE_DEG_C)
-}
-
-/// The base's static bias of a gyro at `T_ref` (°/h); zero where it has none.
-pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f64 {
-    let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.terms.curve(Feature::One));
-    curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
 }
 
 /// That magnetic biases are those of the base with the other sign, in words.

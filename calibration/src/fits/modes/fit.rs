@@ -6,7 +6,7 @@ use isotherm_protocol::document::Document;
 use super::cells::{Cell, Cut, gather, groups};
 use super::checks;
 use super::dither;
-use super::document::{self, base_constant, reference_of};
+use super::document::{self, reference_of};
 use super::model::{Asked, Given, GyroFit, fit};
 use super::prepare::{check, earth_rate, gaps, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
@@ -164,9 +164,6 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
                 .to_owned(),
         );
     }
-    let constants: Vec<Option<f64>> = (0..switches.sensors)
-        .map(|sensor| wanted.place.is_none().then(|| base_constant(wanted.base, sensor, reference_deg_c)))
-        .collect();
     let window_s = window_s(&switches, length_s);
     let mut made = Made {
         before: Written::of(&document::stripped(&bare, &servos, wanted.base, reference_deg_c))?,
@@ -181,19 +178,14 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
         residuals: Vec::new(),
         warnings,
     };
-    made.settle(wanted, &constants, earth_case)?;
+    made.settle(wanted, earth_case)?;
     Ok(made)
 }
 
 impl Made {
     /// Writes and judges; gyros whose terms make an axis worse keep the old ones, and all is judged once more.
-    fn settle(
-        &mut self,
-        wanted: &Wanted<'_>,
-        constants: &[Option<f64>],
-        earth: Option<[f64; 3]>,
-    ) -> Result<(), Error> {
-        self.write(wanted, constants, earth)?;
+    fn settle(&mut self, wanted: &Wanted<'_>, earth: Option<[f64; 3]>) -> Result<(), Error> {
+        self.write(wanted, earth)?;
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::refused(format!(
@@ -210,17 +202,12 @@ impl Made {
                 any_worse = true;
             }
         }
-        if any_worse { self.write(wanted, constants, earth) } else { Ok(()) }
+        if any_worse { self.write(wanted, earth) } else { Ok(()) }
     }
 
     /// Writes the document, and judges what is written.
-    fn write(
-        &mut self,
-        wanted: &Wanted<'_>,
-        constants: &[Option<f64>],
-        earth: Option<[f64; 3]>,
-    ) -> Result<(), Error> {
-        self.written = Written::of(&document::fitted(&self.before.document, wanted.base, self, constants))?;
+    fn write(&mut self, wanted: &Wanted<'_>, earth: Option<[f64; 3]>) -> Result<(), Error> {
+        self.written = Written::of(&document::fitted(wanted.base, self))?;
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
         let rest = Rest { rate_deg_per_h, ..Rest::default() };
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };

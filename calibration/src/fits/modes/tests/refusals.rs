@@ -246,7 +246,7 @@ fn a_gyro_without_a_fit_keeps_the_terms_of_the_document_though_no_axis_is_worse(
     let mut made = fitted(&short(), &old);
     assert!(made.report().accepted());
     made.gyros[1] = Err("its means are far off".to_owned());
-    let new = document::fitted(&made.before.document, &old, &made, &[None; 3]);
+    let new = document::fitted(&old, &made);
     for feature in [Feature::One, Feature::LasingMode, Feature::Meander] {
         let [kept, old, without] = [&new, &old, &made.before.document]
             .map(|document| document.gyro.sensor[1].terms.curve(feature).cloned());
