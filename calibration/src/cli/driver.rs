@@ -93,14 +93,14 @@ impl<'a> Task<'a> {
         }
         units.iter().try_for_each(|(unit, _)| files.check_unit(unit.as_str()))?;
         let bar = Bar::counting("units done", units.len());
-        let came = in_parallel(
-            &units,
-            |ready| bar.at(ready as u64),
-            |(unit, work)| {
-                let work = work.as_ref().map_err(|error| Error::refused(error.to_string()))?;
-                written(&Job { work, among: Some(unit.as_str()) })
-            },
-        );
+        let came = in_parallel(&units, |(unit, work)| {
+            let came = match work {
+                Ok(work) => written(&Job { work, among: Some(unit.as_str()) }),
+                Err(error) => Err(Error::refused(error.to_string())),
+            };
+            bar.done_one();
+            came
+        });
         bar.finish();
         let mut cuts: Vec<String> =
             units.iter().filter_map(|(_, work)| work.as_ref().ok()).flat_map(Work::cuts).collect();
