@@ -6,7 +6,7 @@ use isotherm_protocol::document::{Curve, Document, GyroSensor, ModeReversal, Ser
 use serde_json::{Value, json};
 
 use super::fit::{Made, ServoFit};
-use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
+use super::model::{FITTED, GyroFit, MEANDER_REFERENCE_DEG_C, key};
 use crate::document::{about, by_name, rows, tidy};
 use crate::numbers::unit;
 use crate::report::{Sigmas, gyros as gyros_in_words};
@@ -15,8 +15,6 @@ use crate::report::{Sigmas, gyros as gyros_in_words};
 pub const SETTLED: f64 = 8.0;
 /// `T_ref` where the document states none (°C).
 const REFERENCE_DEG_C: f64 = 20.0;
-/// Terms that are fitted.
-const FITTED: [Feature; 3] = [Feature::One, Feature::LasingMode, Feature::Meander];
 /// Ranges are widened to the next tenth of a degree.
 const PER_DEG_C: f64 = 10.0;
 
@@ -69,22 +67,21 @@ pub fn fitted(base: &Document, made: &Made) -> Document {
     let mut document = made.before.document.clone();
     let sensors = document.gyro.sensor.iter_mut().zip(&base.gyro.sensor);
     for ((sensor, old), found) in sensors.zip(&made.gyros) {
-        let Ok(found) = found else {
-            FITTED.into_iter().for_each(|feature| sensor.set(feature, old.terms.curve(feature).cloned()));
-            continue;
-        };
-        let reference = made.reference_deg_c;
-        let at_reference = old.terms.curve(Feature::One).and_then(|curve| curve.shape().at(reference));
-        let kept = made.keeps_constants.then(|| at_reference.unwrap_or(0.0));
-        sensor.set(Feature::One, curve(found, Term::Static, reference, kept));
-        sensor.set(Feature::LasingMode, curve(found, Term::Magnetic, reference, None));
-        sensor.set(Feature::Meander, curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None));
+        for term in FITTED {
+            let meanders = term == Feature::Meander;
+            let reference = if meanders { MEANDER_REFERENCE_DEG_C } else { made.reference_deg_c };
+            let before = old.terms.curve(term);
+            let constant = before.and_then(|before| before.shape().at(reference)).unwrap_or(0.0);
+            let kept = (made.keeps_constants && term == Feature::One).then_some(constant);
+            let found = found.as_ref().map(|found| curve(found, term, reference, kept));
+            sensor.set(term, found.unwrap_or_else(|_| before.cloned()));
+        }
     }
     document
 }
 
 /// A term as a curve, its constant as it was found or as it is given.
-fn curve(found: &GyroFit, term: Term, reference: f64, constant: Option<f64>) -> Option<Curve> {
+fn curve(found: &GyroFit, term: Feature, reference: f64, constant: Option<f64>) -> Option<Curve> {
     let mut coefficients: Vec<f64> = found.of(term).into_iter().map(tidy).collect();
     let range = widened(found.range_deg_c);
     if let (Some(first), Some(constant)) = (coefficients.first_mut(), constant) {
@@ -120,7 +117,7 @@ pub(super) fn inverted(
     const SEEN: f64 = 10.0;
     let is_inverted = |(old, found): &(&GyroSensor, &Result<GyroFit, String>)| {
         let old = old.terms.curve(Feature::LasingMode).and_then(|curve| curve.shape().at(reference_deg_c));
-        let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Term::Magnetic, 0));
+        let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Feature::LasingMode, 0));
         old.zip(now).is_some_and(|(old, [now, sigma])| {
             (now + old).abs() < ALIKE * old.abs() && old.abs() > SEEN * sigma
         })
@@ -161,14 +158,14 @@ pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
 pub fn sigmas(made: &Made) -> Sigmas {
     let mut sigmas = Sigmas::default();
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
-        for term in [Term::Static, Term::Magnetic, Term::Meander] {
+        for term in FITTED {
             let own = found.iter().flat_map(|fit| &fit.coefficients).filter(|one| one.term == term);
             // Of a constant that was not fitted nothing is known.
-            let is_kept = |power: usize| made.keeps_constants && term == Term::Static && power == 0;
+            let is_kept = |power: usize| made.keeps_constants && term == Feature::One && power == 0;
             let of_term: Vec<f64> =
                 own.map(|one| if is_kept(one.power) { 0.0 } else { tidy(one.sigma) }).collect();
             if !of_term.is_empty() {
-                sigmas.put("gyro", &sensor.name, term.key(), of_term);
+                sigmas.put("gyro", &sensor.name, key(term), of_term);
             }
         }
     }

@@ -15,7 +15,6 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::fits::modes::document;
 use crate::fits::modes::fit::{Made, Wanted, make};
-use crate::fits::modes::model::Term;
 use crate::fixture::events;
 use crate::runs::Run;
 
@@ -225,7 +224,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
             matches!(bias, Shape::Polynomial { coefficients, .. } if coefficients[0].abs() <= 0.0),
             "{bias:?}"
         );
-        let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
+        let [got, sigma] = fit.coefficient(Feature::LasingMode, 0).unwrap();
         assert!(got.abs() > 100.0 * sigma);
     }
     let names: Vec<String> = made.report().coefficients.into_iter().map(|one| one.name).collect();
