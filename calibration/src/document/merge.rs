@@ -14,14 +14,14 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use isotherm_protocol::document::{Document, Filter, Problem, Temperature};
+use isotherm_protocol::document::{AccelSensor, Document, Filter, Problem, Temperature};
 use serde_json::{Map, json};
 use toml::Value;
 
-use crate::document::Written;
 use crate::document::plain::{ASSUMED_DEG_C, plain};
 use crate::document::provenance::{BASE, digest_of};
 use crate::document::show::terms::tree;
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::report::Report;
 use check::{check, chosen, same_unit};
@@ -84,6 +84,13 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
         return Err(Error::Refused(conflicts));
     }
     let mut tree = tree(&base.document)?;
+    // Readings and rows go by the order of the sensors, which keys have not.
+    for AccelSensor { name, .. } in parts.iter().flat_map(|part| accelerometers(&part.written.document)) {
+        let key = format!("accel.sensor.{name}.");
+        if from.keys().any(|from| from.starts_with(&key)) {
+            put(&mut tree, &format!("{key}name"), Some(name.as_str().into()));
+        }
+    }
     for key in whole.sections.keys().map(String::as_str).chain(from.keys().copied()) {
         put(&mut tree, key, from.get(key).and_then(|part| part.sections.get(key).cloned()));
     }
