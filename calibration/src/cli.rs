@@ -1,6 +1,5 @@
 //! The command line: arguments in, exit code out.
 
-mod bar;
 mod board;
 mod diff;
 mod drift;

@@ -20,6 +20,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use isotherm_cli::Bar;
 use isotherm_correction::sample::GyroTick;
 use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_log::mapping::{SensorUnit, TemperatureUnit};
@@ -54,6 +55,8 @@ pub struct Run {
     given: Vec<PathBuf>,
     /// Where it was found to be cut short.
     cut: Cut,
+    /// Whether a bar shows how far its files are read.
+    shown: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -103,7 +106,13 @@ impl Run {
             source,
             given: Vec::new(),
             cut: Cut::default(),
+            shown: false,
         }
+    }
+
+    /// Has a bar show how far its files are read, from now on.
+    pub fn show(&mut self) {
+        self.shown = true;
     }
 
     /// The same, where folders were given that have its files.
@@ -191,9 +200,9 @@ impl Run {
     ///
     /// # Errors
     /// [`Error::Log`]; [`Error::Refused`] where it has no ticks, ticks too long to be corrected, or ticks of two instruments.
-    pub fn series(&self, watch: impl Watch) -> Result<Series, Error> {
+    pub fn series(&self) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
-        self.walk(watch, |fed| series.take(&fed))?;
+        self.walk(|fed| series.take(&fed))?;
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
             let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
             if usual_s > longest_s {
@@ -223,16 +232,12 @@ impl Run {
     }
 
     /// Goes through everything that it has.
-    fn walk(
-        &self,
-        mut watch: impl Watch,
-        mut each: impl FnMut(Fed<'_>) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    fn walk(&self, mut each: impl FnMut(Fed<'_>) -> Result<(), Error>) -> Result<(), Error> {
         match &self.source {
             Source::Events(events) => events.iter().try_for_each(|event| each(Fed::Event(event))),
             Source::Files { files, part } => {
                 let mut messages = files.open(part)?;
-                watch.begin(messages.progress());
+                let mut bar = if self.shown { bar_over(&messages.progress()) } else { Bar::hidden() };
                 while let Some(message) = messages.next_message()? {
                     if let Topic::Raw(_, input) = message.topic {
                         let has_ticks = matches!(input, RawStream::Gyro | RawStream::Accel);
@@ -241,9 +246,9 @@ impl Run {
                             None => each(Fed::Frame(input, &message.frame))?,
                         }
                     }
-                    watch.step();
+                    bar.step();
                 }
-                watch.end();
+                bar.finish();
                 self.cut.note(&self.name, &messages.report());
                 Ok(())
             }
@@ -288,49 +293,24 @@ fn readings(stream: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
 ///
 /// # Errors
 /// [`Error::Log`].
-pub fn units_of(log: &mut Log, mut watch: impl Watch) -> Result<(Vec<UnitId>, Cut), Error> {
+pub fn units_of(log: &mut Log) -> Result<(Vec<UnitId>, Cut), Error> {
     let mut units = BTreeSet::new();
-    watch.begin(log.progress());
+    let mut bar = bar_over(&log.progress());
     while let Some(message) = log.next_message()? {
         if let Topic::Raw(unit, _) = message.topic {
             units.insert(unit);
         }
-        watch.step();
+        bar.step();
     }
-    watch.end();
+    bar.finish();
     let cut = Cut::default();
     cut.note("", &log.report());
     Ok((units.into_iter().collect(), cut))
 }
 
-/// Whoever watches a long reading.
-pub trait Watch {
-    /// A reading begins.
-    fn begin(&mut self, progress: Progress);
-    /// It went a step further.
-    fn step(&mut self);
-    /// It is over.
-    fn end(&mut self);
-}
-
-/// Nobody watches.
-impl Watch for () {
-    fn begin(&mut self, _: Progress) {}
-    fn step(&mut self) {}
-    fn end(&mut self) {}
-}
-
-/// One that is lent, for several readings one after the other.
-impl<W: Watch + ?Sized> Watch for &mut W {
-    fn begin(&mut self, progress: Progress) {
-        (**self).begin(progress);
-    }
-
-    fn step(&mut self) {
-        (**self).step();
-    }
-
-    fn end(&mut self) {
-        (**self).end();
-    }
+/// A bar over the bytes of a log.
+fn bar_over(progress: &Progress) -> Bar {
+    let mut bar = Bar::over_logs("reading");
+    bar.begin(progress.watch());
+    bar
 }

@@ -19,7 +19,6 @@ use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::{far, frozen, judging, quiet};
 use crate::numbers::{Size, dot, is_white, norm, real};
 use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short, six};
-use crate::runs::Watch;
 use crate::runs::swapped::{Shown, by_curves, force_at_rest, moved};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
 use coverage::Coverage;
@@ -53,12 +52,7 @@ const REST_TILT: f64 = 0.035;
 ///
 /// # Errors
 /// [`Error::Refused`] where the runs do not allow it: of another unit, nothing in them, not at rest.
-pub fn validate(
-    written: &Written,
-    logs: &[JudgedLog],
-    wanted: Wanted,
-    mut watch: impl Watch,
-) -> Result<Report, Error> {
+pub fn validate(written: &Written, logs: &[JudgedLog], wanted: Wanted) -> Result<Report, Error> {
     let Written { name, document, .. } = written;
     let bare = Written::compiled(&document.nominal())?;
     let mut report = Report::new(format!("Judgement of {name}"), document.unit.clone());
@@ -72,7 +66,7 @@ pub fn validate(
                 run.name, run.unit, document.unit
             )));
         }
-        let series = run.series(&mut watch)?;
+        let series = run.series()?;
         let at_rest = Stand::default();
         let mut faults = judging(&run.name, &series, &at_rest);
         faults.extend(frozen(&run.name, &series, document));
@@ -88,7 +82,7 @@ pub fn validate(
         let documents = [written.loaded.clone(), bare.clone()];
         let rows = Rows::mostly_valid(window_s);
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
-        let tables = Table::together_seen(run, &documents, rows, &mut watch, seen)?;
+        let tables = Table::together_seen(run, &documents, rows, seen)?;
         let [after, nominal] = <[Table; 2]>::try_from(tables).unwrap_or_default();
         if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
             let nothing = nothing_valid(&run.name, name, &after);

@@ -58,7 +58,7 @@ impl BoardArgs {
             reference_deg_c: self.reference,
             window_s: self.fit_window,
         };
-        let made = fit(&wanted, job.at_work("fitting"))?;
+        let made = fit(&wanted)?;
         let about = About {
             method: "board ratio from cycles in two positions",
             key: "board",

@@ -125,13 +125,13 @@ impl DriftArgs {
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
         if self.is_corrected() {
             let part = self.log.reading.part()?;
-            return Columns::of_corrected(&self.log.log, &part, kind, &work.cut, job.at_work("reading"));
+            return Columns::of_corrected(&self.log.log, &part, kind, &work.cut);
         }
         let run = work.run()?;
         if let Some(document) = &work.base {
-            return Columns::corrected_by(run, &document.loaded, kind, job.bar());
+            return Columns::corrected_by(run, &document.loaded, kind);
         }
-        Columns::raw(run.series(job.bar())?, kind, self.increment_weight)
+        Columns::raw(run.series()?, kind, self.increment_weight)
     }
 
     /// The unit's document with the parameters in it.

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use isotherm_cli::{Bar, to_stdout};
 use serde_json::{Value, json};
 
-use super::bar;
 use super::files::Files;
 use super::units::{Logs, Unit, Work};
 use crate::document::Written;
@@ -42,11 +41,6 @@ pub(super) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// A bar over the readings of its logs.
-    pub(super) fn bar(&self) -> Bar {
-        if self.among.is_none() { bar::reading() } else { Bar::hidden() }
-    }
-
     /// A bar over what is done without an end in sight.
     pub(super) fn at_work(&self, message: &'static str) -> Bar {
         if self.among.is_none() { Bar::at_work(message) } else { Bar::hidden() }
@@ -89,7 +83,8 @@ impl<'a> Task<'a> {
         if units.len() == 1
             && let Some((_, work)) = units.pop()
         {
-            let work = work?;
+            let mut work = work?;
+            work.show();
             let report = written(&Job { work: &work, among: None })?;
             emit(files.json, || report.to_json(), || report.to_text())?;
             files.say_written(report.verdicts.iter().any(|verdict| verdict.accepted));
@@ -98,14 +93,14 @@ impl<'a> Task<'a> {
         }
         units.iter().try_for_each(|(unit, _)| files.check_unit(unit.as_str()))?;
         let bar = Bar::counting("units done", units.len());
-        let came = in_parallel(
-            &units,
-            |ready| bar.at(ready as u64),
-            |(unit, work)| {
-                let work = work.as_ref().map_err(|error| Error::refused(error.to_string()))?;
-                written(&Job { work, among: Some(unit.as_str()) })
-            },
-        );
+        let came = in_parallel(&units, |(unit, work)| {
+            let came = match work {
+                Ok(work) => written(&Job { work, among: Some(unit.as_str()) }),
+                Err(error) => Err(Error::refused(error.to_string())),
+            };
+            bar.done_one();
+            came
+        });
         bar.finish();
         let mut cuts: Vec<String> =
             units.iter().filter_map(|(_, work)| work.as_ref().ok()).flat_map(Work::cuts).collect();

@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 use std::slice;
 
 use clap::{Args, ValueEnum};
-use isotherm_cli::Bar;
 use isotherm_correction::drift::DriftParts;
 use isotherm_correction::units::AngularRate;
 use isotherm_log::diff::is_csv;
 
-use super::bar;
 use super::driver::emit;
 use super::files::PageArgs;
 use super::runs::{LogArgs, Reading};
@@ -203,16 +201,17 @@ impl ImpactArgs {
         let raw = self.reading.mapping.is_some();
         if !raw && (logs.iter().all(|path| is_csv(path)) || self.document.is_none()) {
             let part = self.reading.part()?;
-            return Columns::of_corrected(logs, &part, Kind::Rate, cut, Bar::at_work("reading"));
+            return Columns::of_corrected(logs, &part, Kind::Rate, cut);
         }
         let Some(document) = &self.document else {
             return Err(Error::Usage("a raw log needs --calibration, to correct it".to_owned()));
         };
         // A document is of one unit.
         let (_, work) = Logs { together: true, ..Logs::judging(&args, document) }.units()?.swap_remove(0);
-        let work = work?;
+        let mut work = work?;
+        work.show();
         let run = work.run()?;
-        let columns = Columns::corrected_by(run, &work.base()?.loaded, Kind::Rate, bar::reading());
+        let columns = Columns::corrected_by(run, &work.base()?.loaded, Kind::Rate);
         run.hand_on(cut);
         let mut columns = columns?;
         columns.notes.extend(work.warnings);

@@ -44,10 +44,13 @@ impl ModesArgs {
     fn fit(&self, job: &Job<'_>, place: Option<Place>) -> Result<Fitted, Error> {
         let work = job.work;
         let base = work.base()?;
-        let made = make(
-            &Wanted { runs: &work.runs, judge: &work.judges, base: &base.document, place, asked: self.asked },
-            &mut job.bar(),
-        )?;
+        let made = make(&Wanted {
+            runs: &work.runs,
+            judge: &work.judges,
+            base: &base.document,
+            place,
+            asked: self.asked,
+        })?;
         let ranges = made.gyros.iter().flatten().map(|fit| fit.range_deg_c);
         let about = About {
             method: "polynomials of the lasing modes by generalised least squares",

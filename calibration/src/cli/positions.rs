@@ -24,7 +24,7 @@ use crate::fits::positions::track::Track;
 use crate::limits::{above_0, from_0};
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::Report;
-use crate::runs::{Run, Watch};
+use crate::runs::Run;
 
 /// Axes, scale factors and biases of accelerometers from positions of a stand, at one temperature or several
 #[derive(Debug, Args)]
@@ -116,24 +116,24 @@ impl PositionsArgs {
         settings: &Settings,
         about_gravity: Option<&String>,
     ) -> Result<Fitted, Error> {
-        let (work, watch) = (job.work, &mut job.bar());
+        let work = job.work;
         let runs = &work.runs;
         let add = "add [accel] with their channels, nominal scale factors and axes";
         let base = &*work.base_with_accelerometers(add, || {
-            Written::of(&of_run(work.run()?, self.accelerometer_unit.as_deref(), &mut *watch)?)
+            Written::of(&of_run(work.run()?, self.accelerometer_unit.as_deref())?)
         })?;
-        let tracks = tracks_of(runs, base, watch)?;
+        let tracks = tracks_of(runs, base)?;
         let mut analysis = analyse(&tracks, &base.document, settings).map_err(Error::Refused)?;
         analysis.warnings.extend(about_gravity.cloned());
         let document = complete(&base.document, &analysis, settings.gravity);
         let before = Written::of(&before(&base.document, &analysis, settings.gravity, work.base.is_some()))?;
         let after = Written::of(&document)?;
-        let inside = judged(settings, &analysis, &analysis.poses, runs, [&before, &after], watch)?;
+        let inside = judged(settings, &analysis, &analysis.poses, runs, [&before, &after])?;
         let mut outside = None;
         if !work.judges.is_empty() {
-            let unseen = tracks_of(&work.judges, base, watch)?;
+            let unseen = tracks_of(&work.judges, base)?;
             let (poses, _) = positions(&unseen, settings).map_err(Error::Refused)?;
-            outside = Some(judged(settings, &analysis, &poses, &work.judges, [&before, &after], watch)?);
+            outside = Some(judged(settings, &analysis, &poses, &work.judges, [&before, &after])?);
         }
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
@@ -159,8 +159,8 @@ impl PositionsArgs {
 }
 
 /// Runs tick by tick, corrected with a document.
-fn tracks_of(runs: &[Run], written: &Written, watch: &mut dyn Watch) -> Result<Vec<Track>, Error> {
-    runs.iter().map(|run| Track::of(run, &written.loaded, &mut *watch)).collect()
+fn tracks_of(runs: &[Run], written: &Written) -> Result<Vec<Track>, Error> {
+    runs.iter().map(|run| Track::of(run, &written.loaded)).collect()
 }
 
 /// Poses of runs, before and after.
@@ -170,9 +170,8 @@ fn judged(
     poses: &[(Pose, usize)],
     runs: &[Run],
     [before, after]: [&Written; 2],
-    watch: &mut dyn Watch,
 ) -> Result<Vec<Judgement>, Error> {
-    let (before, after) = (tracks_of(runs, before, watch)?, tracks_of(runs, after, watch)?);
+    let (before, after) = (tracks_of(runs, before)?, tracks_of(runs, after)?);
     let errors = analysis.fit.stand.map(|(error, _)| error);
     Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
 }

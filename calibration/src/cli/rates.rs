@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use isotherm_cli::Bar;
 use isotherm_protocol::document::{Document, GyroOutput};
 
 use super::driver::Job;
@@ -72,7 +71,7 @@ impl RatesArgs {
         let base = match (&work.base, work.runs.first()) {
             (Some(base), _) => &base.document,
             (None, Some(first)) => {
-                nominal = without_document(first, job.bar())?;
+                nominal = without_document(first)?;
                 &nominal
             }
             (None, None) => return Err(Error::Usage("no log is given".to_owned())),
@@ -88,7 +87,7 @@ impl RatesArgs {
             table_ppm: self.table_ppm,
             with_bias: self.with_bias,
         };
-        let made = make(&wanted, &mut job.bar())?;
+        let made = make(&wanted)?;
         let about = About {
             method: "rate table, weighted least squares",
             key: "rates",
@@ -116,8 +115,8 @@ impl RatesArgs {
 }
 
 /// A nominal document for a log of three gyros.
-fn without_document(run: &Run, bar: Bar) -> Result<Document, Error> {
-    let mut series = run.series(bar)?;
+fn without_document(run: &Run) -> Result<Document, Error> {
+    let mut series = run.series()?;
     let gyros = series.gyros.readings.len();
     if gyros != AXES.len() {
         return Err(Error::Usage(format!(

@@ -11,7 +11,6 @@ use isotherm_log::part::{LogFiles, Part, are_recordings};
 use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
-use super::bar;
 use crate::document::{name_of, recordings_in};
 use crate::error::Error;
 use crate::runs::{Run, units_of};
@@ -139,7 +138,7 @@ impl Reading {
             None => {
                 for file in files {
                     let mut log = Log::recordings(std::slice::from_ref(file))?;
-                    let (units, cut) = units_of(&mut log, bar::reading())?;
+                    let (units, cut) = units_of(&mut log)?;
                     if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
                         return Err(Error::refused(format!("no raw readings can be read: {cut}")));
                     }

@@ -65,7 +65,7 @@ impl ThermalArgs {
         let base = work.base.as_ref().map(|base| &base.document);
         let stands = self.stands.stands(work.runs.len(), work.judges.len())?;
         let settings = Settings { stands, ..self.settings.clone() };
-        let fitted = fit(base, (&work.runs, &work.judges), &settings, job.at_work("fitting"))?;
+        let fitted = fit(base, (&work.runs, &work.judges), &settings)?;
         self.common.output.done(fitted, job)
     }
 }

@@ -1,7 +1,6 @@
 //! `isotherm-calibrate tumble`.
 
 use clap::Args;
-use isotherm_cli::Bar;
 use isotherm_protocol::document::AccelOutput;
 
 use super::driver::{Job, Task};
@@ -66,9 +65,9 @@ impl TumbleArgs {
     fn fit(&self, job: &Job<'_>, (gravity, about_gravity): &(f64, Option<String>)) -> Result<Fitted, Error> {
         let (work, run, gravity) = (job.work, job.work.run()?, *gravity);
         let base = &*work.base_with_accelerometers("add [accel], or leave the document out", || {
-            self.first_document(run, job.bar())
+            self.first_document(run)
         })?;
-        let track = Track::of(run, &base.loaded, job.bar())?;
+        let track = Track::of(run, &base.loaded)?;
         let settings = Settings {
             gravity,
             limits: StillLimits {
@@ -89,7 +88,7 @@ impl TumbleArgs {
         let (document, warnings) = complete(&base.document, &tumble).map_err(Error::Refused)?;
         tumble.warnings.extend(warnings);
         let left = |written: &Written| -> Result<Left, Error> {
-            let track = Track::of(run, &written.loaded, job.bar())?;
+            let track = Track::of(run, &written.loaded)?;
             Ok(Left::of(&track, &tumble.poses, gravity))
         };
         let (before, about_before) = before(&base.document, &tumble, work.base.is_some());
@@ -112,8 +111,8 @@ impl TumbleArgs {
     }
 
     /// A document where there is none.
-    fn first_document(&self, run: &Run, bar: Bar) -> Result<Written, Error> {
-        let mut document = of_run(run, self.accelerometer_unit.as_deref(), bar)?;
+    fn first_document(&self, run: &Run) -> Result<Written, Error> {
+        let mut document = of_run(run, self.accelerometer_unit.as_deref())?;
         if document.accel.as_ref().is_some_and(|accel| accel.output == AccelOutput::Volts) {
             document.note = Some(
                 "V in this document is the accelerometers' reading in the log: volts, or counts of a converter with \

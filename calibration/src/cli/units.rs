@@ -59,6 +59,11 @@ impl Work {
         Self { base, runs, judges, warnings: Vec::new(), cut: Cut::default() }
     }
 
+    /// Has bars show how far its logs are read.
+    pub(super) fn show(&mut self) {
+        self.runs.iter_mut().chain(&mut self.judges).for_each(Run::show);
+    }
+
     /// Where its logs are cut short, as far as they have been read.
     pub(super) fn cuts(&self) -> Vec<String> {
         let runs = self.runs.iter().chain(&self.judges).filter_map(Run::cut_short);

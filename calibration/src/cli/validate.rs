@@ -50,7 +50,7 @@ fn judged(job: &Job<'_>, wanted: Wanted) -> Result<Done, Error> {
     let base = work.base()?;
     let logs = work.runs.iter().map(|run| JudgedLog::new(run.clone(), &base.document));
     let logs = logs.collect::<Result<Vec<_>, _>>()?;
-    let mut report = validate(base, &logs, wanted, job.bar())?;
+    let mut report = validate(base, &logs, wanted)?;
     report.warnings.extend(work.told());
     Ok(Done { report, document: None })
 }

@@ -14,18 +14,18 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use isotherm_protocol::document::{Document, Temperature};
+use isotherm_protocol::document::{AccelSensor, Document, Filter, Problem, Temperature};
 use serde_json::{Map, json};
 use toml::Value;
 
-use crate::document::Written;
 use crate::document::plain::{ASSUMED_DEG_C, plain};
 use crate::document::provenance::{BASE, digest_of};
 use crate::document::show::terms::tree;
+use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::report::Report;
 use check::{check, chosen, same_unit};
-use sections::{Sections, group, sections, with};
+use sections::{Sections, group, put, sections};
 
 /// Which part decides over keys that begin so.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,180 +57,189 @@ pub struct Merged {
 pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged, Error> {
     same_unit(base, parts)?;
     check(base, parts, take)?;
-    let old = sections(&tree(&base.document)?);
-    let new: Vec<Sections> =
-        parts.iter().map(|part| Ok(sections(&tree(&part.document)?))).collect::<Result<_, Error>>()?;
-    chosen(take, (&old, &new))?;
-    let mut picked = Picked { sections: old.clone(), ..Picked::default() };
-    for key in old.keys() {
-        picked.from.insert(key.clone(), base.name.clone());
+    let (whole, written) = (Part::of(base)?, parts);
+    let parts = parts.iter().map(Part::of).collect::<Result<Vec<_>, _>>()?;
+    let keys: BTreeSet<&str> =
+        parts.iter().chain([&whole]).flat_map(|part| part.sections.keys()).map(String::as_str).collect();
+    chosen(take, &keys)?;
+    let mut groups: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for key in keys {
+        groups.entry(group(key)).or_default().push(key);
     }
-    let mut groups: BTreeSet<String> = old.keys().map(|key| group(key)).collect();
-    groups.extend(new.iter().flatten().map(|(key, _)| group(key)));
-    let mut conflicts = Vec::new();
-    for group in groups {
-        picked.decide(&group, (base, &old), (parts, &new), take, &mut conflicts);
+    let mut merging = Merging {
+        base: &whole,
+        parts: &parts,
+        take,
+        from: whole.sections.keys().map(|key| (key.as_str(), &whole)).collect(),
+        gone: Vec::new(),
+        warnings: Vec::new(),
+        conflicts: Vec::new(),
+    };
+    for (group, keys) in &groups {
+        merging.decide(group, keys);
     }
-    picked.filters(base, parts, &mut conflicts);
+    merging.filters();
+    let Merging { from, gone, warnings, conflicts, .. } = merging;
     if !conflicts.is_empty() {
         return Err(Error::Refused(conflicts));
     }
-    let Picked { sections, from, gone, warnings } = picked;
-    let words = |found: Vec<isotherm_protocol::document::Problem>| {
-        Error::Document(found.iter().map(ToString::to_string).collect())
-    };
-    let tree = with(tree(&base.document)?, &old, &sections);
+    let mut tree = tree(&base.document)?;
+    // Readings and rows go by the order of the sensors, which keys have not.
+    for AccelSensor { name, .. } in parts.iter().flat_map(|part| accelerometers(&part.written.document)) {
+        let key = format!("accel.sensor.{name}.");
+        if from.keys().any(|from| from.starts_with(&key)) {
+            put(&mut tree, &format!("{key}name"), Some(name.as_str().into()));
+        }
+    }
+    for key in whole.sections.keys().map(String::as_str).chain(from.keys().copied()) {
+        put(&mut tree, key, from.get(key).and_then(|part| part.sections.get(key).cloned()));
+    }
+    let words = |found: Vec<Problem>| Error::Document(found.iter().map(ToString::to_string).collect());
     let mut document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
-    document.origin = Some(origin::origin(base, parts, &from)?);
-    let taken = from.into_iter().filter(|(key, _)| sections.contains_key(key)).collect();
-    Ok(Merged { written: Written::of(&document)?, taken, gone, warnings })
+    let taken = from.into_iter().map(|(key, part)| (key.to_owned(), part.name().to_owned())).collect();
+    document.origin = Some(origin::origin(base, written, &taken)?);
+    Ok(Merged { written: Written::of(&document)?, taken: taken.into_iter().collect(), gone, warnings })
+}
+
+/// A document with its sections.
+struct Part<'a> {
+    written: &'a Written,
+    sections: Sections,
 }
 
 /// What has been decided so far.
-#[derive(Debug, Default)]
-struct Picked {
-    sections: Sections,
-    from: BTreeMap<String, String>,
+struct Merging<'a> {
+    base: &'a Part<'a>,
+    parts: &'a [Part<'a>],
+    take: &'a [Take],
+    /// Where each section is from.
+    from: BTreeMap<&'a str, &'a Part<'a>>,
     gone: Vec<(String, String)>,
     warnings: Vec<String>,
+    conflicts: Vec<String>,
 }
 
-impl Picked {
-    /// Decides over what is replaced together.
-    fn decide(
-        &mut self,
-        of: &str,
-        (base, old): (&Written, &Sections),
-        (parts, new): (&[Written], &[Sections]),
-        take: &[Take],
-        conflicts: &mut Vec<String>,
-    ) {
-        let mine = |sections: &Sections| -> Sections {
-            let inside = sections.iter().filter(|(key, _)| group(key) == of);
-            inside.map(|(key, value)| (key.clone(), value.clone())).collect()
-        };
-        let before = mine(old);
-        // By part: what it has made differently, and what it does without.
-        let mut made: Vec<(&str, BTreeMap<String, Option<Value>>)> = Vec::new();
-        for (part, sections) in parts.iter().zip(new) {
-            let mut after = mine(sections);
-            let gone: Vec<String> = before.keys().filter(|key| !after.contains_key(*key)).cloned().collect();
-            after.retain(|key, value| {
-                before.get(key) != Some(value) && has_made(part, sections, key, value, &before)
-            });
-            let open = |key: &&String| !take.iter().any(|take| covers(&take.key, key));
-            let never: Vec<&str> = gone.iter().filter(open).map(String::as_str).collect();
-            if !after.is_empty() && !never.is_empty() && !is_of(part, base, parts) {
-                conflicts.push(format!(
+impl<'a> Merging<'a> {
+    /// Decides over keys that are replaced together.
+    fn decide(&mut self, group: &str, keys: &[&'a str]) {
+        let base = self.base;
+        // By part: what it has made, and what it does without.
+        let mut changed: Vec<(&'a Part<'a>, Vec<&str>)> = Vec::new();
+        for part in self.parts {
+            let lacks = |key: &&str| base.sections.contains_key(*key) && !part.sections.contains_key(*key);
+            let gone: Vec<&str> = keys.iter().copied().filter(lacks).collect();
+            let made: Vec<&str> = keys.iter().copied().filter(|key| part.has_made(base, key)).collect();
+            let open = |key: &&str| !self.take.iter().any(|take| covers(&take.key, key));
+            let never: Vec<&str> = gone.iter().copied().filter(open).collect();
+            if made.is_empty() {
+                let lacks = format!("{} lacks {}: kept as in {}", part.name(), gone.join(", "), base.name());
+                self.warnings.extend((!gone.is_empty()).then_some(lacks));
+            } else if !never.is_empty() && !self.is_known(part) {
+                self.conflicts.push(format!(
                     "{}: in {}, but {} was made from another document, which may not have had this: repeat its fit from {} \
                      (--calibration), or choose with --take {}={}",
-                    never.join(", "), base.name, part.name, base.name, never[0], base.name
+                    never.join(", "), base.name(), part.name(), base.name(), never[0], base.name()
                 ));
-                continue;
-            }
-            if !after.is_empty() {
-                let changed = after.into_iter().map(|(key, value)| (key, Some(value)));
-                made.push((
-                    part.name.as_str(),
-                    changed.chain(gone.into_iter().map(|key| (key, None))).collect(),
-                ));
-            } else if !gone.is_empty() {
-                self.warnings.push(format!(
-                    "{} lacks {}: kept as in {}",
-                    part.name,
-                    gone.join(", "),
-                    base.name
-                ));
+            } else {
+                changed.push((part, [made, gone].concat()));
             }
         }
-        let keys: BTreeSet<&String> = made.iter().flat_map(|(_, changed)| changed.keys()).collect();
-        for key in keys {
-            let said: Vec<(&str, &Option<Value>)> =
-                made.iter().filter_map(|(name, changed)| Some((*name, changed.get(key)?))).collect();
-            let chosen = take.iter().rev().find(|take| covers(&take.key, key));
+        for &key in keys {
+            let own = changed.iter().filter(|(_, own)| own.contains(&key));
+            let said: Vec<Said<'a>> = own.map(|(part, _)| (*part, part.sections.get(key))).collect();
+            let Some(first) = said.first() else { continue };
+            let chosen = self.take.iter().rev().find(|take| covers(&take.key, key));
             let decided = match chosen {
-                Some(take) if take.from == base.name => continue,
-                Some(take) => said.iter().find(|(name, _)| *name == take.from),
-                None => said.first().filter(|(_, value)| said.iter().all(|(_, other)| other == value)),
+                Some(take) if take.from == base.name() => continue,
+                Some(take) => said.iter().find(|(part, _)| part.name() == take.from),
+                None => Some(first).filter(|(_, value)| said.iter().all(|(_, other)| other == value)),
             };
-            let Some((name, value)) = decided else {
-                conflicts.push(conflict(key, &said, chosen));
-                continue;
-            };
-            self.set(key, name, value.as_ref());
+            match decided {
+                None => self.conflicts.push(conflict(key, &said, chosen)),
+                Some(&(part, Some(_))) => drop(self.from.insert(key, part)),
+                Some(&(part, None)) => {
+                    self.from.remove(key);
+                    self.gone.push((key.to_owned(), part.name().to_owned()));
+                }
+            }
         }
-        let fits: BTreeSet<&String> = self
-            .from
-            .iter()
-            .filter(|(key, from)| group(key) == of && **from != base.name)
-            .map(|(_, from)| from)
-            .collect();
-        if (of.ends_with(" bias") || of.ends_with(" output")) && fits.len() > 1 {
-            let names: Vec<&str> = fits.into_iter().map(String::as_str).collect();
+        let from = keys.iter().filter_map(|key| self.from.get(key)).map(|part| part.name());
+        let fits: BTreeSet<&str> = from.filter(|name| *name != base.name()).collect();
+        if are_curves(group) && fits.len() > 1 {
+            let names: Vec<&str> = fits.into_iter().collect();
             self.warnings.push(format!(
-                "the terms of {of} are from several separate fits ({}): judge the result with validate",
+                "the terms of {group} are from several separate fits ({}): judge the result with validate",
                 names.join(", ")
             ));
         }
     }
 
-    fn set(&mut self, key: &str, from: &str, value: Option<&Value>) {
-        if let Some(value) = value {
-            self.sections.insert(key.to_owned(), value.clone());
-            self.from.insert(key.to_owned(), from.to_owned());
-            return;
-        }
-        if self.sections.remove(key).is_some() {
-            self.gone.push((key.to_owned(), from.to_owned()));
-        }
-        self.from.remove(key);
+    /// Whether a part was made from the base or from another part, as far as it says.
+    fn is_known(&self, part: &Part<'_>) -> bool {
+        let mut all = self.parts.iter().chain([self.base]);
+        part.made_from().is_none_or(|digest| all.any(|one| digest_of(one.written) == digest))
     }
 
     /// Terms of Ṫ, T̈ and lags hold with the filter that they were fitted with, and with no other.
-    fn filters(&self, base: &Written, parts: &[Written], conflicts: &mut Vec<String>) {
-        let filter_of = |document: &Written| document.document.temperature.filter.clone();
-        let Some(from) = self.from.get("temperature.filter") else { return };
-        let find = |name: &str| parts.iter().chain([base]).find(|document| document.name == name);
-        let filter = find(from).and_then(filter_of);
+    fn filters(&mut self) {
+        let Some(chosen) = self.from.get("temperature.filter") else { return };
         for (key, source) in &self.from {
-            if is_dynamic(key) && find(source).and_then(filter_of) != filter {
-                conflicts.push(format!(
-                    "temperature.filter is taken from {from}, but {key} of {source} was fitted with another filter \
-                     and is wrong with this one: repeat one of the fits with the other's filter"
+            if is_dynamic(key) && source.filter() != chosen.filter() {
+                self.conflicts.push(format!(
+                    "temperature.filter is taken from {}, but {key} of {} was fitted with another filter \
+                     and is wrong with this one: repeat one of the fits with the other's filter",
+                    chosen.name(),
+                    source.name()
                 ));
             }
         }
     }
 }
 
-/// Whether a part has made what it states: one that was made from its log alone states the rest as every first document does, and
-/// thermometers and their filter by what its log happens to be, which no static term rests on.
-fn has_made(part: &Written, own: &Sections, key: &str, value: &Value, before: &Sections) -> bool {
-    if made_from(part) != Some("") {
-        return true;
+impl<'a> Part<'a> {
+    fn of(written: &'a Written) -> Result<Self, Error> {
+        Ok(Self { written, sections: sections(tree(&written.document)?) })
     }
-    if key.starts_with("temperature.") && before.contains_key(key) {
-        return own.keys().any(|key| is_dynamic(key)) && key != "temperature.assumed_deg_c";
+
+    fn name(&self) -> &'a str {
+        &self.written.name
     }
-    let Document { unit, gyro, accel, .. } = &part.document;
-    let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() };
-    let first = plain(unit, gyro.output, temperature, accel.as_ref().map(|accel| accel.output));
-    tree(&first).is_ok_and(|first| sections(&first).get(key) != Some(value))
+
+    fn filter(&self) -> Option<&Filter> {
+        self.written.document.temperature.filter.as_ref()
+    }
+
+    /// Whether it has made what it states otherwise than the base: one that was made from its log alone states the rest as every first
+    /// document does, and thermometers and their filter by what its log happens to be, which no static term rests on.
+    fn has_made(&self, base: &Self, key: &str) -> bool {
+        let (before, value) = (base.sections.get(key), self.sections.get(key));
+        if value.is_none() || value == before {
+            return false;
+        }
+        if self.made_from() != Some("") {
+            return true;
+        }
+        if key.starts_with("temperature.") && before.is_some() {
+            return self.sections.keys().any(|key| is_dynamic(key)) && key != "temperature.assumed_deg_c";
+        }
+        let Document { unit, gyro, accel, .. } = &self.written.document;
+        let temperature = Temperature { assumed_deg_c: ASSUMED_DEG_C, filter: None, channel: Vec::new() };
+        let first = plain(unit, gyro.output, temperature, accel.as_ref().map(|accel| accel.output));
+        tree(&first).is_ok_and(|first| sections(first).get(key) != value)
+    }
+
+    /// The digest of the document that it was made from, as far as it says.
+    fn made_from(&self) -> Option<&str> {
+        self.written.document.origin.as_ref()?.details.as_ref()?.get(BASE)?.as_str()
+    }
 }
+
+/// A part, and what it says of a key; `None` where it does without.
+type Said<'a> = (&'a Part<'a>, Option<&'a Value>);
 
 /// Whether a term holds with the temperature filter that it was fitted with only.
 fn is_dynamic(key: &str) -> bool {
     ["thermal_rate", "thermal_acceleration", "lag"].iter().any(|term| key.ends_with(&format!(".{term}")))
-}
-
-/// The digest of the document that a part was made from, as far as it says.
-fn made_from(part: &Written) -> Option<&str> {
-    part.document.origin.as_ref()?.details.as_ref()?.get(BASE)?.as_str()
-}
-
-/// Whether a part was made from the base or from another part, as far as it says.
-fn is_of(part: &Written, base: &Written, parts: &[Written]) -> bool {
-    made_from(part).is_none_or(|digest| parts.iter().chain([base]).any(|one| digest_of(one) == digest))
 }
 
 /// Whether a choice is about a key.
@@ -238,17 +247,23 @@ fn covers(choice: &str, key: &str) -> bool {
     key.strip_prefix(choice).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
+/// Whether what is replaced together are curves over temperature.
+fn are_curves(group: &str) -> bool {
+    group.ends_with(" bias") || group.ends_with(" output")
+}
+
 /// What is in the way. Of two curves over temperature, made each as a whole, none adds to the other.
-fn conflict(key: &str, said: &[(&str, &Option<Value>)], chosen: Option<&Take>) -> String {
-    let named = |(name, value): &(&str, &Option<Value>)| {
-        if value.is_some() { (*name).to_owned() } else { format!("{name} (does without it)") }
+fn conflict(key: &str, said: &[Said<'_>], chosen: Option<&Take>) -> String {
+    let named = |(part, value): &Said<'_>| {
+        let without = if value.is_none() { " (does without it)" } else { "" };
+        format!("{}{without}", part.name())
     };
     let parts = said.iter().map(named).collect::<Vec<_>>().join(" and ");
     if let Some(take) = chosen {
         return format!("{key}: --take names {}, but only {parts} changed it", take.from);
     }
-    let first = said.first().map_or("", |(name, _)| name);
-    let again = if [" bias", " output"].iter().any(|curves| group(key).ends_with(curves)) {
+    let first = said.first().map_or("", |(part, _)| part.name());
+    let again = if are_curves(&group(key)) {
         "repeat the fit over temperature from the other document (--calibration) and leave that one out here, or "
     } else {
         ""

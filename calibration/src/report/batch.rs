@@ -86,21 +86,16 @@ impl Batch<'_> {
 }
 
 /// Does the same to every item, as many at a time as there are processors; what comes out stands in the order of the items,
-/// whoever was ready first. `done` is told how many are, from whichever thread was.
-pub fn in_parallel<T: Sync, R: Send>(
-    items: &[T],
-    done: impl Fn(usize) + Sync,
-    each: impl Fn(&T) -> R + Sync,
-) -> Vec<R> {
+/// whoever was ready first.
+pub fn in_parallel<T: Sync, R: Send>(items: &[T], each: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let threads = thread::available_parallelism().map_or(1, usize::from).min(items.len());
-    let (next, ready) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let next = AtomicUsize::new(0);
     let work = || {
         let mut mine = Vec::new();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = items.get(index) else { return mine };
             mine.push((index, each(item)));
-            done(ready.fetch_add(1, Ordering::Relaxed) + 1);
         }
     };
     let mut made: Vec<(usize, R)> = thread::scope(|scope| {

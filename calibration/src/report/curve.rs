@@ -10,7 +10,7 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::{Size, once_each, real};
 use crate::runs::table::{Rows, Table};
-use crate::runs::{Run, Troubles, Watch};
+use crate::runs::{Run, Troubles};
 
 /// One sensor or axis over one run, before and after. A window that either lacks is a gap in both.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,14 +82,13 @@ pub fn judge(
     (runs, unseen): (&[Run], &[Run]),
     [before, after]: [&Written; 2],
     of_run: impl Fn(usize, &Run) -> Result<Judging, Error>,
-    mut watch: impl Watch,
 ) -> Result<Judged, Error> {
     let mut judged = Judged::default();
     let loaded = [after.loaded.clone(), before.loaded.clone()];
     for (index, run) in runs.iter().chain(unseen).enumerate() {
         let (rest, rows, counts) = of_run(index, run)?;
         let sample = if index < runs.len() { Sample::In } else { Sample::Out };
-        let tables = Table::together(run, &loaded, rows, &mut watch)?;
+        let tables = Table::together(run, &loaded, rows)?;
         let [of_after, of_before] = <[Table; 2]>::try_from(tables).unwrap_or_default();
         let curves = Curve::of_tables(&run.name, sample, [&of_before, &of_after], &after.document, &rest);
         judged.curves.extend(curves.into_iter().filter(|curve| curve.of.starts_with(counts)));

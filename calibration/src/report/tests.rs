@@ -96,7 +96,7 @@ fn judging_a_run_shows_what_the_terms_do() {
     let before = Written::of(&after.document.nominal()).unwrap();
     let judged = |rest: Rest| {
         let of_run = |_, _: &Run| Ok((rest, Rows::valid(5.0), ""));
-        judge((&[], std::slice::from_ref(&run)), [&before, &after], of_run, ()).unwrap()
+        judge((&[], std::slice::from_ref(&run)), [&before, &after], of_run).unwrap()
     };
     let means = judged(Rest::default());
     let names: Vec<&str> = means.curves.iter().map(|curve| curve.of.as_str()).collect();
@@ -119,7 +119,7 @@ fn judging_a_run_shows_what_the_terms_do() {
 #[test]
 fn a_batch_keeps_its_order_and_ends_with_one_table() {
     let items: Vec<u64> = (0..50).collect();
-    let squares = in_parallel(&items, |_| (), |item| item * item);
+    let squares = in_parallel(&items, |item| item * item);
     assert_eq!(squares, items.iter().map(|item| item * item).collect::<Vec<_>>());
     let mut report = Report::new("Thermal calibration", "A");
     report.verdicts = vec![verdict(), verdict().refused("worse")];

@@ -10,7 +10,7 @@ use isotherm_correction::unit::Unit;
 use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2, Timestamp};
 use isotherm_log::offline::Loaded;
 
-use super::{Run, Troubles, Watch};
+use super::{Run, Troubles};
 use crate::error::Error;
 use crate::finding::Kind;
 use crate::numbers::{real, seconds};
@@ -165,24 +165,24 @@ impl Table {
     ///
     /// # Errors
     /// As [`Run::correct_together`].
-    pub fn of(run: &Run, loaded: &Loaded, window_s: f64, watch: impl Watch) -> Result<Self, Error> {
-        Self::of_rows(run, loaded, Rows::valid(window_s), watch)
+    pub fn of(run: &Run, loaded: &Loaded, window_s: f64) -> Result<Self, Error> {
+        Self::of_rows(run, loaded, Rows::valid(window_s))
     }
 
     /// The same with rows of any kind.
     ///
     /// # Errors
     /// As [`Run::correct_together`].
-    pub fn of_rows(run: &Run, loaded: &Loaded, rows: Rows, watch: impl Watch) -> Result<Self, Error> {
-        Ok(Self::together(run, slice::from_ref(loaded), rows, watch)?.pop().unwrap_or_default())
+    pub fn of_rows(run: &Run, loaded: &Loaded, rows: Rows) -> Result<Self, Error> {
+        Ok(Self::together(run, slice::from_ref(loaded), rows)?.pop().unwrap_or_default())
     }
 
     /// Corrects a run with several calibrations of the same channels and sensors at once: a table for each, with the same rows.
     ///
     /// # Errors
     /// As [`Run::correct_together`].
-    pub fn together(run: &Run, loaded: &[Loaded], rows: Rows, watch: impl Watch) -> Result<Vec<Self>, Error> {
-        Self::together_seen(run, loaded, rows, watch, |_, _| ())
+    pub fn together(run: &Run, loaded: &[Loaded], rows: Rows) -> Result<Vec<Self>, Error> {
+        Self::together_seen(run, loaded, rows, |_, _| ())
     }
 
     /// The same; `seen` sees each tick of the first calibration, and its unit as it stands behind it.
@@ -193,7 +193,6 @@ impl Table {
         run: &Run,
         loaded: &[Loaded],
         Rows { length_s: window_s, takes, whole }: Rows,
-        watch: impl Watch,
         mut seen: impl FnMut(&CorrectedTick, &Unit),
     ) -> Result<Vec<Self>, Error> {
         let mut tables = vec![Self { window_s, ..Self::default() }; loaded.len()];
@@ -211,7 +210,7 @@ impl Table {
                 }
             }
         };
-        let troubles = run.correct_together(loaded, watch, each)?;
+        let troubles = run.correct_together(loaded, each)?;
         for (table, troubles) in tables.iter_mut().zip(troubles) {
             table.troubles = troubles;
             if let Some(share) = whole {
@@ -311,7 +310,7 @@ mod tests {
         });
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
         let written = Written::read(path.as_ref()).unwrap();
-        let means = Table::of(&run, &written.loaded, 10.0, ()).unwrap();
+        let means = Table::of(&run, &written.loaded, 10.0).unwrap();
         let middles = [5.0, 15.0, 25.0, 35.0, 45.0, 55.0];
         assert!(means.time_s.iter().zip(middles).all(|(time, middle)| (time - middle).abs() < 1e-9));
         for (axis, truth) in truth.iter().enumerate() {
@@ -325,16 +324,16 @@ mod tests {
                 .all(|column| column.len() == 6 && column.iter().all(|t| t.is_finite()))
         );
         let bare = Written::compiled(&written.document.nominal()).unwrap();
-        let before = Table::of(&run, &bare, 10.0, ()).unwrap();
+        let before = Table::of(&run, &bare, 10.0).unwrap();
         assert_ne!(before.rate(0), means.rate(0), "the bias is in one of them");
-        assert_eq!(run.series(()).unwrap().gyros.len(), 60 * 100);
+        assert_eq!(run.series().unwrap().gyros.len(), 60 * 100);
         // Together they are what each is alone.
         let rows = Rows::valid(10.0);
-        let both = Table::together(&run, &[written.loaded.clone(), bare], rows, ()).unwrap();
+        let both = Table::together(&run, &[written.loaded.clone(), bare], rows).unwrap();
         assert_eq!(both, [means.clone(), before]);
         // Ticks as rows.
         let rows = Rows::TICKS;
-        let ticks = Table::together(&run, slice::from_ref(&written.loaded), rows, ()).unwrap().remove(0);
+        let ticks = Table::together(&run, slice::from_ref(&written.loaded), rows).unwrap().remove(0);
         assert_eq!((ticks.len(), ticks.end_ns.len()), (6000, 6000));
         let within = ticks.mean_rate_within([10.0, 20.0]);
         assert!((0..3).all(|axis| (within[axis] / means.rate(axis)[1] - 1.0).abs() < 1e-9));

@@ -9,7 +9,7 @@ use isotherm_log::offline::{Loaded, Offline};
 use isotherm_log::text::LogEvent;
 
 use super::series::Series;
-use super::{Fed, Run, Troubles, Watch};
+use super::{Fed, Run, Troubles};
 use crate::error::Error;
 
 impl Run {
@@ -17,12 +17,8 @@ impl Run {
     ///
     /// # Errors
     /// [`Error::Log`] where the log cannot be read.
-    pub fn gyro_ticks(
-        &self,
-        watch: impl Watch,
-        mut each: impl FnMut(OutputKind, &GyroTick),
-    ) -> Result<(), Error> {
-        self.walk(watch, |fed| {
+    pub fn gyro_ticks(&self, mut each: impl FnMut(OutputKind, &GyroTick)) -> Result<(), Error> {
+        self.walk(|fed| {
             if let Fed::Event(LogEvent::Gyro { output, tick }) = fed {
                 each(*output, tick);
             }
@@ -39,10 +35,9 @@ impl Run {
     pub fn correct_together(
         &self,
         loaded: &[Loaded],
-        watch: impl Watch,
         each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
     ) -> Result<Vec<Troubles>, Error> {
-        self.correct_beside(loaded, watch, |_| (), each)
+        self.correct_beside(loaded, |_| (), each)
     }
 
     /// Corrects the run with a calibration, and gives its readings as columns beside, from one reading of the log. The columns end where
@@ -53,20 +48,18 @@ impl Run {
     pub fn correct_with_series(
         &self,
         loaded: &Loaded,
-        watch: impl Watch,
         mut each: impl FnMut(&CorrectedTick),
     ) -> (Series, Result<Troubles, Error>) {
         let (mut series, mut takes) = (Series::empty(self.unit.clone()), true);
         let beside = |fed: &Fed<'_>| takes = takes && series.take(fed).is_ok();
         let ticks = |_: &GyroTick, ticks: &[CorrectedTick], _: &Unit| ticks.iter().for_each(&mut each);
-        let troubles = self.correct_beside(slice::from_ref(loaded), watch, beside, ticks);
+        let troubles = self.correct_beside(slice::from_ref(loaded), beside, ticks);
         (series, troubles.map(|troubles| troubles.concat()))
     }
 
     fn correct_beside(
         &self,
         loaded: &[Loaded],
-        watch: impl Watch,
         mut beside: impl FnMut(&Fed<'_>),
         mut each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit),
     ) -> Result<Vec<Troubles>, Error> {
@@ -74,7 +67,7 @@ impl Run {
         // A document of gyros alone is asked about gyros: their log may well have accelerometers.
         let has_accelerometers = first.calibration.accel_count() > 0;
         let mut units = Together::new(loaded);
-        self.walk(watch, |fed| {
+        self.walk(|fed| {
             beside(&fed);
             match fed {
                 fed if !has_accelerometers && fed.is_accel() => {}

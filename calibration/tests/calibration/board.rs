@@ -128,7 +128,7 @@ fn logs_that_do_not_tell_the_ratio_are_refused_by_kind() {
             .map(|tilt| Stand { site: Site::at(55.75, 30.0, Some(tilt), None).unwrap(), turning: None });
         let wanted =
             Wanted { runs: &runs, judges: &[], stands: &stands, base, reference_deg_c: None, window_s: 10.0 };
-        let Err(Error::Found(findings)) = fit(&wanted, ()) else { panic!("it must be refused") };
+        let Err(Error::Found(findings)) = fit(&wanted) else { panic!("it must be refused") };
         assert_eq!(
             findings.iter().filter_map(|found| found.place.accel.as_deref()).collect::<String>(),
             "xyz"

@@ -24,7 +24,7 @@ fn logs(folder: &Path) -> [String; 3] {
     let run = Run::new("raw".into(), unit.clone(), LogFiles::Recordings(vec![raw.clone()]), &Part::default());
     let mut csv = Vec::new();
     write_header(&mut csv).unwrap();
-    run.correct_with_series(&loaded, (), |tick| write_tick(&mut csv, tick).unwrap()).1.unwrap();
+    run.correct_with_series(&loaded, |tick| write_tick(&mut csv, tick).unwrap()).1.unwrap();
     std::fs::write(path("corrected.csv"), csv).unwrap();
     // As the service records what it publishes.
     let mut stream = Offline::new(&loaded, isotherm_correction::unit::UnitSettings::default());

@@ -64,7 +64,7 @@ fn settings(method: Method) -> Settings {
 fn fitted(method: Method, [train, judge]: &[Run; 2]) -> Fitted {
     let base = base();
     let runs = (std::slice::from_ref(train), std::slice::from_ref(judge));
-    fit(Some(&base), runs, &settings(method), ()).unwrap()
+    fit(Some(&base), runs, &settings(method)).unwrap()
 }
 
 /// Times by which rms and peak to peak fall out of sample, by gyro.
@@ -119,7 +119,7 @@ fn the_sequential_fit_reaches_on_the_programme_of_000_what_the_paper_states() {
     let least = [3.8, 1.68 / 0.19, 3.2];
     let log = run(&Scenario { tick_ns: TICK_NS, ..fibre_optic_chamber(303, paper_profile()) });
     let Fitted { report, written, .. } =
-        fit(Some(&base()), (&[log], &[]), &settings(Method::Sequential), ()).unwrap();
+        fit(Some(&base()), (&[log], &[]), &settings(Method::Sequential)).unwrap();
     println!("{}", report.headline());
     for ((verdict, gyro), least) in report.verdicts.iter().zip(&written.document.gyro.sensor).zip(least) {
         let [before, after] = verdict.in_sample.map(|size| size.peak_to_peak);

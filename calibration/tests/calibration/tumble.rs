@@ -93,8 +93,8 @@ fn real(files: &[PathBuf; 2]) -> Tumble {
         batch_ticks: 100,
     };
     let run = Run::new("tumbled".to_owned(), unit, files, &Part::default());
-    let document = bare(&run.series(()).unwrap(), AccelOutput::Volts).unwrap();
-    let track = Track::of(&run, &Written::of(&document).unwrap().loaded, ()).unwrap();
+    let document = bare(&run.series().unwrap(), AccelOutput::Volts).unwrap();
+    let track = Track::of(&run, &Written::of(&document).unwrap().loaded).unwrap();
     analyse(&track, &Settings { gravity: 9.81744, ..settings() }).unwrap()
 }
 
@@ -190,8 +190,8 @@ fn track(instrument: &Instrument, attitudes: &[Matrix3<f64>], how: &Stand) -> (T
     // No channels: the log has one temperature.
     events.retain(|event| !matches!(event, isotherm_log::text::LogEvent::Temperature(_)));
     let run = stand::run("tumbled", events);
-    let document = bare(&run.series(()).unwrap(), AccelOutput::MetresPerSecondSquared).unwrap();
-    (Track::of(&run, &Written::of(&document).unwrap().loaded, ()).unwrap(), held)
+    let document = bare(&run.series().unwrap(), AccelOutput::MetresPerSecondSquared).unwrap();
+    (Track::of(&run, &Written::of(&document).unwrap().loaded).unwrap(), held)
 }
 
 pub(crate) fn how(seed: u64) -> Stand {
@@ -300,7 +300,7 @@ fn gyros_that_do_not_follow_the_turns_are_refused_and_the_accelerometers_stand()
 #[test]
 fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
     let (_, track, _) = tumbled(24, &how(13));
-    let series = stand::run("t", tumbled_log(12, 13)).series(()).unwrap();
+    let series = stand::run("t", tumbled_log(12, 13)).series().unwrap();
     let plain = bare(&series, AccelOutput::MetresPerSecondSquared).unwrap();
     let good = analyse(&track, &settings()).unwrap();
     assert_eq!(complete(&plain, &good).unwrap().1, Vec::<String>::new());
@@ -426,7 +426,7 @@ fn accelerometers_are_in_what_the_mapping_states() {
         let (paths, mapping) = (vec![log.clone()], Box::new(mapping));
         let files = LogFiles::Text { paths, mapping, unit: unit.clone(), batch_ticks: 64 };
         let run = Run::new("log.csv".to_owned(), unit, files, &Part::default());
-        Ok::<_, String>(of_run(&run, given, ()).map_err(|error| error.to_string())?.accel.unwrap().output)
+        Ok::<_, String>(of_run(&run, given).map_err(|error| error.to_string())?.accel.unwrap().output)
     };
     let (force, volts) = (AccelOutput::MetresPerSecondSquared, AccelOutput::Volts);
     assert_eq!(["m_per_s2", "volt", "raw"].map(|unit| output(unit, None).unwrap()), [force, volts, volts]);

@@ -15,7 +15,7 @@ use crate::tumble::{how, settings, tumbled, tumbled_log};
 fn changed(seed: u64, change: &dyn Fn(&mut Track)) -> (Document, Tumble) {
     let (_, mut track, _) = tumbled(24, &how(seed));
     change(&mut track);
-    let series = stand::run("t", tumbled_log(12, seed)).series(()).unwrap();
+    let series = stand::run("t", tumbled_log(12, seed)).series().unwrap();
     (bare(&series, AccelOutput::MetresPerSecondSquared).unwrap(), analyse(&track, &settings()).unwrap())
 }
 

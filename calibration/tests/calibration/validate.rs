@@ -145,7 +145,7 @@ fn temperatures_of_a_recording_are_those_of_their_time() {
     let recorded = Run::new("recorded".into(), unit.clone(), files, &Part::default());
     let in_memory = Run::of_events("recorded".into(), unit, events(&scenario).collect());
     let loaded = Written::read(&shipped("FOG-0001.toml")).unwrap().loaded;
-    let [a, b] = [&recorded, &in_memory].map(|run| Table::of(run, &loaded, 10.0, ()).unwrap());
+    let [a, b] = [&recorded, &in_memory].map(|run| Table::of(run, &loaded, 10.0).unwrap());
     assert_eq!(a, b);
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use isotherm_protocol::document::{AccelOutput, Document, GyroOutput};
 
-use super::sections::{Sections, is_about};
+use super::sections::is_about;
 use super::{Take, covers};
 use crate::document::Written;
 use crate::error::Error;
@@ -86,19 +86,19 @@ pub(super) fn check(base: &Written, parts: &[Written], take: &[Take]) -> Result<
 }
 
 /// Refuses choices of keys that no document has.
-pub(super) fn chosen(take: &[Take], (base, parts): (&Sections, &[Sections])) -> Result<(), Error> {
-    let keys = || parts.iter().chain([base]).flat_map(Sections::keys);
-    let Some(take) = take.iter().find(|take| !keys().any(|key| covers(&take.key, key))) else {
+pub(super) fn chosen(take: &[Take], keys: &BTreeSet<&str>) -> Result<(), Error> {
+    let Some(take) = take.iter().find(|take| !keys.iter().any(|key| covers(&take.key, key))) else {
         return Ok(());
     };
     let parents = std::iter::successors(Some(take.key.as_str()), |key| Some(key.rsplit_once('.')?.0));
     let first = |key: &str| key.split('.').next().unwrap_or(key).to_owned();
     let below = |parent: &str| -> BTreeSet<String> {
-        let rest = keys().filter(|key| covers(parent, key)).filter_map(|key| key.get(parent.len() + 1..));
+        let rest =
+            keys.iter().filter(|key| covers(parent, key)).filter_map(|key| key.get(parent.len() + 1..));
         rest.map(|rest| format!("{parent}.{}", first(rest))).collect()
     };
     let near = parents.map(below).find(|near| !near.is_empty());
-    let near = near.unwrap_or_else(|| keys().map(|key| first(key)).collect());
+    let near = near.unwrap_or_else(|| keys.iter().map(|key| first(key)).collect());
     Err(Error::Usage(format!(
         "--take {}={}: no document has this key; there are {}",
         take.key,

@@ -213,6 +213,17 @@ fn a_choice_of_a_key_that_nobody_has_is_refused_with_those_that_are_there() {
 }
 
 #[test]
+fn accelerometers_that_the_base_has_not_keep_their_order() {
+    let base = named("base.toml", |document| document.accel = None);
+    let part = named("part.toml", |document| {
+        let sensors = document.accel.iter_mut().flat_map(|accel| &mut accel.sensor);
+        sensors.zip(["c", "b", "a"]).for_each(|(sensor, name)| sensor.name = name.into());
+    });
+    let merged = merge(&base, std::slice::from_ref(&part), &[]).unwrap();
+    assert_eq!(merged.written.document.accel, part.document.accel);
+}
+
+#[test]
 fn the_terms_of_a_sensor_with_a_dot_in_its_name_go_together() {
     for (key, of) in [
         ("gyro.sensor.g.x.lag", "gyro.sensor.g.x bias"),
@@ -244,7 +255,7 @@ fn an_output_of_two_fits_is_warned_of_and_a_weight_has_the_error_of_its_document
     let sigmas = Sigmas::of(&merged.written.document);
     assert_eq!(sigmas.get("gyro", "x", "increment_weight_ppm"), Some([50.0].as_slice()));
 
-    let accel = |change: fn(&mut isotherm_protocol::document::AccelSensor)| {
+    let accel = |change: fn(&mut AccelSensor)| {
         move |document: &mut Document| change(&mut document.accel.as_mut().unwrap().sensor[0])
     };
     let plain = named("base.toml", |_| ());

@@ -13,8 +13,8 @@ use crate::fits::thermal::target::axes;
 use crate::fits::thermal::{Site, Stand};
 use crate::numbers::{dot, hull, once_each};
 use crate::report::{Curve, Judged, Report, Rest, Sigmas, Verdict, beside, fixed, judge, per_deg_c, short};
+use crate::runs::Run;
 use crate::runs::table::Rows as Windows;
-use crate::runs::{Run, Watch};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 220;
@@ -60,7 +60,7 @@ pub struct Made {
 ///
 /// # Errors
 /// [`Error::Refused`] and [`Error::Found`] with every reason; [`Error::Log`], [`Error::Document`].
-pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
+pub fn fit(wanted: &Wanted<'_>) -> Result<Made, Error> {
     let sensors = accelerometers(wanted.base);
     if sensors.is_empty() {
         let words = "the document has no accelerometers: add [accel] with their channels and board_channel";
@@ -72,8 +72,8 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     }
     let mut samples = Vec::new();
     for run in wanted.runs {
-        let series = run.series(&mut watch)?;
-        samples.push(Samples::of(run, &series, &bare, wanted.window_s, &mut watch)?);
+        let series = run.series()?;
+        samples.push(Samples::of(run, &series, &bare, wanted.window_s)?);
     }
     let mut found: Vec<Result<Ratio, AccelKind>> = sensors
         .iter()
@@ -90,7 +90,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
     }
     let given = Written::of(wanted.base)?;
     let mut written = Written::of(&with(wanted.base, &found))?;
-    let Judged { mut curves, mut troubles } = judged(wanted, [&given, &written], &mut watch)?;
+    let Judged { mut curves, mut troubles } = judged(wanted, [&given, &written])?;
     let mains: Vec<usize> =
         wanted.base.accel.iter().flat_map(|accel| accel.orientation.rows.iter().map(main_axis)).collect();
     let mut verdicts = Curve::verdicts(&curves);
@@ -103,7 +103,7 @@ pub fn fit(wanted: &Wanted<'_>, mut watch: impl Watch) -> Result<Made, Error> {
             *found = Err(AccelKind::MadeWorse { axis: *axis });
         }
         written = Written::of(&with(wanted.base, &found))?;
-        let again = judged(wanted, [&given, &written], &mut watch)?;
+        let again = judged(wanted, [&given, &written])?;
         (curves, troubles) = (again.curves, once_each([troubles, again.troubles].concat()));
         verdicts = beside(&verdicts, Curve::verdicts(&curves));
     }
@@ -161,9 +161,9 @@ fn with(base: &Document, found: &[Result<Ratio, AccelKind>]) -> Document {
 }
 
 /// Forces along the case axes before and after, each run less its mean, which the ratio does not know.
-fn judged(wanted: &Wanted<'_>, documents: [&Written; 2], watch: impl Watch) -> Result<Judged, Error> {
+fn judged(wanted: &Wanted<'_>, documents: [&Written; 2]) -> Result<Judged, Error> {
     let of_run = |_, _: &Run| Ok((Rest::default(), Windows::valid(wanted.window_s), "accelerometer"));
-    judge((wanted.runs, wanted.judges), documents, of_run, watch)
+    judge((wanted.runs, wanted.judges), documents, of_run)
 }
 
 /// Puts into the report what was found of each accelerometer.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use isotherm_cli::Bar;
 use isotherm_correction::sample::{CorrectedTick, OutputKind, SensorFlags};
 use isotherm_log::diff::CorrectedLog;
 use isotherm_log::offline::{Loaded, unit_id};
@@ -16,9 +17,9 @@ use crate::error::Error;
 use crate::fits::thermal::bare::DEG_C;
 use crate::fits::thermal::checks::SMALLEST_RANGE_DEG_C;
 use crate::numbers::{percentile, seconds};
+use crate::runs::Run;
 use crate::runs::cut::Cut;
 use crate::runs::series::{Channel, Series, Ticks};
-use crate::runs::{Run, Watch};
 
 /// What a column measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,9 +129,9 @@ impl Columns {
     ///
     /// # Errors
     /// As [`Run::correct_together`] and [`checks::raw`].
-    pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind, watch: impl Watch) -> Result<Self, Error> {
+    pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind) -> Result<Self, Error> {
         let mut columns = Self::empty(loaded.unit.clone(), kind);
-        let (series, troubles) = run.correct_with_series(loaded, watch, |tick| columns.push(tick));
+        let (series, troubles) = run.correct_with_series(loaded, |tick| columns.push(tick));
         columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
         let converted = |name: &str, raw: f64| {
             let channel =
@@ -146,14 +147,8 @@ impl Columns {
     ///
     /// # Errors
     /// [`Error::Refused`] where it has none, or of several units; [`Error::Log`].
-    pub fn of_corrected(
-        paths: &[PathBuf],
-        part: &Part,
-        kind: Kind,
-        cut: &Cut,
-        mut watch: impl Watch,
-    ) -> Result<Self, Error> {
-        let unnamed = unnamed()?;
+    pub fn of_corrected(paths: &[PathBuf], part: &Part, kind: Kind, cut: &Cut) -> Result<Self, Error> {
+        let (unnamed, mut bar) = (unnamed()?, Bar::at_work("reading"));
         let mut columns: Option<Self> = None;
         for path in paths {
             let mut log = CorrectedLog::open(path, part, &unnamed)?;
@@ -166,11 +161,11 @@ impl Columns {
                     )));
                 }
                 ticks.ticks.iter().for_each(|tick| columns.push(&tick.tick));
-                watch.step();
+                bar.step();
             }
             log.cut_short().iter().for_each(|words| cut.recording(words));
         }
-        watch.end();
+        bar.finish();
         columns.map_or_else(
             || {
                 let none =

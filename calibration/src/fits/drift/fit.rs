@@ -96,7 +96,7 @@ struct Prepared {
 /// Analyses every sensor of a log; the extrapolation is fitted to so many hours.
 pub fn analyse(grid: &Grid, fit_h: f64) -> Vec<Analysis> {
     let sensors = &grid.sensors;
-    let prepared = in_parallel(sensors, |_| (), |sensor| prepare(grid, sensor));
+    let prepared = in_parallel(sensors, |sensor| prepare(grid, sensor));
     // One thing of work per sensor and averaging time, the slow ones first.
     let mut work = Vec::new();
     for (index, of) in prepared.iter().enumerate() {
@@ -104,26 +104,20 @@ pub fn analyse(grid: &Grid, fit_h: f64) -> Vec<Analysis> {
             work.extend(lengths(of.phase.longest()).into_iter().map(|m| (index, estimator, m)));
         }
     }
-    let variances = in_parallel(
-        &work,
-        |_| (),
-        |(index, estimator, m)| prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m)),
-    );
+    let variances = in_parallel(&work, |(index, estimator, m)| {
+        prepared.get(*index).and_then(|of| of.phase.variance(*estimator, *m))
+    });
     let found: Vec<_> = work.into_iter().zip(variances).collect();
     let indices: Vec<usize> = (0..sensors.len()).collect();
-    let finished = in_parallel(
-        &indices,
-        |_| (),
-        |index| {
-            let of_sensor: Vec<(Estimator, Variance)> = found
-                .iter()
-                .filter(|((sensor, ..), _)| sensor == index)
-                .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
-                .collect();
-            let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
-            Some(finish(grid, sensor, prepared, &of_sensor, fit_h))
-        },
-    );
+    let finished = in_parallel(&indices, |index| {
+        let of_sensor: Vec<(Estimator, Variance)> = found
+            .iter()
+            .filter(|((sensor, ..), _)| sensor == index)
+            .filter_map(|((_, estimator, _), variance)| Some((*estimator, (*variance)?)))
+            .collect();
+        let (sensor, prepared) = (sensors.get(*index)?, prepared.get(*index)?);
+        Some(finish(grid, sensor, prepared, &of_sensor, fit_h))
+    });
     finished.into_iter().flatten().collect()
 }
 

@@ -95,14 +95,10 @@ pub fn sail_all(
     trend: [f64; 3],
     seeds: &[u64],
 ) -> Result<Vec<(Course, Spread)>, Error> {
-    let all = in_parallel(
-        seeds,
-        |_| (),
-        |seed| {
-            let drift = drift(voyage, parts, trend, *seed);
-            CARES.into_iter().map(|care| voyage.sail(care, &drift, parts)).collect::<Result<Vec<_>, _>>()
-        },
-    );
+    let all = in_parallel(seeds, |seed| {
+        let drift = drift(voyage, parts, trend, *seed);
+        CARES.into_iter().map(|care| voyage.sail(care, &drift, parts)).collect::<Result<Vec<_>, _>>()
+    });
     let mut first = Vec::new();
     let mut figures = vec![Vec::new(); CARES.len()];
     for courses in all {

@@ -15,7 +15,7 @@ use cutter::Cutter;
 use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::real;
-use crate::runs::{Run, Troubles, Watch};
+use crate::runs::{Run, Troubles};
 
 /// Largest power of temperature that is tried.
 pub const MAX_POWER: usize = 3;
@@ -132,13 +132,7 @@ fn documents(bare: &Document, group: [usize; 3], reference: f64) -> Result<Vec<L
 ///
 /// # Errors
 /// As [`Run::correct_together`].
-pub fn gather(
-    runs: &[Run],
-    bare: &Document,
-    group: [usize; 3],
-    cut: Cut,
-    watch: &mut dyn Watch,
-) -> Result<Gathered, Error> {
+pub fn gather(runs: &[Run], bare: &Document, group: [usize; 3], cut: Cut) -> Result<Gathered, Error> {
     let loaded = documents(bare, group, cut.reference_deg_c)?;
     let mut gathered = Gathered::default();
     let (mut velocity, mut force_s) = ([0.0; 3], 0.0);
@@ -147,7 +141,7 @@ pub fn gather(
         let run = run.of_gyros(group);
         let mut cutter =
             Cutter::new(cut, bare, begin_s, gathered.cells.last().map_or(0, |cell| cell.stretch + 1));
-        let troubles = run.correct_together(&loaded, &mut *watch, |raw, ticks, unit| {
+        let troubles = run.correct_together(&loaded, |raw, ticks, unit| {
             let Some(bare) = ticks.first() else { return };
             gathered.ticks[0] += 1;
             gathered.ticks[1] += bare.missed;

@@ -6,7 +6,7 @@ use isotherm_protocol::document::{Curve, Document, GyroSensor, ModeReversal, Ser
 use serde_json::{Value, json};
 
 use super::fit::{Made, ServoFit};
-use super::model::{GyroFit, MEANDER_REFERENCE_DEG_C, Term};
+use super::model::{FITTED, GyroFit, MEANDER_REFERENCE_DEG_C, key};
 use crate::document::{about, by_name, rows, tidy};
 use crate::numbers::unit;
 use crate::report::{Sigmas, gyros as gyros_in_words};
@@ -15,8 +15,6 @@ use crate::report::{Sigmas, gyros as gyros_in_words};
 pub const SETTLED: f64 = 8.0;
 /// `T_ref` where the document states none (°C).
 const REFERENCE_DEG_C: f64 = 20.0;
-/// Terms that are fitted.
-const FITTED: [Feature; 3] = [Feature::One, Feature::LasingMode, Feature::Meander];
 /// Ranges are widened to the next tenth of a degree.
 const PER_DEG_C: f64 = 10.0;
 
@@ -64,32 +62,26 @@ fn servo(found: &ServoFit, old: &GyroSensor, reference: f64) -> Servo {
     }
 }
 
-/// The document with everything that was found. `constants` are those of static biases that are not to be touched.
-pub fn fitted(stripped: &Document, made: &Made, constants: &[Option<f64>]) -> Document {
-    let mut document = stripped.clone();
-    for ((sensor, found), constant) in document.gyro.sensor.iter_mut().zip(&made.gyros).zip(constants) {
-        let Ok(found) = found else { continue };
-        let reference = made.reference_deg_c;
-        sensor.set(Feature::One, curve(found, Term::Static, reference, *constant));
-        sensor.set(Feature::LasingMode, curve(found, Term::Magnetic, reference, None));
-        sensor.set(Feature::Meander, curve(found, Term::Meander, MEANDER_REFERENCE_DEG_C, None));
+/// The document with everything that was found. Gyros without a fit keep what the base has.
+pub fn fitted(base: &Document, made: &Made) -> Document {
+    let mut document = made.before.document.clone();
+    let sensors = document.gyro.sensor.iter_mut().zip(&base.gyro.sensor);
+    for ((sensor, old), found) in sensors.zip(&made.gyros) {
+        for term in FITTED {
+            let meanders = term == Feature::Meander;
+            let reference = if meanders { MEANDER_REFERENCE_DEG_C } else { made.reference_deg_c };
+            let before = old.terms.curve(term);
+            let constant = before.and_then(|before| before.shape().at(reference)).unwrap_or(0.0);
+            let kept = (made.keeps_constants && term == Feature::One).then_some(constant);
+            let found = found.as_ref().map(|found| curve(found, term, reference, kept));
+            sensor.set(term, found.unwrap_or_else(|_| before.cloned()));
+        }
     }
     document
 }
 
-/// Gyros without a fit keep what the base has.
-pub fn keep_old(document: &mut Document, base: &Document, gyros: &[Result<GyroFit, String>]) {
-    for ((sensor, old), found) in document.gyro.sensor.iter_mut().zip(&base.gyro.sensor).zip(gyros) {
-        if found.is_err() {
-            for feature in FITTED {
-                sensor.set(feature, old.terms.curve(feature).cloned());
-            }
-        }
-    }
-}
-
 /// A term as a curve, its constant as it was found or as it is given.
-fn curve(found: &GyroFit, term: Term, reference: f64, constant: Option<f64>) -> Option<Curve> {
+fn curve(found: &GyroFit, term: Feature, reference: f64, constant: Option<f64>) -> Option<Curve> {
     let mut coefficients: Vec<f64> = found.of(term).into_iter().map(tidy).collect();
     let range = widened(found.range_deg_c);
     if let (Some(first), Some(constant)) = (coefficients.first_mut(), constant) {
@@ -114,12 +106,6 @@ pub fn reference_of(base: &Document) -> f64 {
     base.gyro.sensor.iter().find_map(of).unwrap_or(REFERENCE_DEG_C)
 }
 
-/// The base's static bias of a gyro at `T_ref` (°/h); zero where it has none.
-pub fn base_constant(base: &Document, sensor: usize, reference_deg_c: f64) -> f64 {
-    let curve = base.gyro.sensor.get(sensor).and_then(|sensor| sensor.terms.curve(Feature::One));
-    curve.and_then(|curve| curve.shape().at(reference_deg_c)).unwrap_or(0.0)
-}
-
 /// That magnetic biases are those of the base with the other sign, in words.
 pub(super) fn inverted(
     base: &Document,
@@ -131,7 +117,7 @@ pub(super) fn inverted(
     const SEEN: f64 = 10.0;
     let is_inverted = |(old, found): &(&GyroSensor, &Result<GyroFit, String>)| {
         let old = old.terms.curve(Feature::LasingMode).and_then(|curve| curve.shape().at(reference_deg_c));
-        let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Term::Magnetic, 0));
+        let now = found.as_ref().ok().and_then(|fit| fit.coefficient(Feature::LasingMode, 0));
         old.zip(now).is_some_and(|(old, [now, sigma])| {
             (now + old).abs() < ALIKE * old.abs() && old.abs() > SEEN * sigma
         })
@@ -172,14 +158,14 @@ pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
 pub fn sigmas(made: &Made) -> Sigmas {
     let mut sigmas = Sigmas::default();
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
-        for term in [Term::Static, Term::Magnetic, Term::Meander] {
+        for term in FITTED {
             let own = found.iter().flat_map(|fit| &fit.coefficients).filter(|one| one.term == term);
             // Of a constant that was not fitted nothing is known.
-            let is_kept = |power: usize| made.keeps_constants && term == Term::Static && power == 0;
+            let is_kept = |power: usize| made.keeps_constants && term == Feature::One && power == 0;
             let of_term: Vec<f64> =
                 own.map(|one| if is_kept(one.power) { 0.0 } else { tidy(one.sigma) }).collect();
             if !of_term.is_empty() {
-                sigmas.put("gyro", &sensor.name, term.key(), of_term);
+                sigmas.put("gyro", &sensor.name, key(term), of_term);
             }
         }
     }

@@ -6,7 +6,7 @@ use isotherm_protocol::document::Document;
 use super::cells::{Cell, Cut, gather, groups};
 use super::checks;
 use super::dither;
-use super::document::{self, base_constant, reference_of};
+use super::document::{self, reference_of};
 use super::model::{Asked, Given, GyroFit, fit};
 use super::prepare::{check, earth_rate, gaps, provisional, transition_ticks, window_s};
 use super::servo::{self, Transient};
@@ -17,8 +17,8 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::{median, real};
 use crate::report::{Curve as Residual, Rest, judge};
+use crate::runs::Run;
 use crate::runs::table::{Rows, Takes};
-use crate::runs::{Run, Watch};
 
 /// About so many cells are made of a fit's runs, none shorter than [`SHORTEST_S`].
 const CELLS: f64 = 400.0;
@@ -83,8 +83,8 @@ pub struct Made {
 ///
 /// # Errors
 /// [`Error::Refused`] with every reason why the log does not allow it; [`Error::Log`], [`Error::Document`].
-pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
-    let switches = Switches::of(wanted.runs, watch)?;
+pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
+    let switches = Switches::of(wanted.runs)?;
     let reasons = checks::before(&switches, wanted.base, wanted.asked.transition_ticks);
     if !reasons.is_empty() {
         return Err(Error::Refused(reasons));
@@ -110,15 +110,15 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
     let mut servos: Vec<Result<ServoFit, String>> = vec![Err(String::new()); switches.sensors];
     let mut earth_case = None;
     for group in groups(switches.sensors) {
-        let gathered = gather(wanted.runs, &bare, group, cut, watch)?;
+        let gathered = gather(wanted.runs, &bare, group, cut)?;
         let earth = earth_rate(wanted, &gathered)?;
         earth_case = earth;
-        let doubts = check(wanted, &gathered, (&bare, group), earth, watch)?;
+        let doubts = check(wanted, &gathered, (&bare, group), earth)?;
         // Gaps, gravity and temperatures are the same for every group of gyros.
         if group[0] == 0 {
             gaps(&gathered, &mut warnings);
             warnings.extend(doubts);
-            warnings.extend(temperatures::freezing(wanted.runs, &bare, watch)?);
+            warnings.extend(temperatures::freezing(wanted.runs, &bare)?);
             let deg_c: Vec<f64> =
                 gathered.cells.iter().map(|cell| cell.powers[0][0] + reference_deg_c).collect();
             warnings.extend(units::other_dither(&switches, wanted.base, median(&deg_c)));
@@ -164,9 +164,6 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
                 .to_owned(),
         );
     }
-    let constants: Vec<Option<f64>> = (0..switches.sensors)
-        .map(|sensor| wanted.place.is_none().then(|| base_constant(wanted.base, sensor, reference_deg_c)))
-        .collect();
     let window_s = window_s(&switches, length_s);
     let mut made = Made {
         before: Written::of(&document::stripped(&bare, &servos, wanted.base, reference_deg_c))?,
@@ -181,21 +178,14 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         residuals: Vec::new(),
         warnings,
     };
-    made.settle(wanted, &constants, earth_case, watch)?;
+    made.settle(wanted, earth_case)?;
     Ok(made)
 }
 
 impl Made {
     /// Writes and judges; gyros whose terms make an axis worse keep the old ones, and all is judged once more.
-    fn settle(
-        &mut self,
-        wanted: &Wanted<'_>,
-        constants: &[Option<f64>],
-        earth: Option<[f64; 3]>,
-        watch: &mut dyn Watch,
-    ) -> Result<(), Error> {
-        let document = document::fitted(&self.before.document, self, constants);
-        self.write(&document, wanted, earth, watch)?;
+    fn settle(&mut self, wanted: &Wanted<'_>, earth: Option<[f64; 3]>) -> Result<(), Error> {
+        self.write(wanted, earth)?;
         let verdicts = Residual::verdicts(&self.residuals);
         if verdicts.is_empty() {
             return Err(Error::refused(format!(
@@ -204,35 +194,26 @@ impl Made {
                 self.window_s
             )));
         }
-        if verdicts.iter().all(|verdict| verdict.accepted) {
-            return Ok(());
-        }
-        for (sensor, row) in wanted.base.gyro.orientation.rows.iter().enumerate() {
+        let mut any_worse = false;
+        for (fit, row) in self.gyros.iter_mut().zip(&wanted.base.gyro.orientation.rows) {
             let axis = output_name(true, main_axis(row));
-            if verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == axis) {
-                self.gyros[sensor] = Err(format!("its terms make {axis} worse: it keeps the old ones"));
+            if fit.is_ok() && verdicts.iter().any(|verdict| !verdict.accepted && verdict.of == axis) {
+                *fit = Err(format!("its terms make {axis} worse: it keeps the old ones"));
+                any_worse = true;
             }
         }
-        let mut document = document::fitted(&self.before.document, self, constants);
-        document::keep_old(&mut document, wanted.base, &self.gyros);
-        self.write(&document, wanted, earth, watch)
+        if any_worse { self.write(wanted, earth) } else { Ok(()) }
     }
 
-    /// Writes a document, and judges what is written.
-    fn write(
-        &mut self,
-        document: &Document,
-        wanted: &Wanted<'_>,
-        earth: Option<[f64; 3]>,
-        watch: &mut dyn Watch,
-    ) -> Result<(), Error> {
-        self.written = Written::of(document)?;
+    /// Writes the document, and judges what is written.
+    fn write(&mut self, wanted: &Wanted<'_>, earth: Option<[f64; 3]>) -> Result<(), Error> {
+        self.written = Written::of(&document::fitted(wanted.base, self))?;
         let rate_deg_per_h = earth.map(|rate| rate.map(super::model::deg_per_h));
         let rest = Rest { rate_deg_per_h, ..Rest::default() };
         let rows = Rows { length_s: self.window_s, takes: Takes::Bridged, whole: Some(WHOLE) };
         let documents = [&self.before, &self.written];
         let of_run = |_, _: &Run| Ok((rest, rows, "gyro"));
-        self.residuals = judge((wanted.runs, wanted.judge), documents, of_run, watch)?.curves;
+        self.residuals = judge((wanted.runs, wanted.judge), documents, of_run)?.curves;
         Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use isotherm_correction::reversal::MAX_TRANSITION_TICKS;
+use isotherm_correction::thermal::{Feature, GYRO_TERMS};
 use isotherm_correction::units::AngularRate;
 use nalgebra::DMatrix;
 
@@ -27,22 +28,12 @@ const ROUNDS: usize = 3;
 /// What is wrong where there is no solution.
 const SINGULAR: &str = "its terms cannot be separated: both modes are needed at every temperature";
 
-/// A term of the model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Term {
-    /// Static bias.
-    Static,
-    /// Magnetic bias.
-    Magnetic,
-    /// Slow meander.
-    Meander,
-}
+/// Features whose terms are fitted, in the order of their columns: static bias, magnetic bias, slow meander.
+pub const FITTED: [Feature; 3] = [Feature::One, Feature::LasingMode, Feature::Meander];
 
-impl Term {
-    /// Its key in the document.
-    pub fn key(self) -> &'static str {
-        ["static_bias", "magnetic_bias", "slow_meander"][self as usize]
-    }
+/// The key of a gyro's term in a document.
+pub fn key(feature: Feature) -> &'static str {
+    GYRO_TERMS.iter().find(|term| term.feature == feature).map_or("", |term| term.key)
 }
 
 /// What was asked for; what was not is found in the log or the document.
@@ -72,7 +63,7 @@ pub struct Asked {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fitted {
     /// Of which term.
-    pub term: Term,
+    pub term: Feature,
     /// Of which power of temperature.
     pub power: usize,
     /// Its value (°/h per °Cʲ).
@@ -108,7 +99,7 @@ pub struct GyroFit {
 
 impl GyroFit {
     /// Coefficients of a term, lowest power first; empty where it is not in the model.
-    pub fn of(&self, term: Term) -> Vec<f64> {
+    pub fn of(&self, term: Feature) -> Vec<f64> {
         self.coefficients.iter().filter(|fitted| fitted.term == term).map(|fitted| fitted.value).collect()
     }
 }

@@ -1,7 +1,9 @@
 //! Orders of the polynomials by cross-validation: what was fitted to cooling is judged on heating, and the other way round.
 
+use isotherm_correction::thermal::Feature;
+
 use super::cells::MAX_POWER;
-use super::model::{Asked, MEANDER_ORDER, Term};
+use super::model::{Asked, FITTED, MEANDER_ORDER};
 use crate::lsq::correlated::{Data, Noise, White};
 use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::numbers::ends;
@@ -29,21 +31,22 @@ pub struct Model {
 impl Model {
     /// Its columns among all.
     pub fn columns(&self) -> Vec<usize> {
-        let place = |(term, power): (Term, usize)| (MAX_POWER + 1) * term as usize + power;
-        self.terms().into_iter().map(place).collect()
+        let place = |(term, power): (usize, usize)| (MAX_POWER + 1) * term + power;
+        self.powers().map(place).collect()
     }
 
     /// Term and power of each column.
-    pub fn terms(&self) -> Vec<(Term, usize)> {
-        let orders = [
-            (Term::Static, Some(self.static_order)),
-            (Term::Magnetic, Some(self.magnetic_order)),
-            (Term::Meander, self.meander_order),
-        ];
-        let powers = |(term, order): (Term, Option<usize>)| {
+    pub fn terms(&self) -> Vec<(Feature, usize)> {
+        self.powers().map(|(term, power)| (FITTED[term], power)).collect()
+    }
+
+    /// The same, the term by its number.
+    fn powers(&self) -> impl Iterator<Item = (usize, usize)> {
+        let orders = [Some(self.static_order), Some(self.magnetic_order), self.meander_order];
+        let powers = |(term, order): (usize, Option<usize>)| {
             order.into_iter().flat_map(move |order| (0..=order).map(move |power| (term, power)))
         };
-        orders.into_iter().flat_map(powers).collect()
+        orders.into_iter().enumerate().flat_map(powers)
     }
 }
 

@@ -10,7 +10,6 @@ use super::switches::Switches;
 use super::{checks, document, temperatures};
 use crate::document::gyro_name;
 use crate::error::Error;
-use crate::runs::Watch;
 use crate::runs::swapped::force_at_rest;
 use crate::runs::table;
 
@@ -65,7 +64,6 @@ pub(super) fn check(
     gathered: &Gathered,
     (bare, group): (&Document, [usize; 3]),
     earth: Option<[f64; 3]>,
-    watch: &mut dyn Watch,
 ) -> Result<Vec<String>, Error> {
     let names = group.map(|sensor| gyro_name(bare, sensor));
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
@@ -74,7 +72,7 @@ pub(super) fn check(
     let mut reasons = checks::behind(gathered, names, counts, along);
     if !reasons.is_empty() {
         if checks::lacks_temperatures(gathered) {
-            reasons.push(temperatures::read(wanted.runs, bare, watch)?);
+            reasons.push(temperatures::read(wanted.runs, bare)?);
         }
         return Err(Error::Refused(reasons));
     }

@@ -1,9 +1,10 @@
 //! The report of the modes.
 
+use isotherm_correction::thermal::Feature;
 use isotherm_pages::Table;
 
 use super::fit::{Made, ServoFit};
-use super::model::{GyroFit, Term};
+use super::model::{GyroFit, key};
 use crate::axes::{main_axis, output_name};
 use crate::numbers::real;
 use crate::report::{Curve, Report, counted, fixed, or_dash, per_deg_c, short, together};
@@ -88,9 +89,9 @@ fn gyro(
 ) {
     for one in &fit.coefficients {
         let unit = per_deg_c("°/h", one.power);
-        let kept = keeps_constants && one.term == Term::Static && one.power == 0;
+        let kept = keeps_constants && one.term == Feature::One && one.power == 0;
         let what = if kept { ", with the Earth's rate: not written" } else { "" };
-        let name = format!("gyro {name} {}, power {}{what}", one.term.key().replace('_', " "), one.power);
+        let name = format!("gyro {name} {}, power {}{what}", key(one.term).replace('_', " "), one.power);
         report.coefficient(name, unit, one.value, one.sigma);
     }
     let markov = fit.noise.markov.map_or_else(String::new, |[variance, time_s]| {
@@ -148,7 +149,7 @@ fn refuse(made: &Made, sensor: usize, reason: &str, report: &mut Report) {
 
 impl GyroFit {
     /// Value and standard error of a coefficient.
-    pub fn coefficient(&self, term: Term, power: usize) -> Option<[f64; 2]> {
+    pub fn coefficient(&self, term: Feature, power: usize) -> Option<[f64; 2]> {
         let found = self.coefficients.iter().find(|one| one.term == term && one.power == power);
         found.map(|one| [one.value, one.sigma])
     }

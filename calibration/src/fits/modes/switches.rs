@@ -8,7 +8,7 @@ use isotherm_correction::sample::{GyroTick, LasingMode, OutputKind};
 use super::seen::Seen;
 use crate::error::Error;
 use crate::numbers::{median, real, scatter, seconds};
-use crate::runs::{Run, Watch};
+use crate::runs::Run;
 
 /// Ticks before a switch that show what a reading is like.
 const BEFORE: usize = 16;
@@ -71,14 +71,14 @@ impl Switches {
     ///
     /// # Errors
     /// As [`Run::gyro_ticks`].
-    pub fn of(runs: &[Run], watch: &mut dyn Watch) -> Result<Self, Error> {
+    pub fn of(runs: &[Run]) -> Result<Self, Error> {
         let mut found = Self { whole: true, ..Self::default() };
         let mut length_s = 0.0;
         for run in runs {
             let mut eye = Eye::default();
             found.seen.iter_mut().for_each(Seen::begin);
             let mut begin = None;
-            run.gyro_ticks(&mut *watch, |output, tick| {
+            run.gyro_ticks(|output, tick| {
                 found.output.get_or_insert(output);
                 found.whole &= tick
                     .readings

@@ -8,17 +8,17 @@ use crate::error::Error;
 use crate::fits::drift::pieces::checks::frozen;
 use crate::numbers::{ends, median, once_each};
 use crate::report::{grouped, short};
+use crate::runs::Run;
 use crate::runs::series::Channel;
-use crate::runs::{Run, Watch};
 
 /// What every channel of the document reads in some runs, beside its limits, in one sentence.
 ///
 /// # Errors
 /// As [`Run::series`].
-pub(super) fn read(runs: &[Run], document: &Document, watch: &mut dyn Watch) -> Result<String, Error> {
+pub(super) fn read(runs: &[Run], document: &Document) -> Result<String, Error> {
     let mut raw: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for run in runs {
-        for (name, channel) in run.series(&mut *watch)?.temperatures {
+        for (name, channel) in run.series()?.temperatures {
             raw.entry(name).or_default().extend(channel.raw);
         }
     }
@@ -77,14 +77,10 @@ fn words(channel: &isotherm_protocol::document::Channel, raw: Option<&Vec<f64>>)
 ///
 /// # Errors
 /// As [`Run::series`].
-pub(super) fn freezing(
-    runs: &[Run],
-    document: &Document,
-    watch: &mut dyn Watch,
-) -> Result<Vec<String>, Error> {
+pub(super) fn freezing(runs: &[Run], document: &Document) -> Result<Vec<String>, Error> {
     let mut told: Vec<(&str, String)> = Vec::new();
     for run in runs {
-        let series = run.series(&mut *watch)?;
+        let series = run.series()?;
         for channel in &document.temperature.channel {
             let Some(Channel { time_ns, raw }) = series.temperatures.get(&channel.name) else { continue };
             let Some(words) = frozen("", time_ns, raw) else { continue };

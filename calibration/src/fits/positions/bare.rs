@@ -6,8 +6,8 @@ use isotherm_correction::sample::OutputKind;
 
 use crate::document::{ASSUMED_DEG_C, channels, faults, plain};
 use crate::error::Error;
+use crate::runs::Run;
 use crate::runs::series::Series;
-use crate::runs::{Run, Watch};
 
 /// Physical range of a channel whose readings are °C already.
 const RANGE_DEG_C: [f64; 2] = [-70.0, 130.0];
@@ -39,7 +39,7 @@ pub fn bare(series: &Series, accel_output: AccelOutput) -> Result<Document, Erro
 ///
 /// # Errors
 /// As [`Run::series`] and [`bare`]; [`Error::Usage`] where the mapping states another unit.
-pub fn of_run(run: &Run, accelerometer_unit: Option<&str>, watch: impl Watch) -> Result<Document, Error> {
+pub fn of_run(run: &Run, accelerometer_unit: Option<&str>) -> Result<Document, Error> {
     let of_log = run.accelerometer_unit().filter(|unit| ["V", "m/s²"].contains(unit));
     if let (Some(given), Some(of_log)) = (accelerometer_unit, of_log)
         && given != of_log.replace('²', "2")
@@ -49,7 +49,7 @@ pub fn of_run(run: &Run, accelerometer_unit: Option<&str>, watch: impl Watch) ->
             run.name
         )));
     }
-    let series = run.series(watch)?;
+    let series = run.series()?;
     let output = match (series.accels.output, accelerometer_unit.or(of_log).unwrap_or("V")) {
         (Some(OutputKind::Counts), _) => AccelOutput::Counts,
         (_, "V") => AccelOutput::Volts,

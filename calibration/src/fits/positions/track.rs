@@ -8,8 +8,8 @@ use isotherm_log::offline::Loaded;
 use crate::error::Error;
 use crate::numbers::{real, seconds};
 use crate::report::{counted, six};
+use crate::runs::Run;
 use crate::runs::table::{Rows, Table};
-use crate::runs::{Run, Watch};
 
 /// Share of the ticks, or of the time, that gaps may take.
 const MANY: f64 = 0.01;
@@ -45,8 +45,8 @@ impl Track {
     ///
     /// # Errors
     /// As [`Run::series`] and [`Run::correct_together`]; [`Error::Refused`] without accelerometers.
-    pub fn of(run: &Run, loaded: &Loaded, mut watch: impl Watch) -> Result<Self, Error> {
-        let series = run.series(&mut watch)?;
+    pub fn of(run: &Run, loaded: &Loaded) -> Result<Self, Error> {
+        let series = run.series()?;
         let accels = &series.accels;
         if accels.is_empty() {
             return Err(Error::refused(format!(
@@ -54,7 +54,7 @@ impl Track {
                 run.name
             )));
         }
-        let table = Table::of_rows(run, loaded, Rows::TICKS, watch)?;
+        let table = Table::of_rows(run, loaded, Rows::TICKS)?;
         let taken = |column: &[f64], at: &[usize]| -> Vec<f64> {
             at.iter().map(|index| column.get(*index).copied().unwrap_or(f64::NAN)).collect()
         };

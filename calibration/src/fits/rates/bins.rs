@@ -8,7 +8,7 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::fits::modes::cells::{along_input_axes, groups, temperature};
 use crate::runs::table::{Rows, Table, Takes};
-use crate::runs::{Run, Troubles, Watch};
+use crate::runs::{Run, Troubles};
 
 /// Length of a bin (s).
 pub const BIN_S: f64 = 0.5;
@@ -52,11 +52,11 @@ pub struct Binned {
 ///
 /// # Errors
 /// As [`Run::correct_together`].
-pub fn binned(run: &Run, document: &Document, watch: &mut dyn Watch) -> Result<Binned, Error> {
+pub fn binned(run: &Run, document: &Document) -> Result<Binned, Error> {
     let sensors = document.gyro.sensor.len();
     let mut whole = Binned::default();
     for group in groups(sensors) {
-        let part = of_group(run, document, group, &mut *watch)?;
+        let part = of_group(run, document, group)?;
         if whole.bins.is_empty() {
             whole = part;
             whole.bins.iter_mut().for_each(|bin| bin.rate.resize(sensors, f64::NAN));
@@ -69,10 +69,10 @@ pub fn binned(run: &Run, document: &Document, watch: &mut dyn Watch) -> Result<B
     Ok(whole)
 }
 
-fn of_group(run: &Run, document: &Document, group: [usize; 3], watch: impl Watch) -> Result<Binned, Error> {
+fn of_group(run: &Run, document: &Document, group: [usize; 3]) -> Result<Binned, Error> {
     let loaded = Written::compiled(&along_input_axes(document, group))?;
     let rows = Rows { length_s: BIN_S, takes: Takes::Own, whole: None };
-    let table = Table::of_rows(&run.of_gyros(group), &loaded, rows, watch)?;
+    let table = Table::of_rows(&run.of_gyros(group), &loaded, rows)?;
     let [good_s, force_s] = &table.taken_s;
     let at = |columns: &[Vec<f64>; 3], row: usize| columns.each_ref().map(|column| column[row]);
     let bin = |row: usize| Bin {

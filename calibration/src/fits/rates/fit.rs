@@ -19,8 +19,8 @@ use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
 use crate::numbers::{Size, hull, median};
 use crate::report::{Verdict, beside, of_logs};
+use crate::runs::Run;
 use crate::runs::table::{Rows, Table};
-use crate::runs::{Run, Watch};
 
 /// Rounds in which the Earth's turning and the fit settle.
 const ROUNDS: usize = 3;
@@ -88,9 +88,9 @@ pub struct Made {
 ///
 /// # Errors
 /// [`Error::Refused`] with every reason; [`Error::Log`], [`Error::Document`].
-pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
+pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     let mut warnings: Vec<Finding> = one_way(wanted.steps).map(Finding::from).into_iter().collect();
-    let mut runs = read_all(wanted, watch, &mut warnings)?;
+    let mut runs = read_all(wanted, &mut warnings)?;
     let judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
     let mut walk = vec![0.0; sensors];
@@ -172,19 +172,15 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         over_temperature,
         warnings,
     };
-    made.settle(wanted, axes_deg_c, &doubted, watch)?;
+    made.settle(wanted, axes_deg_c, &doubted)?;
     Ok(made)
 }
 
 /// Reads the runs and, behind them, the judging ones.
-fn read_all(
-    wanted: &Wanted<'_>,
-    watch: &mut dyn Watch,
-    warnings: &mut Vec<Finding>,
-) -> Result<Vec<Turned>, Error> {
+fn read_all(wanted: &Wanted<'_>, warnings: &mut Vec<Finding>) -> Result<Vec<Turned>, Error> {
     let (mut runs, mut reasons) = (Vec::new(), Vec::new());
     for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
-        match read(wanted, number, run, &mut *watch)? {
+        match read(wanted, number, run)? {
             Ok(read) => runs.push(read),
             Err(reason) => reasons.push(reason),
         }
@@ -225,10 +221,9 @@ impl Made {
         wanted: &Wanted<'_>,
         axes_deg_c: Option<f64>,
         doubted: &[(usize, Kind)],
-        watch: &mut dyn Watch,
     ) -> Result<(), Error> {
-        self.judge(wanted, 0, watch)?;
-        self.write(wanted, axes_deg_c, watch)?;
+        self.judge(wanted, 0)?;
+        self.write(wanted, axes_deg_c)?;
         self.verdicts = verdicts(&self.steps, &self.judged);
         let worse: Vec<usize> =
             (0..self.verdicts.len()).filter(|axis| !self.verdicts[*axis].accepted).collect();
@@ -238,7 +233,7 @@ impl Made {
             {
                 *gyro = Err(Kind::Worse { axis: *main });
             }
-            self.write(wanted, axes_deg_c, watch)?;
+            self.write(wanted, axes_deg_c)?;
             self.verdicts = beside(&self.verdicts, verdicts(&self.steps, &self.judged));
         }
         for (axis, verdict) in self.verdicts.iter_mut().enumerate().filter(|(_, verdict)| verdict.accepted) {
@@ -258,12 +253,7 @@ impl Made {
     }
 
     /// Writes what is left of the fits, and judges it.
-    fn write(
-        &mut self,
-        wanted: &Wanted<'_>,
-        axes_deg_c: Option<f64>,
-        watch: &mut dyn Watch,
-    ) -> Result<(), Error> {
+    fn write(&mut self, wanted: &Wanted<'_>, axes_deg_c: Option<f64>) -> Result<(), Error> {
         // What was fitted at the reference needs no slopes to come there.
         let axes_deg_c = axes_deg_c.filter(|_| self.over_temperature.is_none());
         let mut document = document::fitted(wanted.base, &self.gyros, axes_deg_c, wanted.with_bias);
@@ -271,14 +261,14 @@ impl Made {
             over.put(&mut document, &self.gyros);
         }
         self.written = Written::of(&document)?;
-        self.judge(wanted, 1, watch)
+        self.judge(wanted, 1)
     }
 
     /// Errors of all steps with the document as it stands: before (0), after (1).
-    fn judge(&mut self, wanted: &Wanted<'_>, sample: usize, watch: &mut dyn Watch) -> Result<(), Error> {
+    fn judge(&mut self, wanted: &Wanted<'_>, sample: usize) -> Result<(), Error> {
         for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
             let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
-            let ticks = Table::of_rows(run, &self.written.loaded, Rows::TICKS, &mut *watch)?;
+            let ticks = Table::of_rows(run, &self.written.loaded, Rows::TICKS)?;
             for step in steps.iter_mut().filter(|step| step.matched.step.run == number) {
                 let mean = ticks.mean_rate_within(step.matched.plateau.window_s);
                 step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);

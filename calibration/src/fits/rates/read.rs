@@ -12,7 +12,7 @@ use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::count_arcsec;
 use crate::fits::modes::model::deg_per_h;
 use crate::numbers::real;
-use crate::runs::{Run, Watch};
+use crate::runs::Run;
 
 /// Share of a step's ticks that may be lost.
 const LOST: f64 = 0.05;
@@ -29,13 +29,8 @@ pub(super) struct Turned {
 }
 
 /// Reads one run and finds its steps; the inner error is a reason to refuse.
-pub(super) fn read(
-    wanted: &Wanted<'_>,
-    number: usize,
-    run: &Run,
-    watch: &mut dyn Watch,
-) -> Result<Result<Turned, Finding>, Error> {
-    let binned = binned(run, wanted.base, watch)?;
+pub(super) fn read(wanted: &Wanted<'_>, number: usize, run: &Run) -> Result<Result<Turned, Finding>, Error> {
+    let binned = binned(run, wanted.base)?;
     let own: Vec<Step> = wanted.steps.iter().filter(|step| step.run == number).copied().collect();
     if own.is_empty() {
         return Ok(Err(Kind::NoStepStated { log: run.name.clone() }.in_log(number)));

@@ -109,7 +109,7 @@ fn made(runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
 fn made_from(base: &Document, runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
     let given =
         Wanted { runs, judge: &[], steps, scale_known: true, base, place, table_ppm: 0.0, with_bias: false };
-    make(&given, &mut ())
+    make(&given)
 }
 
 /// Three runs, one about each axis.

@@ -16,8 +16,8 @@ use crate::finding::ThermalKind;
 use crate::numbers::{Size, real, scatter_of_steps};
 use crate::report::curve::{Judging, channel_of, column};
 use crate::report::{Curve, Rest, is_worse, or_dash, short};
+use crate::runs::Run;
 use crate::runs::table::Table;
-use crate::runs::{Run, Watch};
 
 /// Axes: gyros, then accelerometers.
 const AXES: usize = 6;
@@ -34,18 +34,13 @@ pub(super) type Rivals = [Vec<(Term, f64, f64)>; 3];
 /// A run, and how it is judged.
 type Stage<'a> = (&'a Run, Judging);
 
-/// Rms of what is left on the judging runs, by axis and in the order of [`HEAD`]; and the levels that the document and none had where
-/// it was fitted.
+/// What is left on the judging runs, window by window, by axis and in the order of [`HEAD`]; and the levels that the document and none
+/// had where it was fitted.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Compared {
-    rms: [Option<[f64; HEAD.len()]>; AXES],
+    left: [[Vec<f64>; HEAD.len()]; AXES],
     levels: [[f64; 2]; AXES],
-    /// What the document before and the new one leave of each axis, window by window.
-    left: [[Vec<f64>; 2]; AXES],
 }
-
-/// Squares and their number.
-type Sum = (f64, f64);
 
 impl Compared {
     /// Of documents without terms, with cubics, with Ṫ beside them, the new one, and the one before it.
@@ -53,13 +48,12 @@ impl Compared {
         documents: [&Document; DOCUMENTS],
         fitted: &[Stage<'_>],
         judging: &[Stage<'_>],
-        mut watch: impl Watch,
     ) -> Result<Self, Error> {
         let loaded: Vec<Loaded> =
             documents.iter().copied().map(Written::compiled).collect::<Result<_, _>>()?;
         let mut levels = [[(0.0, 0.0); DOCUMENTS]; AXES];
         for (run, (rest, rows, counts)) in fitted {
-            let tables = Table::together(run, &loaded, *rows, &mut watch)?;
+            let tables = Table::together(run, &loaded, *rows)?;
             for (axis, levels) in levels.iter_mut().enumerate().filter(|(axis, _)| takes_part(counts, *axis))
             {
                 let truth = rest.truth(axis).unwrap_or(0.0);
@@ -71,22 +65,23 @@ impl Compared {
         }
         let levels =
             levels.map(|axis| axis.map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }));
-        let mut sums: [[Sum; HEAD.len()]; AXES] = Default::default();
-        let mut left: [[Vec<f64>; 2]; AXES] = Default::default();
+        let mut left: [[Vec<f64>; HEAD.len()]; AXES] = Default::default();
         for (run, (rest, rows, counts)) in judging {
-            let tables = Table::together(run, &loaded, *rows, &mut watch)?;
+            let tables = Table::together(run, &loaded, *rows)?;
             let shared = fitted.iter().any(|(other, _)| run.shares_log(other));
             let judges = |axis: &usize| takes_part(counts, *axis) && moves(&tables, documents[0], *axis);
             for axis in (0..AXES).filter(judges) {
-                let into = (&mut sums[axis], &mut left[axis]);
-                add(into, &tables, (axis, rest.truth(axis)), levels[axis], shared);
+                add(&mut left[axis], &tables, (axis, rest.truth(axis)), levels[axis], shared);
             }
         }
-        let rms = sums.map(|axis| {
-            let known = axis.iter().all(|(_, count)| *count > 0.0);
-            known.then(|| axis.map(|(square, count)| (square / count).sqrt()))
-        });
-        Ok(Self { rms, levels: levels.map(|axis| [axis[0], axis[3]]), left })
+        Ok(Self { left, levels: levels.map(|axis| [axis[0], axis[3]]) })
+    }
+
+    /// Rms of what is left of an axis; `None` where nothing judges it.
+    fn rms(&self, axis: usize) -> Option<[f64; HEAD.len()]> {
+        let left = self.left.get(axis).filter(|left| !left[0].is_empty())?;
+        let square = |left: &Vec<f64>| left.iter().map(|left| left.powi(2)).sum::<f64>() / real(left.len());
+        Some(left.each_ref().map(|left| square(left).sqrt()))
     }
 
     /// Levels before and after, for a run that is another part of a log of the fit.
@@ -96,7 +91,7 @@ impl Compared {
 
     /// Which of the rivals leaves less of an axis than the document does, and in words: a mean or a cubic.
     fn prefers(&self, axis: usize) -> Option<(usize, &'static str)> {
-        let [_, mean, cubic, _, document, _] = self.rms.get(axis).copied().flatten()?;
+        let [_, mean, cubic, _, document, _] = self.rms(axis)?;
         if mean.min(cubic) >= document {
             None
         } else if mean < cubic {
@@ -108,7 +103,7 @@ impl Compared {
 
     /// That the document before leaves less of an axis than the new one, by more than noise.
     pub(super) fn before_is_better(&self, axis: usize) -> Option<ThermalKind> {
-        let [before, new] = self.left.get(axis)?;
+        let [.., new, before] = self.left.get(axis)?;
         is_worse(before, new).then(|| ThermalKind::BeforeIsBetter {
             left: [before, new].map(|left| Size::of(left).rms),
             measure: if axis < 3 { "°/h" } else { "m/s²" },
@@ -119,8 +114,8 @@ impl Compared {
     pub(super) fn table(&self, outcome: &Outcome, curves: &[Curve]) -> Rows {
         let judged = curves.iter().any(|curve| curve.sample == Sample::Out);
         let mut rows = Vec::new();
-        for (axis, rms) in self.rms.iter().enumerate() {
-            let of = output_name(axis < 3, axis % 3);
+        for axis in 0..AXES {
+            let (of, rms) = (output_name(axis < 3, axis % 3), self.rms(axis));
             let deciding = |curve: &&Curve| curve.of == of && (curve.sample == Sample::Out) == judged;
             let mine: Vec<&Curve> = curves.iter().filter(deciding).collect();
             let Some(first) = mine.first() else { continue };
@@ -142,7 +137,6 @@ impl Outcome {
         document: &Document,
         (runs, judges): (&[Run], &[Run]),
         rest: &impl Fn(&Run, &Stand) -> Result<Rest, Error>,
-        watch: impl Watch,
     ) -> Result<Compared, Error> {
         if judges.is_empty() {
             return Ok(Compared::default());
@@ -154,7 +148,7 @@ impl Outcome {
         let [cubic, with_rate] = [1, 2].map(|rival: usize| {
             self.document(|found| found.rivals.as_ref().map_or(&found.terms, |rivals| &rivals[rival]))
         });
-        Compared::of([&self.plain(), &cubic, &with_rate, document, &self.base], fitted, judging, watch)
+        Compared::of([&self.plain(), &cubic, &with_rate, document, &self.base], fitted, judging)
     }
 
     /// Takes a mean or a cubic where a judging run leaves less with it; whether there was one.
@@ -191,9 +185,9 @@ fn takes_part(counts: &str, axis: usize) -> bool {
     counts.is_empty() || axis < 3
 }
 
-/// Adds the squares of what is left of an axis in windows that all have.
+/// Adds what is left of an axis in windows that all have.
 fn add(
-    (sums, left): (&mut [Sum; HEAD.len()], &mut [Vec<f64>; 2]),
+    left: &mut [Vec<f64>; HEAD.len()],
     tables: &[Table],
     (axis, truth): (usize, Option<f64>),
     levels: [f64; DOCUMENTS],
@@ -212,14 +206,8 @@ fn add(
     // The mean of the fitted runs is what it takes, where the level counts.
     let mean = off(0) + if truth.is_some() { levels[0] } else { 0.0 };
     let lines = [(0, off(0)), (0, mean), (1, off(1)), (2, off(2)), (3, off(3)), (4, off(4))];
-    for ((square, number), (document, off)) in sums.iter_mut().zip(lines) {
-        for &row in &good {
-            *square += (columns[document][row] - off).powi(2);
-            *number += 1.0;
-        }
-    }
-    for (left, document) in left.iter_mut().zip([4, 3]) {
-        left.extend(good.iter().map(|&row| columns[document][row] - off(document)));
+    for (left, (document, off)) in left.iter_mut().zip(lines) {
+        left.extend(good.iter().map(|&row| columns[document][row] - off));
     }
 }
 

@@ -19,9 +19,9 @@ use crate::document::{Fitted, accelerometers};
 use crate::error::Error;
 use crate::finding::ThermalKind;
 use crate::report::{Rest, few, six};
+use crate::runs::Run;
 use crate::runs::series::Series;
 use crate::runs::table::usual_window_s;
-use crate::runs::{Run, Watch};
 
 /// One sensor on its way.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +49,6 @@ pub fn fit(
     base: Option<&Document>,
     (runs, judges): (&[Run], &[Run]),
     settings: &Settings,
-    mut watch: impl Watch,
 ) -> Result<Fitted, Error> {
     let mut warnings = Vec::new();
     let (mut refusals, mut dead) = (Vec::new(), Vec::new());
@@ -58,7 +57,7 @@ pub fn fit(
     let all =
         || runs.iter().chain(judges).zip(&stands).enumerate().map(|(index, of)| (index < runs.len(), of));
     for (is_fitted, (run, stand)) in all() {
-        let of_run = run.series(&mut watch)?;
+        let of_run = run.series()?;
         if is_fitted {
             let found = checks::raw(&run.name, &of_run, stand);
             refusals.extend(found.refusals);
@@ -112,9 +111,8 @@ pub fn fit(
         let (of_readings, far) = checks::far(&run.name, series, (&plain, stand), window_s);
         let run = &run.without(far);
         sound.push(run.clone());
-        let of_run = Samples::of(run, series, &plain, window_s, &mut watch)?;
-        let (of_rest, mut found) =
-            stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead), &mut watch)?;
+        let of_run = Samples::of(run, series, &plain, window_s)?;
+        let (of_rest, mut found) = stands_as_stated(run, &of_run, (&base, &plain), (stand, &dead))?;
         found.refusals.extend(checks::frozen(&run.name, series, &plain));
         found.refusals.extend(of_readings.refusals);
         found.warnings.extend(of_readings.warnings);
@@ -152,7 +150,7 @@ pub fn fit(
         sensors_of(&mut outcome, columns, &all, (known, longest_s), &samples)?;
         outcome.history(name, &known.history);
     }
-    outcome.finish(sound.split_at(runs.len()), |run, stand| rest(run, &base, stand, ()), watch)
+    outcome.finish(sound.split_at(runs.len()), |run, stand| rest(run, &base, stand))
 }
 
 /// The logs that have the same readings as a run.
@@ -174,13 +172,12 @@ fn stands_as_stated(
     of_run: &Samples,
     (base, plain): (&Document, &Document),
     (stand, dead): (&Stand, &[(bool, usize, String)]),
-    watch: impl Watch,
 ) -> Result<(Option<Rest>, Findings), Error> {
     let mut found = checks::corrected(of_run, stand, dead);
     if !found.refusals.is_empty() {
         return Ok((None, found));
     }
-    let rest = rest(run, base, stand, watch)?;
+    let rest = rest(run, base, stand)?;
     found.refusals.extend(checks::turning(of_run, plain, stand));
     let stands = checks::attitude(of_run, plain, (&rest, stand));
     found.refusals.extend(stands.refusals);

@@ -20,8 +20,8 @@ use crate::finding::ThermalKind;
 use crate::numbers::{Size, hull, once_each};
 use crate::report::curve::Judging;
 use crate::report::{Curve, FLAT, Judged, Rest, Verdict, judge};
+use crate::runs::Run;
 use crate::runs::table::Rows;
-use crate::runs::{Run, Watch};
 
 /// Why a sensor is refused that nothing can judge.
 const NO_WINDOW: &str = "none of its windows is complete: look for gaps and flags with isotherm-replay correct, and choose a shorter --window";
@@ -101,13 +101,12 @@ impl Outcome {
         mut self,
         (runs, judges): (&[Run], &[Run]),
         rest: impl Fn(&Run, &Stand) -> Result<Rest, Error>,
-        mut watch: impl Watch,
     ) -> Result<Fitted, Error> {
         self.found.sort_by_key(|(sensor, ..)| (!sensor.gyro, sensor.index));
         let before = Written::of(&self.plain())?;
         let (document, curves, mut verdicts, troubles, compared) = loop {
             let document = self.document(|found| &found.terms);
-            let compared = self.compared(&document, (runs, judges), &rest, &mut watch)?;
+            let compared = self.compared(&document, (runs, judges), &rest)?;
             if self.take_simpler(&compared) {
                 continue;
             }
@@ -117,8 +116,7 @@ impl Outcome {
                 let shares = index >= runs.len() && runs.iter().any(|other| run.shares_log(other));
                 Ok((Rest { levels: shares.then(|| compared.levels()), ..rest }, rows, counts))
             };
-            let Judged { mut curves, mut troubles } =
-                judge((runs, judges), [&before, &written], of_run, &mut watch)?;
+            let Judged { mut curves, mut troubles } = judge((runs, judges), [&before, &written], of_run)?;
             troubles.extend(unjudged(&mut curves));
             let verdicts = Curve::verdicts(&curves);
             if verdicts.is_empty() {

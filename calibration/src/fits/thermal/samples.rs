@@ -17,7 +17,7 @@ use crate::error::Error;
 use crate::numbers::{median, real};
 use crate::runs::series::Series;
 use crate::runs::table::{Rows, Table};
-use crate::runs::{Run, Troubles, Watch};
+use crate::runs::{Run, Troubles};
 
 /// One run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,13 +51,7 @@ impl Samples {
     ///
     /// # Errors
     /// As [`Run::correct_together`], and [`Error::Document`].
-    pub fn of(
-        run: &Run,
-        series: &Series,
-        bare: &Document,
-        window_s: f64,
-        watch: impl Watch,
-    ) -> Result<Self, Error> {
+    pub fn of(run: &Run, series: &Series, bare: &Document, window_s: f64) -> Result<Self, Error> {
         let gyro_count = bare.gyro.sensor.len();
         let accel_count = accelerometers(bare).len();
         // Patterns of turned sensors, then the same with a bias of one on every accelerometer.
@@ -68,7 +62,7 @@ impl Samples {
             kinds.iter().flat_map(|document| (0..patterns).map(|pattern| along_axes(document, pattern)));
         let loaded: Vec<Loaded> =
             documents.map(|document| Written::compiled(&document)).collect::<Result<_, Error>>()?;
-        let tables = Table::together(run, &loaded, Rows::mostly_valid(window_s), watch)?;
+        let tables = Table::together(run, &loaded, Rows::mostly_valid(window_s))?;
         let rates: Vec<[&[f64]; 3]> =
             tables.iter().take(patterns).map(|table| [0, 1, 2].map(|axis| table.rate(axis))).collect();
         let forces: Vec<[&[f64]; 3]> =

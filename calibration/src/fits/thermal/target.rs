@@ -15,8 +15,8 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::numbers::{Size, dot, real};
 use crate::report::Rest;
+use crate::runs::Run;
 use crate::runs::table::{Table, earth_rate};
-use crate::runs::{Run, Watch};
 
 /// Shortest windows of a levelling (s).
 const LEVELLING_S: f64 = 60.0;
@@ -26,12 +26,12 @@ const SETTLED_S: f64 = 60.0;
 
 /// What a unit without error would put out during a run, over whole turns where it is turned: then the accelerometers, which feel
 /// the table too, have none.
-pub(super) fn rest(run: &Run, document: &Document, stand: &Stand, watch: impl Watch) -> Result<Rest, Error> {
+pub(super) fn rest(run: &Run, document: &Document, stand: &Stand) -> Result<Rest, Error> {
     let Site::Known { place, force_m_per_s2 } = &stand.site else { return Ok(Rest::default()) };
     let mean_force = match force_m_per_s2 {
         Some(force) => Some(*force),
         None if document.accel.is_some() => {
-            let means = Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S), watch)?;
+            let means = Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S))?;
             let mean = |axis: usize| Size::of(means.force(axis)).mean;
             Some([mean(0), mean(1), mean(2)])
         }

@@ -66,7 +66,7 @@ pub(crate) fn found_in_room(
 }
 
 pub(crate) fn tracks(runs: &[Run], written: &Written) -> Vec<Track> {
-    runs.iter().map(|run| Track::of(run, &written.loaded, ()).unwrap()).collect()
+    runs.iter().map(|run| Track::of(run, &written.loaded).unwrap()).collect()
 }
 
 /// Difference from the true axes at one power, as two angles per accelerometer.

@@ -197,7 +197,7 @@ fn gains(coil: u64, case: Case, method: Method) -> [[f64; 3]; 3] {
     let train = logged(&coil, case, &fitted, seed, WALK);
     let judge = logged(&coil, case, &judging, seed + 1, 0.0);
     let settings = Settings { method, ..Settings::default() };
-    let made = match fit(None, (&[train], &[]), &settings, ()) {
+    let made = match fit(None, (&[train], &[]), &settings) {
         Ok(made) => made,
         Err(error) => {
             println!("{}: {error}", case.name);
@@ -207,7 +207,7 @@ fn gains(coil: u64, case: Case, method: Method) -> [[f64; 3]; 3] {
     let deviations = |document: &Document| {
         let loaded = Written::compiled(document).unwrap();
         MEANS_S.map(|length_s| {
-            let table = Table::of(&judge, &loaded, length_s, ()).unwrap();
+            let table = Table::of(&judge, &loaded, length_s).unwrap();
             [0, 1, 2].map(|gyro| Size::of(table.rate(gyro)).deviation)
         })
     };

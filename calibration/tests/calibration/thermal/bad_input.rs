@@ -91,7 +91,7 @@ fn thermometer_at(kept: impl Fn(u32) -> bool) -> Run {
 }
 
 fn tried(run: Run, method: Method) -> Result<Fitted, Error> {
-    fit(None, (&[run], &[]), &Settings { method, ..Settings::default() }, ())
+    fit(None, (&[run], &[]), &Settings { method, ..Settings::default() })
 }
 
 #[track_caller]
@@ -137,7 +137,7 @@ fn what_a_base_document_hides_is_told() {
         gyro.increment_weight_rad_per_rad = Some(4.848e-6);
     }
     base.accel = None;
-    let made = fit(Some(&base), (&[run(0..5400, usual)], &[]), &Settings::default(), ()).unwrap();
+    let made = fit(Some(&base), (&[run(0..5400, usual)], &[]), &Settings::default()).unwrap();
     insta::assert_snapshot!(made.report.warnings.join("\n"));
 }
 
@@ -271,7 +271,7 @@ fn terms_that_are_kept_under_another_filter_are_told() {
     let old_s = base.temperature.filter.as_ref().unwrap().smoothing_s;
     let told = |smoothing_s: f64| {
         let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
-        let made = fit(Some(&base), (&[zero()], &[]), &settings, ()).unwrap();
+        let made = fit(Some(&base), (&[zero()], &[]), &settings).unwrap();
         let [new, old] = [&made.written.document, &base].map(|document| &document.gyro.sensor[1].terms);
         assert!(
             made.report.verdicts.iter().any(|verdict| verdict.accepted)
@@ -402,7 +402,7 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
     // Whoever judges the document says the same.
     let written = tried(flat(), Method::Joint).unwrap().written;
     let log = JudgedLog::new(flat(), &written.document).unwrap();
-    let report = validate(&written, &[log], Wanted { window_s: None, place: None }, ()).unwrap();
+    let report = validate(&written, &[log], Wanted { window_s: None, place: None }).unwrap();
     let verdict = of_y(&report);
     assert!(verdict.accepted, "{}", verdict.words());
     told += &(verdict.reason + "\n");
@@ -421,7 +421,7 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
 fn all_terms_are_the_largest_model() {
     let fitted = |terms: Terms| {
         let settings = Settings { terms, ..Settings::default() };
-        fit(None, (&[run(0..5400, usual)], &[]), &settings, ()).unwrap()
+        fit(None, (&[run(0..5400, usual)], &[]), &settings).unwrap()
     };
     let made = fitted(Terms::All);
     let count = |of: &str| made.report.coefficients.iter().filter(|c| c.name.starts_with(of)).count();
@@ -462,7 +462,7 @@ fn ticks_that_no_corrector_takes_are_refused_by_their_length() {
 
 /// A judging run beside one that is fitted.
 fn judged(judge: Run) -> Result<Fitted, Error> {
-    fit(None, (&[run(0..5400, usual)], &[judge]), &Settings::default(), ())
+    fit(None, (&[run(0..5400, usual)], &[judge]), &Settings::default())
 }
 
 /// A second of another run of the same unit.

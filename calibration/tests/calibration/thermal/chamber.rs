@@ -38,13 +38,13 @@ fn part(path: &std::path::Path, from_s: f64, to_s: Option<f64>) -> Run {
 fn fitted(path: &std::path::Path, method: Method) -> Fitted {
     let (train, judge) = (part(path, 0.0, Some(TURN_S)), part(path, TURN_S, None));
     let settings = Settings { method, ..Settings::default() };
-    fit(None, (&[train], &[judge]), &settings, ()).unwrap()
+    fit(None, (&[train], &[judge]), &settings).unwrap()
 }
 
 /// Rms out of sample about the level of the training part, as the data's README states it, by axis: gyros (°/s), then
 /// accelerometers (m/s²); and the deviation about the own mean.
 fn out_of_sample(path: &std::path::Path, written: &Written) -> [[f64; 2]; 6] {
-    let means = |run: &Run| Table::of(run, &written.loaded, 10.0, ()).unwrap();
+    let means = |run: &Run| Table::of(run, &written.loaded, 10.0).unwrap();
     let (train, judge) = (means(&part(path, 30.0, Some(TURN_S))), means(&part(path, TURN_S, None)));
     let column = |means: &Table, axis: usize| -> Vec<f64> {
         if axis < 3 {
@@ -105,7 +105,7 @@ fn without_a_judging_run_no_axis_of_the_real_log_gets_worse_needs_data() {
     for method in [Method::Sequential, Method::Joint] {
         let settings = Settings { method, ..Settings::default() };
         let train = part(&path, 0.0, Some(TURN_S));
-        let made = fit(None, (&[train], &[]), &settings, ()).unwrap();
+        let made = fit(None, (&[train], &[]), &settings).unwrap();
         println!("{method:?}: {}", made.report.headline());
         let out = out_of_sample(&path, &made.written);
         for axis in 1..6 {

@@ -67,7 +67,7 @@ fn base() -> Document {
 
 fn fitted(runs: &[Run], stands: Vec<Stand>, method: Method) -> Fitted {
     let settings = Settings { method, stands, window_s: Some(10.0), ..Settings::default() };
-    fit(Some(&base()), (runs, &[]), &settings, ()).unwrap()
+    fit(Some(&base()), (runs, &[]), &settings).unwrap()
 }
 
 /// The true scale factor error of a sensor (ppm) as a polynomial about another point.
@@ -215,7 +215,7 @@ fn a_table_that_turns_otherwise_is_refused() {
     let refused = |rate: f64, runs: &[Run]| {
         let stands = vec![stand([0.0, 0.0], rate)];
         let settings = Settings { stands, ..Settings::default() };
-        fit(Some(&base()), (runs, &[]), &settings, ()).unwrap_err().to_string()
+        fit(Some(&base()), (runs, &[]), &settings).unwrap_err().to_string()
     };
     let otherwise = refused(-20.0, std::slice::from_ref(&turned));
     let mut started: Vec<LogEvent> = events(&scenario(5, [0.0, 0.0], 0.0)).collect();
@@ -273,7 +273,7 @@ fn a_known_scale_factor_does_not_get_into_the_bias_where_the_attitude_is_not_kno
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let known = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     let runs = [run("level", &scenario(4, [0.0, 0.0], 0.0))];
-    let made = fit(Some(&known), (&runs, &[]), &Settings::default(), ()).unwrap();
+    let made = fit(Some(&known), (&runs, &[]), &Settings::default()).unwrap();
     assert!(made.report.accepted(), "{}", made.report.to_text());
     let slope = |document: &Document| {
         let bias = document.accel.as_ref().unwrap().sensor[2].terms.curve(Feature::One).cloned().unwrap();

@@ -71,7 +71,7 @@ fn the_residual_of_the_report_is_that_of_the_service() {
     for method in [Method::Sequential, Method::Joint] {
         let run = run_of(&log, &mapping);
         let settings = Settings { method, window_s: Some(10.0), ..Settings::default() };
-        let made = fit(None, (&[run], &[]), &settings, ()).unwrap();
+        let made = fit(None, (&[run], &[]), &settings).unwrap();
         let out = folder.path().join(format!("{}.toml", method.name()));
         made.written.save(&out, false).unwrap();
         assert!(made.report.verdicts.iter().any(|verdict| verdict.accepted), "{}", made.report.to_text());
@@ -111,7 +111,7 @@ fn a_level_that_the_run_cannot_tell_stays_what_it_was() {
     let (log, mapping) = text_log(folder.path());
     let settings = Settings { window_s: Some(10.0), ..Settings::default() };
     let fitted = |base: Option<&Document>| {
-        fit(base, (&[run_of(&log, &mapping)], &[]), &settings, ()).unwrap().written.document
+        fit(base, (&[run_of(&log, &mapping)], &[]), &settings).unwrap().written.document
     };
     let mut base = fitted(None);
     for (sensor, value) in base.gyro.sensor.iter_mut().zip(LEVELS_DEG_PER_H) {
@@ -134,12 +134,11 @@ fn a_document_that_is_worse_than_the_one_before_it_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let (log, mapping) = text_log(folder.path());
     let settings = Settings { window_s: Some(10.0), ..Settings::default() };
-    let whole = fit(None, (&[run_of(&log, &mapping)], &[]), &settings, ()).unwrap().written.document;
+    let whole = fit(None, (&[run_of(&log, &mapping)], &[]), &settings).unwrap().written.document;
     let [fitted, judging] = [(Span::ZERO, Some(HALF)), (HALF, None)]
         .map(|(start, end)| part_of(&log, &mapping, &Part { start, end, ..Part::default() }));
     let again = |base: &Document| {
-        fit(Some(base), (std::slice::from_ref(&fitted), std::slice::from_ref(&judging)), &settings, ())
-            .unwrap()
+        fit(Some(base), (std::slice::from_ref(&fitted), std::slice::from_ref(&judging)), &settings).unwrap()
     };
     let made = again(&whole);
     let terms =

@@ -109,13 +109,13 @@ fn a_log_with_a_row_a_minute_serves_a_fit() {
     let folder = tempfile::tempdir().unwrap();
     let [train, judge] = [(101, training_profile(), "train.csv"), (202, judging_profile(), "judge.csv")]
         .map(|(seed, profile, name)| minutes(&scenario((seed, profile)), &folder, name));
-    assert_eq!(train.series(()).unwrap().gyros.output, Some(OutputKind::Mean));
+    assert_eq!(train.series().unwrap().gyros.output, Some(OutputKind::Mean));
     let mut base = base();
     base.temperature.channel.retain(|channel| channel.name.starts_with("gyro"));
     base.gyro.orientation.thermal = None;
     let runs = (std::slice::from_ref(&train), std::slice::from_ref(&judge));
     let settings = Settings { window_s: None, ..settings(Method::Joint) };
-    let Fitted { report, .. } = fit(Some(&base), runs, &settings, ()).unwrap();
+    let Fitted { report, .. } = fit(Some(&base), runs, &settings).unwrap();
     println!("{:.1?}\n{}\n{:#?}", together(&report), report.headline(), report.warnings);
     assert!(report.accepted() && together(&report)[0] > 4.0, "{}", report.headline());
     // No window is shorter than a row.

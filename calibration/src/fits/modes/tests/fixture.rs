@@ -13,7 +13,7 @@ use isotherm_simulator::zeeman::Zeeman;
 
 use crate::document::Written;
 use crate::fits::modes::fit::{Made, Wanted, make};
-use crate::fits::modes::model::{Asked, Term, deg_per_h};
+use crate::fits::modes::model::{Asked, deg_per_h};
 use crate::fixture::simulated;
 use crate::runs::Run;
 
@@ -75,18 +75,18 @@ pub(super) fn wanted<'a>(runs: &'a [Run], base: &'a Document) -> Wanted<'a> {
 
 pub(super) fn fitted(scenario: &Scenario, base: &Document) -> Made {
     let runs = [run(scenario)];
-    make(&wanted(&runs, base), &mut ()).unwrap()
+    make(&wanted(&runs, base)).unwrap()
 }
 
 /// The true constants of a gyro (°/h): term, power, value.
-pub(super) fn truth(scenario: &mut Scenario, sensor: usize) -> Vec<(Term, usize, f64)> {
+pub(super) fn truth(scenario: &mut Scenario, sensor: usize) -> Vec<(Feature, usize, f64)> {
     let gyro = zeeman(scenario).gyros[sensor];
-    let of = |term: Term, values: &[f64]| {
+    let of = |term: Feature, values: &[f64]| {
         values.iter().enumerate().map(|(power, value)| (term, power, deg_per_h(*value))).collect::<Vec<_>>()
     };
-    let mut all = of(Term::Static, &gyro.bias_nonmagnetic_rad_per_s);
-    all.extend(of(Term::Magnetic, &gyro.bias_magnetic_rad_per_s));
-    all.extend(of(Term::Meander, &gyro.meander_rad_per_s));
+    let mut all = of(Feature::One, &gyro.bias_nonmagnetic_rad_per_s);
+    all.extend(of(Feature::LasingMode, &gyro.bias_magnetic_rad_per_s));
+    all.extend(of(Feature::Meander, &gyro.meander_rad_per_s));
     all
 }
 

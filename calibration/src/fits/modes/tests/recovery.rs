@@ -30,7 +30,7 @@ fn over_seeds(seeds: std::ops::Range<u64>, asked: Asked, scenario: impl Fn(u64) 
     for seed in seeds {
         let mut scenario = scenario(seed);
         let runs = [run(&scenario)];
-        let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
+        let made = make(&Wanted { asked, ..wanted(&runs, &base) }).unwrap();
         let mut errors = Vec::new();
         for (sensor, fit) in made.gyros.iter().enumerate() {
             let fit = fit.as_ref().unwrap();
@@ -144,7 +144,7 @@ fn the_drift_in_running_mode_falls_tenfold_on_another_profile() {
     let judge = [run(&other)];
     let mut wanted = wanted(&runs, &base);
     wanted.judge = &judge;
-    let made = make(&wanted, &mut ()).unwrap();
+    let made = make(&wanted).unwrap();
     let report = made.report();
     println!("{}", report.headline());
     for verdict in &report.verdicts {

@@ -13,8 +13,8 @@ use isotherm_simulator::chamber::Profile;
 use super::fixture::{base, cycle, fitted, scenario, wanted, zeeman};
 use crate::document::Written;
 use crate::error::Error;
+use crate::fits::modes::document;
 use crate::fits::modes::fit::{Made, Wanted, make};
-use crate::fits::modes::model::Term;
 use crate::fixture::events;
 use crate::runs::Run;
 
@@ -37,7 +37,7 @@ fn changed(scenario: &Scenario, mut change: impl FnMut(&mut GyroTick) -> bool) -
 
 fn made(run: Run, base: &Document) -> Result<Made, Error> {
     let runs = [run];
-    make(&wanted(&runs, base), &mut ())
+    make(&wanted(&runs, base))
 }
 
 /// Why nothing can be made of a run.
@@ -146,7 +146,7 @@ fn a_mode_that_comes_late_is_refused_and_one_the_other_way_round_told() {
             tick.mode.map(|mode| if mode == LasingMode::Plus { LasingMode::Minus } else { LasingMode::Plus });
         true
     });
-    let again = make(&wanted(&[turned], &made.written.document), &mut ()).unwrap();
+    let again = make(&wanted(&[turned], &made.written.document)).unwrap();
     insta::assert_snapshot!(format!(
         "as it is\n{}\nturned\n{}",
         made.warnings.join("\n"),
@@ -214,7 +214,7 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
     zeeman(&mut scenario).reversal.meander_half_period_s = 0.0;
     let base = base();
     let runs = [changed(&scenario, |_| true)];
-    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }, &mut ()).unwrap();
+    let made = make(&Wanted { place: None, ..wanted(&runs, &base) }).unwrap();
     insta::assert_snapshot!(made.warnings.join("\n"));
     for (sensor, fit) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let fit = fit.as_ref().unwrap();
@@ -224,19 +224,34 @@ fn without_an_attitude_the_constant_stays_and_the_rest_is_fitted() {
             matches!(bias, Shape::Polynomial { coefficients, .. } if coefficients[0].abs() <= 0.0),
             "{bias:?}"
         );
-        let [got, sigma] = fit.coefficient(Term::Magnetic, 0).unwrap();
+        let [got, sigma] = fit.coefficient(Feature::LasingMode, 0).unwrap();
         assert!(got.abs() > 100.0 * sigma);
     }
     let names: Vec<String> = made.report().coefficients.into_iter().map(|one| one.name).collect();
-    let sigmas = crate::fits::modes::document::sigmas(&made);
+    let sigmas = document::sigmas(&made);
     assert!(
         sigmas.get("gyro", "x", "static_bias").unwrap()[0] <= 0.0,
         "of what was not fitted nothing is known"
     );
     // Orders that the run cannot tell are not invented.
     let asked = crate::fits::modes::model::Asked { meander_order: Some(1), ..Default::default() };
-    let made = make(&Wanted { asked, ..wanted(&runs, &base) }, &mut ()).unwrap();
+    let made = make(&Wanted { asked, ..wanted(&runs, &base) }).unwrap();
     insta::assert_snapshot!([names, made.report().warnings].concat().join("\n"));
+}
+
+#[test]
+fn a_gyro_without_a_fit_keeps_the_terms_of_the_document_though_no_axis_is_worse() {
+    let old = fitted(&short(), &base()).written.document;
+    let mut made = fitted(&short(), &old);
+    assert!(made.report().accepted());
+    made.gyros[1] = Err("its means are far off".to_owned());
+    let new = document::fitted(&old, &made);
+    for feature in [Feature::One, Feature::LasingMode, Feature::Meander] {
+        let [kept, old, without] = [&new, &old, &made.before.document]
+            .map(|document| document.gyro.sensor[1].terms.curve(feature).cloned());
+        assert!(old.is_some() && without.is_none(), "{feature:?}");
+        assert_eq!(kept, old);
+    }
 }
 
 #[test]
@@ -245,7 +260,7 @@ fn a_latitude_that_the_gyros_contradict_is_told() {
     let runs = [changed(&short(), |_| true)];
     let told = |latitude_deg: f64| {
         let place = Place::new(latitude_deg, 30.0, Some([0.0, 0.0])).unwrap();
-        let made = make(&Wanted { place: Some(place), ..wanted(&runs, &base) }, &mut ()).unwrap();
+        let made = make(&Wanted { place: Some(place), ..wanted(&runs, &base) }).unwrap();
         made.warnings.join("\n")
     };
     insta::assert_snapshot!([55.75, 15.75].map(told).join("\n\n"));
