@@ -22,7 +22,7 @@ pub use layout::{DecimalMark, Delimiter, Encoding, Layout, OnBadRow};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use time::TimeKeys;
-pub use time::{Marks, TimeColumn, TimeMapping, TimeUnit};
+pub use time::{DurationRule, Marks, TimeColumn, TimeMapping, TimeUnit};
 
 use crate::error::Error;
 use crate::file::read_small_text;
