@@ -15,10 +15,12 @@ pub mod timeline;
 mod window;
 
 use std::path::{Path, PathBuf};
+use std::slice;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::unit::Event;
 use isotherm_correction::units::Timestamp;
 use serde::Serialize;
 
@@ -97,6 +99,16 @@ impl LogEvent {
     /// What events are ordered by.
     fn order(&self) -> (Timestamp, u8) {
         (self.time(), self.rank())
+    }
+}
+
+impl<'e> From<&'e LogEvent> for Event<'e> {
+    fn from(event: &'e LogEvent) -> Self {
+        match event {
+            LogEvent::Gyro { output, tick } => Self::Gyro { output: *output, ticks: slice::from_ref(tick) },
+            LogEvent::Accel { output, tick } => Self::Accel { output: *output, ticks: slice::from_ref(tick) },
+            LogEvent::Temperature(reading) => Self::Temperature(slice::from_ref(reading)),
+        }
     }
 }
 
