@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use isotherm_correction::units::Span;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::UnitId;
 
 use crate::error::Error;
@@ -48,11 +48,33 @@ impl Part {
     pub fn window(&self) -> Option<(Span, Option<Span>)> {
         (self.start > Span::ZERO || self.end.is_some()).then_some((self.start, self.end))
     }
+}
 
-    /// How long it is; `None` to the end.
-    #[must_use]
-    pub fn duration(&self) -> Option<Span> {
-        self.end.map(|end| Span::from_ns(end.as_ns().saturating_sub(self.start.as_ns())))
+/// Where in the time of a part a log is that is taken tick by tick.
+///
+/// The log begins with the start of its first tick, or the time of its first temperature reading. A tick belongs to the part when it
+/// begins and ends inside.
+#[derive(Debug, Default)]
+pub(crate) struct Stretch {
+    start: Span,
+    /// `None` is the log's end.
+    end: Option<Span>,
+    /// When the log begins.
+    beginning: Option<Timestamp>,
+    /// The part is over.
+    pub(crate) over: bool,
+}
+
+impl Stretch {
+    pub(crate) fn of(part: &Part) -> Self {
+        Self { start: part.start, end: part.end, ..Self::default() }
+    }
+
+    /// Whether what began and ended then belongs to the part; notes when the part is over.
+    pub(crate) fn holds(&mut self, began: Timestamp, ended: Timestamp) -> bool {
+        let beginning = *self.beginning.get_or_insert(began);
+        self.over = self.end.is_some_and(|end| ended > beginning + end);
+        !self.over && (self.start == Span::ZERO || began >= beginning + self.start)
     }
 }
 
@@ -60,7 +82,7 @@ impl LogFiles {
     /// Opens a part of the log.
     ///
     /// A recording's time is that of reception, counted from its first message, and its messages are taken whole; chunks that
-    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
+    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::LogReader::within`].
     ///
     /// # Errors
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].

@@ -20,7 +20,7 @@ use crate::message::{Message, Topic};
 use crate::part::Part;
 use crate::progress::Progress;
 use crate::recording::{self, RecordingReader, RecordingReport};
-use crate::text::{LogEvent, LogReader, ReadReport, Window};
+use crate::text::{LogEvent, LogReader, ReadReport};
 
 /// Whether a file is a recording; what cannot be read is not.
 #[must_use]
@@ -98,9 +98,8 @@ impl Log {
         batch_ticks: usize,
         part: &Part,
     ) -> Result<Self, Error> {
-        let events = LogReader::open(mapping, paths)?;
+        let events = LogReader::open(mapping, paths)?.within(part);
         let progress = events.progress();
-        let events = Window::new(events, part.start, part.duration());
         let text = TextLog { events, unit: unit.clone(), batcher: Batcher::new(batch_ticks), over: false };
         Ok(Self { source: Source::Text(Box::new(text)), progress })
     }
@@ -139,7 +138,7 @@ impl Log {
     pub fn report(&self) -> LogReport {
         match &self.source {
             Source::Recording(reader) => LogReport::Recording(reader.report().clone()),
-            Source::Text(text) => LogReport::Text(text.events.inner().report()),
+            Source::Text(text) => LogReport::Text(text.events.report()),
             Source::Corrected(csv) => LogReport::Text(ReadReport { rows: csv.rows, ..ReadReport::default() }),
         }
     }
@@ -193,7 +192,7 @@ impl CorrectedCsv {
 /// A text log, put into batches.
 #[derive(Debug)]
 struct TextLog {
-    events: Window<LogReader>,
+    events: LogReader,
     unit: UnitId,
     batcher: Batcher,
     over: bool,

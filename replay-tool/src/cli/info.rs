@@ -6,7 +6,6 @@ pub(super) mod tables;
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
-use isotherm_log::text::LogReader;
 
 use super::log_args::{LogArgs, unnamed};
 use super::{print, show};
@@ -72,8 +71,6 @@ impl LogArgs {
         if self.is_recording()? {
             return Ok(self.log.clone());
         }
-        let events = self.events()?;
-        let reader: &LogReader = events.inner();
-        Ok(reader.paths().to_vec())
+        Ok(self.events()?.paths().to_vec())
     }
 }

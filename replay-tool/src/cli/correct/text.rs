@@ -61,13 +61,13 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         show::warn(&warning.to_string());
     }
     let mut events = args.log.events()?;
-    let mut inputs = events.inner().paths().to_vec();
+    let mut inputs = events.paths().to_vec();
     inputs.extend(args.log.mapping_file().into_iter().chain([calibration.to_owned()]));
     let mut sink = Sink::open(args, std::slice::from_ref(&loaded.unit), &inputs)?;
     let form = sink.form(args.format);
     let mut stream = loaded.stream(settings);
     let mut sums = Sums::default();
-    let mut bar = Bar::over_log(events.inner().progress().watch());
+    let mut bar = Bar::over_log(events.progress().watch());
     for event in &mut events {
         stream.handle((&event?).into());
         if stream.ready().len() >= BLOCK {
@@ -77,14 +77,14 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     }
     stream.flush();
     let ticks_in = stream.unit().counters().gyro_ticks_in;
-    if ticks_in == 0 && !events.inner().report().lost_data() {
+    if ticks_in == 0 && !events.report().lost_data() {
         return Err(Error::Nothing("corrected"));
     }
     sink.write(take(&mut stream, &mut sums, form))?;
     sink.finish(&inputs)?;
     bar.finish();
 
-    let (summary, log) = (sums.summary(), events.inner().report());
+    let (summary, log) = (sums.summary(), events.report());
     for trouble in troubles(&stream).into_iter().chain(summary.doubts()) {
         show::warn(&trouble);
     }
