@@ -11,7 +11,8 @@ use crate::file::refuse_pipe;
 use crate::mapping::Mapping;
 use crate::message::Message;
 use crate::progress::Progress;
-use crate::source::{Log, LogReport, is_recording};
+use crate::recording::RecordingReader;
+use crate::source::{LogReport, Source, is_recording};
 
 /// The files of a log, and how they are read.
 #[derive(Debug, Clone)]
@@ -88,28 +89,30 @@ impl LogFiles {
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
     pub fn open(&self, part: &Part) -> Result<Messages, Error> {
         let mut beginning_ns = None;
-        let (log, window) = match self {
+        let ((source, progress), window) = match self {
             Self::Recordings(paths) => {
                 let mut before_ns = 0;
                 if part.start > Span::ZERO {
-                    beginning_ns = Log::recordings(paths)?.next_message()?.map(|message| message.received_ns);
+                    let first = Source::recordings(paths, 0)?.0.next_message()?;
+                    beginning_ns = first.map(|message| message.received_ns);
                     let start_ns = u64::try_from(part.start.as_ns()).unwrap_or(0);
                     before_ns = beginning_ns.map_or(0, |beginning| beginning.saturating_add(start_ns));
                 }
-                (Log::recordings_at(paths, before_ns)?, part.window())
+                (Source::recordings(paths, before_ns)?, part.window())
             }
             Self::Text { paths, mapping, unit, batch_ticks } => {
-                (Log::text(paths, mapping, unit, *batch_ticks, part)?, None)
+                (Source::text(paths, mapping, unit, *batch_ticks, part)?, None)
             }
         };
-        Ok(Messages { log, units: part.units.clone(), window, beginning_ns, over: false })
+        Ok(Messages { source, progress, units: part.units.clone(), window, beginning_ns, over: false })
     }
 }
 
 /// The messages of a part of a log, one by one in constant memory.
 #[derive(Debug)]
 pub struct Messages {
-    log: Log,
+    source: Source,
+    progress: Progress,
     units: BTreeSet<UnitId>,
     /// Begin and end after the first message, of a recording.
     window: Option<(Span, Option<Span>)>,
@@ -123,8 +126,9 @@ impl Messages {
     /// # Errors
     /// [`Error::File`].
     pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
-        let log = Log::corrected(path, unit, part)?;
-        Ok(Self { log, units: part.units.clone(), window: None, beginning_ns: None, over: false })
+        let (source, progress) = Source::corrected(path, unit, part)?;
+        let units = part.units.clone();
+        Ok(Self { source, progress, units, window: None, beginning_ns: None, over: false })
     }
 
     /// The next message; `None` behind the last.
@@ -133,7 +137,7 @@ impl Messages {
     /// [`Error::File`] and [`Error::Log`].
     pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
         while !self.over {
-            let Some(message) = self.log.next_message()? else { break };
+            let Some(message) = self.source.next_message()? else { break };
             if self.holds(&message) {
                 return Ok(Some(message));
             }
@@ -158,18 +162,18 @@ impl Messages {
     /// How far the log has been read.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        self.log.progress()
+        self.progress.clone()
     }
 
     /// What reading came to so far.
     #[must_use]
     pub fn report(&self) -> LogReport {
-        self.log.report()
+        self.source.report()
     }
 
-    /// The log itself, for what it holds beside messages.
-    pub fn log(&mut self) -> &mut Log {
-        &mut self.log
+    /// The recordings that are read, for what they hold beside messages; `None` for a text log.
+    pub fn recording(&mut self) -> Option<&mut RecordingReader> {
+        self.source.recording()
     }
 }
 

@@ -45,7 +45,7 @@ pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
     let mut bar = Bar::over_log(messages.progress().watch());
     loop {
         let message = messages.next_message()?;
-        if let Some(recordings) = messages.log().recording() {
+        if let Some(recordings) = messages.recording() {
             survey.beside(recordings.take_attachments(), recordings.take_metadata());
         }
         let Some(message) = message else { break };
