@@ -109,7 +109,7 @@ pub(super) fn resolve(mapping: &mut FileMapping, header: &[String]) -> Result<Co
     }
     // As cells are.
     let trim = |text: &mut String| *text = text.trim().to_owned();
-    for gyro in &mut mapping.gyro {
+    if let Some(gyro) = &mut mapping.gyro {
         let states = gyro.mode.iter_mut().chain(&mut gyro.meander);
         states.for_each(|state| [&mut state.plus, &mut state.minus].into_iter().for_each(trim));
     }
@@ -142,7 +142,7 @@ impl TickCells {
 }
 
 impl Column {
-    /// Its place, which has been found: no row has another.
+    /// Its place; none that a row has, of a column that has not been found.
     pub(super) fn index(&self) -> usize {
         match self {
             Self::Index(index) => *index,
