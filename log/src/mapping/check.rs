@@ -30,7 +30,7 @@ pub(super) fn check(r: &mut Reader<'_>, Mapping { files, .. }: &Mapping) {
 
 fn check_file(r: &mut Reader<'_>, path: &str, file: &FileMapping) {
     let (delimiter, gyro, accel) = (file.layout.delimiter, file.gyro.as_ref(), file.accel.as_ref());
-    if delimiter == Delimiter::Character(file.layout.decimal_mark as u8) {
+    if delimiter.byte() == Some(file.layout.decimal_mark as u8) {
         r.report(&join(path, "decimal_mark"), "is also the delimiter: choose another");
     }
     if gyro.is_none() && accel.is_none() && file.temperatures.is_empty() {

@@ -250,7 +250,7 @@ impl FileReader {
         let line = self.lines.line();
         let filled = |cell: &Cell| line.get(cell.start..cell.end).is_some_and(|text| !text.is_empty());
         let Some(surplus) = self.cells.iter().skip(columns).position(filled) else { return Ok(()) };
-        let commas = self.mapping.layout.delimiter == Delimiter::Character(b',');
+        let commas = self.mapping.layout.delimiter == Delimiter::Comma;
         Err(Reason::TooManyCells { columns, named: self.mapping.layout.header, commas }.at(columns + surplus))
     }
 
