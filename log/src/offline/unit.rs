@@ -147,7 +147,7 @@ struct Taker {
 }
 
 impl UnitWork {
-    pub(super) fn new(plan: UnitPlan, form: Form, from_ns: u64, diff: DiffOptions) -> Self {
+    pub(super) fn new(plan: UnitPlan, form: Form, from_ns: u64) -> Self {
         let UnitPlan { id, basis, compare } = plan;
         let by_journal = matches!(basis, Basis::Journal { .. });
         let replica = match basis {
@@ -162,7 +162,7 @@ impl UnitWork {
             from_ns,
             received_ns: 0,
             sums: Sums::default(),
-            comparison: compare.then(|| Comparison::new(diff, false)),
+            comparison: compare.then(|| Comparison::new(DiffOptions::default(), false)),
             made: None,
             event: None,
             output: Output::default(),
