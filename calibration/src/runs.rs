@@ -25,9 +25,8 @@ use isotherm_correction::sample::GyroTick;
 use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_log::mapping::{SensorUnit, TemperatureUnit};
 use isotherm_log::message::Topic;
-use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::part::{LogFiles, Messages, Part};
 use isotherm_log::progress::Progress;
-use isotherm_log::source::Log;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -293,7 +292,7 @@ fn readings(stream: RawStream, frame: &[u8]) -> Option<Vec<LogEvent>> {
 ///
 /// # Errors
 /// [`Error::Log`].
-pub fn units_of(log: &mut Log) -> Result<(Vec<UnitId>, Cut), Error> {
+pub fn units_of(log: &mut Messages) -> Result<(Vec<UnitId>, Cut), Error> {
     let mut units = BTreeSet::new();
     let mut bar = bar_over(&log.progress());
     while let Some(message) = log.next_message()? {

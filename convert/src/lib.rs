@@ -174,7 +174,7 @@ impl Conversion {
 
 /// Files that were come across since the last message.
 fn attachments(messages: &mut Messages) -> Vec<Attachment> {
-    messages.log().recording().map(RecordingReader::take_attachments).unwrap_or_default()
+    messages.recording().map(RecordingReader::take_attachments).unwrap_or_default()
 }
 
 /// A calibration document in a recording; what is none is passed over.

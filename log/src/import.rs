@@ -24,15 +24,15 @@ use std::fmt;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mapping::{Encoding, TimeUnit};
+use crate::mapping::{Delimiter, Encoding, TimeUnit};
 
 pub use propose::propose;
 
 /// What somebody says of a log, in place of a guess.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Hints {
-    /// What stands between two cells, as the mapping spells it.
-    pub delimiter: Option<String>,
+    /// What stands between two cells.
+    pub delimiter: Option<Delimiter>,
     /// Decimal mark, `.` or `,`.
     pub decimal_mark: Option<char>,
     /// Encoding of the text.

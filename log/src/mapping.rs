@@ -22,7 +22,7 @@ pub use layout::{DecimalMark, Delimiter, Encoding, Layout, OnBadRow};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use time::TimeKeys;
-pub use time::{Marks, TimeColumn, TimeMapping, TimeUnit};
+pub use time::{DurationRule, Marks, TimeColumn, TimeMapping, TimeUnit};
 
 use crate::error::Error;
 use crate::file::read_small_text;
@@ -293,9 +293,9 @@ impl<U: SensorUnit> TickMapping<U> {
         Some(TimeColumn { column, unit, date: None })
     }
 
-    fn columns(&self) -> impl Iterator<Item = &Column> {
-        let sensors = self.sensors.iter().filter_map(|sensor| sensor.column.as_ref());
-        sensors.chain(&self.sequence).chain(&self.duration_column)
+    fn columns_mut(&mut self) -> impl Iterator<Item = &mut Column> {
+        let sensors = self.sensors.iter_mut().filter_map(|sensor| sensor.column.as_mut());
+        sensors.chain(&mut self.sequence).chain(&mut self.duration_column)
     }
 }
 
@@ -379,19 +379,20 @@ impl From<ColumnWord> for Column {
 
 impl FileMapping {
     /// All columns that the file must have.
-    pub(crate) fn columns(&self) -> impl Iterator<Item = &Column> {
-        let stamps =
-            self.time.stamps.iter().flat_map(|stamps| std::iter::once(&stamps.column).chain(&stamps.date));
-        let gyro = self.gyro.iter().flat_map(|gyro| {
-            let modes = gyro.mode.iter().chain(&gyro.meander).map(|mode| &mode.column);
-            let switch = gyro.switch.iter().filter_map(|switch| switch.column.as_ref());
-            let halves = gyro.half_periods.iter().flat_map(|half| [&half.positive, &half.negative]);
-            gyro.ticks.columns().chain(modes).chain(switch).chain(halves)
+    pub(crate) fn columns_mut(&mut self) -> impl Iterator<Item = &mut Column> {
+        let Self { time, gyro, accel, temperatures, status, select, .. } = self;
+        let stamps = time.stamps.iter_mut();
+        let stamps = stamps.flat_map(|stamps| std::iter::once(&mut stamps.column).chain(&mut stamps.date));
+        let gyro = gyro.iter_mut().flat_map(|GyroMapping { ticks, mode, switch, meander, half_periods }| {
+            let modes = mode.iter_mut().chain(meander).map(|mode| &mut mode.column);
+            let switch = switch.iter_mut().filter_map(|switch| switch.column.as_mut());
+            let halves = half_periods.iter_mut().flat_map(|half| [&mut half.positive, &mut half.negative]);
+            ticks.columns_mut().chain(modes).chain(switch).chain(halves)
         });
-        let accel = self.accel.iter().flat_map(TickMapping::columns);
-        let temperatures = self.temperatures.iter().map(|temperature| &temperature.column);
-        let status = self.status.iter().map(|status| &status.column);
-        let select = self.select.iter().map(|select| &select.column);
+        let accel = accel.iter_mut().flat_map(TickMapping::columns_mut);
+        let temperatures = temperatures.iter_mut().map(|temperature| &mut temperature.column);
+        let status = status.iter_mut().map(|status| &mut status.column);
+        let select = select.iter_mut().map(|select| &mut select.column);
         stamps.chain(gyro).chain(accel).chain(temperatures).chain(status).chain(select)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`Offline`] | a text log's events, one by one |
+//! | [`Loaded`] | a calibration, and a stream with it |
 //! | [`correct`], [`UnitPlan`] | the units of a recording, all at once |
 //! | [`rows`] | corrected ticks as a file |
 //! | [`sums`] | their figures |
@@ -14,21 +14,18 @@ pub mod sums;
 mod unit;
 
 use std::path::Path;
-use std::slice;
 use std::sync::Arc;
 
-use isotherm_correction::sample::CorrectedTick;
-use isotherm_correction::unit::{Event, Unit, UnitSettings};
+use isotherm_correction::unit::UnitSettings;
 use isotherm_document::file::read_bounded;
 use isotherm_protocol::document::{Document, Parsed, Problem};
-use isotherm_protocol::key::{RawStream, UnitId};
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::{UnitStream, unfit};
 
 pub use parallel::{Made, RunOptions, correct};
 pub use unit::{Basis, Form, Output, UnitPlan, UnitReport};
 
 use crate::error::Error;
-use crate::text::LogEvent;
 
 /// A calibration document that was read from a file.
 #[derive(Debug, Clone)]
@@ -77,7 +74,12 @@ impl Loaded {
         })
     }
 
-    /// The stream of a unit with it, as the service has it after its start.
+    /// The stream of a unit with it, as the service has it after its start; corrected ticks are kept.
+    #[must_use]
+    pub fn stream(&self, settings: UnitSettings) -> UnitStream {
+        self.installed(UnitStream::new(self.unit.clone(), settings).keeping_ticks())
+    }
+
     pub(crate) fn installed(&self, mut stream: UnitStream) -> UnitStream {
         stream.install(Arc::clone(&self.calibration), self.digest);
         stream
@@ -92,129 +94,50 @@ pub fn unit_id(serial: &str) -> Result<UnitId, Error> {
     UnitId::new(serial).map_err(|source| Error::Unit { serial: serial.to_owned(), source })
 }
 
-/// Corrects events one by one.
-#[derive(Debug)]
-pub struct Offline {
-    /// The unit's stream.
-    stream: UnitStream,
+/// Counters of a unit that are not zero.
+pub fn counters(stream: &UnitStream) -> impl Iterator<Item = (String, u64)> + use<> {
+    let counters = stream.counters().into_iter();
+    counters.filter(|counter| counter.value > 0).map(|counter| (counter.name, counter.value))
 }
 
-impl Offline {
-    /// A unit with a calibration, as the service has it after its start.
-    #[must_use]
-    pub fn new(loaded: &Loaded, settings: UnitSettings) -> Self {
-        Self { stream: loaded.installed(UnitStream::new(loaded.unit.clone(), settings).keeping_ticks()) }
-    }
-
-    /// Takes one event.
-    pub fn handle(&mut self, event: &LogEvent) {
-        self.stream.handle(match event {
-            LogEvent::Gyro { output, tick } => Event::Gyro { output: *output, ticks: slice::from_ref(tick) },
-            LogEvent::Accel { output, tick } => {
-                Event::Accel { output: *output, ticks: slice::from_ref(tick) }
-            }
-            LogEvent::Temperature(reading) => Event::Temperature(slice::from_ref(reading)),
-        });
-    }
-
-    /// Takes one frame of raw readings. One that cannot be read is counted, and its ticks are a gap.
-    pub fn receive(&mut self, input: RawStream, frame: &[u8]) {
-        let _ = self.stream.receive(input, frame);
-    }
-
-    /// The unit as it stands.
-    #[must_use]
-    pub fn unit(&self) -> &Unit {
-        self.stream.unit()
-    }
-
-    /// Releases what still waits: the log is over.
-    pub fn finish(&mut self) {
-        self.stream.flush();
-    }
-
-    /// How many corrected ticks are ready.
-    #[must_use]
-    pub fn ready(&self) -> usize {
-        self.stream.ready().len()
-    }
-
-    /// Corrected ticks that are ready, without taking them.
-    pub fn peek(&self) -> impl Iterator<Item = &CorrectedTick> {
-        self.stream.ready().ticks().iter()
-    }
-
-    /// Takes the corrected ticks that are ready.
-    pub fn take(&mut self) -> Vec<CorrectedTick> {
-        self.stream.take_ready()
-    }
-
-    /// Takes ready ticks as one frame; false where there are none.
-    pub fn next_frame(&mut self, frame: &mut Vec<u8>) -> bool {
-        self.stream.next_frame(frame).is_some()
-    }
-
-    /// Takes the corrected ticks that are ready, as rows or frames.
-    pub fn give_out(&mut self, form: Form) -> Output {
-        let mut output = Output::default();
-        output.give_out(&mut self.stream, form, &mut Vec::new());
-        output
-    }
-
-    /// What was refused or passed over, in words for whoever reads only the summary.
-    #[must_use]
-    pub fn troubles(&self) -> Vec<String> {
-        /// Counters of what is as it should be, or that the summary and its flags show anyway.
-        const EXPECTED: [&str; 8] = [
-            "gyro_ticks_in",
-            "accel_ticks_in",
-            "temperature_readings_in",
-            "ticks_out",
-            "gaps",
-            "ticks_missed",
-            "ticks_interpolated",
-            "switches_restored",
-        ];
-        let channels: Vec<_> =
-            self.stream.unit().channels().map(|channel| channel.name.to_string()).collect();
-        let counters = self.counters().into_iter().filter(|(name, _)| !EXPECTED.contains(&name.as_str()));
-        let words = counters.map(|(name, value)| match name.as_str() {
-            "temperature_unknown_channel" => format!(
-                "{value} temperature readings are of channels that the calibration does not have; it has: {}",
-                if channels.is_empty() { "none".to_owned() } else { channels.join(", ") }
-            ),
-            name if unfit::COUNTERS.contains(&name) => {
-                let calibration = self.stream.unit().calibration();
-                let why = calibration.and_then(|(calibration, _)| unfit::words(name, calibration));
-                format!("{value} ticks of gyros and accelerometers refused: {}", why.unwrap_or_default())
-            }
-            "not_finite_readings" => format!("{value} sensor readings are not numbers"),
-            "overrange_readings" => format!("{value} sensor readings are at or beyond the input range"),
-            "temperature_rejected" => {
-                format!("{value} temperature readings are not numbers, out of range, or spikes")
-            }
-            "temperature_late" => {
-                format!("{value} temperature readings came too late for their ticks")
-            }
-            "temperature_out_of_order" => {
-                format!("{value} temperature readings are not newer than the one before")
-            }
-            _ => format!("{value} {}", name.replace('_', " ")),
-        });
-        words.collect()
-    }
-
-    /// Gyro ticks that did not go out corrected, though the log has them.
-    #[must_use]
-    pub fn refused(&self) -> u64 {
-        let counters = self.stream.unit().counters();
-        counters.gyro_ticks_in.saturating_sub(counters.ticks_out)
-    }
-
-    /// Counters of the unit that are not zero.
-    #[must_use]
-    pub fn counters(&self) -> Vec<(String, u64)> {
-        let counters = self.stream.counters().into_iter();
-        counters.filter(|counter| counter.value > 0).map(|counter| (counter.name, counter.value)).collect()
-    }
+/// What a stream has refused or passed over, in words for whoever reads only the summary.
+#[must_use]
+pub fn troubles(stream: &UnitStream) -> Vec<String> {
+    /// Counters of what is as it should be, or that the summary and its flags show anyway.
+    const EXPECTED: [&str; 8] = [
+        "gyro_ticks_in",
+        "accel_ticks_in",
+        "temperature_readings_in",
+        "ticks_out",
+        "gaps",
+        "ticks_missed",
+        "ticks_interpolated",
+        "switches_restored",
+    ];
+    let channels: Vec<_> = stream.unit().channels().map(|channel| channel.name.to_string()).collect();
+    let counters = counters(stream).filter(|(name, _)| !EXPECTED.contains(&name.as_str()));
+    let words = counters.map(|(name, value)| match name.as_str() {
+        "temperature_unknown_channel" => format!(
+            "{value} temperature readings are of channels that the calibration does not have; it has: {}",
+            if channels.is_empty() { "none".to_owned() } else { channels.join(", ") }
+        ),
+        name if unfit::COUNTERS.contains(&name) => {
+            let calibration = stream.unit().calibration();
+            let why = calibration.and_then(|(calibration, _)| unfit::words(name, calibration));
+            format!("{value} ticks of gyros and accelerometers refused: {}", why.unwrap_or_default())
+        }
+        "not_finite_readings" => format!("{value} sensor readings are not numbers"),
+        "overrange_readings" => format!("{value} sensor readings are at or beyond the input range"),
+        "temperature_rejected" => {
+            format!("{value} temperature readings are not numbers, out of range, or spikes")
+        }
+        "temperature_late" => {
+            format!("{value} temperature readings came too late for their ticks")
+        }
+        "temperature_out_of_order" => {
+            format!("{value} temperature readings are not newer than the one before")
+        }
+        _ => format!("{value} {}", name.replace('_', " ")),
+    });
+    words.collect()
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use isotherm_correction::units::Span;
+use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::UnitId;
 
 use crate::error::Error;
@@ -11,7 +11,8 @@ use crate::file::refuse_pipe;
 use crate::mapping::Mapping;
 use crate::message::Message;
 use crate::progress::Progress;
-use crate::source::{Log, LogReport, is_recording};
+use crate::recording::RecordingReader;
+use crate::source::{LogReport, Source, is_recording};
 
 /// The files of a log, and how they are read.
 #[derive(Debug, Clone)]
@@ -48,11 +49,33 @@ impl Part {
     pub fn window(&self) -> Option<(Span, Option<Span>)> {
         (self.start > Span::ZERO || self.end.is_some()).then_some((self.start, self.end))
     }
+}
 
-    /// How long it is; `None` to the end.
-    #[must_use]
-    pub fn duration(&self) -> Option<Span> {
-        self.end.map(|end| Span::from_ns(end.as_ns().saturating_sub(self.start.as_ns())))
+/// Where in the time of a part a log is that is taken tick by tick.
+///
+/// The log begins with the start of its first tick, or the time of its first temperature reading. A tick belongs to the part when it
+/// begins and ends inside.
+#[derive(Debug, Default)]
+pub(crate) struct Stretch {
+    start: Span,
+    /// `None` is the log's end.
+    end: Option<Span>,
+    /// When the log begins.
+    beginning: Option<Timestamp>,
+    /// The part is over.
+    pub(crate) over: bool,
+}
+
+impl Stretch {
+    pub(crate) fn of(part: &Part) -> Self {
+        Self { start: part.start, end: part.end, ..Self::default() }
+    }
+
+    /// Whether what began and ended then belongs to the part; notes when the part is over.
+    pub(crate) fn holds(&mut self, began: Timestamp, ended: Timestamp) -> bool {
+        let beginning = *self.beginning.get_or_insert(began);
+        self.over = self.end.is_some_and(|end| ended > beginning + end);
+        !self.over && (self.start == Span::ZERO || began >= beginning + self.start)
     }
 }
 
@@ -60,34 +83,36 @@ impl LogFiles {
     /// Opens a part of the log.
     ///
     /// A recording's time is that of reception, counted from its first message, and its messages are taken whole; chunks that
-    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::Window`].
+    /// lie before the part are passed over unread. A text log's time is that of its rows, and its ticks are taken one by one: see [`crate::text::LogReader::within`].
     ///
     /// # Errors
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
     pub fn open(&self, part: &Part) -> Result<Messages, Error> {
         let mut beginning_ns = None;
-        let (log, window) = match self {
+        let ((source, progress), window) = match self {
             Self::Recordings(paths) => {
                 let mut before_ns = 0;
                 if part.start > Span::ZERO {
-                    beginning_ns = Log::recordings(paths)?.next_message()?.map(|message| message.received_ns);
+                    let first = Source::recordings(paths, 0)?.0.next_message()?;
+                    beginning_ns = first.map(|message| message.received_ns);
                     let start_ns = u64::try_from(part.start.as_ns()).unwrap_or(0);
                     before_ns = beginning_ns.map_or(0, |beginning| beginning.saturating_add(start_ns));
                 }
-                (Log::recordings_at(paths, before_ns)?, part.window())
+                (Source::recordings(paths, before_ns)?, part.window())
             }
             Self::Text { paths, mapping, unit, batch_ticks } => {
-                (Log::text(paths, mapping, unit, *batch_ticks, part)?, None)
+                (Source::text(paths, mapping, unit, *batch_ticks, part)?, None)
             }
         };
-        Ok(Messages { log, units: part.units.clone(), window, beginning_ns, over: false })
+        Ok(Messages { source, progress, units: part.units.clone(), window, beginning_ns, over: false })
     }
 }
 
 /// The messages of a part of a log, one by one in constant memory.
 #[derive(Debug)]
 pub struct Messages {
-    log: Log,
+    source: Source,
+    progress: Progress,
     units: BTreeSet<UnitId>,
     /// Begin and end after the first message, of a recording.
     window: Option<(Span, Option<Span>)>,
@@ -101,8 +126,9 @@ impl Messages {
     /// # Errors
     /// [`Error::File`].
     pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
-        let log = Log::corrected(path, unit, part)?;
-        Ok(Self { log, units: part.units.clone(), window: None, beginning_ns: None, over: false })
+        let (source, progress) = Source::corrected(path, unit, part)?;
+        let units = part.units.clone();
+        Ok(Self { source, progress, units, window: None, beginning_ns: None, over: false })
     }
 
     /// The next message; `None` behind the last.
@@ -111,7 +137,7 @@ impl Messages {
     /// [`Error::File`] and [`Error::Log`].
     pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
         while !self.over {
-            let Some(message) = self.log.next_message()? else { break };
+            let Some(message) = self.source.next_message()? else { break };
             if self.holds(&message) {
                 return Ok(Some(message));
             }
@@ -136,18 +162,18 @@ impl Messages {
     /// How far the log has been read.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        self.log.progress()
+        self.progress.clone()
     }
 
     /// What reading came to so far.
     #[must_use]
     pub fn report(&self) -> LogReport {
-        self.log.report()
+        self.source.report()
     }
 
-    /// The log itself, for what it holds beside messages.
-    pub fn log(&mut self) -> &mut Log {
-        &mut self.log
+    /// The recordings that are read, for what they hold beside messages; `None` for a text log.
+    pub fn recording(&mut self) -> Option<&mut RecordingReader> {
+        self.source.recording()
     }
 }
 

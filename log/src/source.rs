@@ -20,7 +20,7 @@ use crate::message::{Message, Topic};
 use crate::part::Part;
 use crate::progress::Progress;
 use crate::recording::{self, RecordingReader, RecordingReport};
-use crate::text::{LogEvent, LogReader, ReadReport, Window};
+use crate::text::{LogEvent, LogReader, ReadReport};
 
 /// Whether a file is a recording; what cannot be read is not.
 #[must_use]
@@ -28,15 +28,9 @@ pub fn is_recording(path: &Path) -> bool {
     open_log(path, "open the log").is_ok_and(|file| begins_with(file, recording::MAGIC))
 }
 
-/// A log, read message by message in constant memory.
+/// What messages are read from, in constant memory.
 #[derive(Debug)]
-pub struct Log {
-    source: Source,
-    progress: Progress,
-}
-
-#[derive(Debug)]
-enum Source {
+pub(crate) enum Source {
     Recording(Box<RecordingReader>),
     Text(Box<TextLog>),
     Corrected(Box<CorrectedCsv>),
@@ -63,20 +57,13 @@ impl LogReport {
     }
 }
 
-impl Log {
-    /// Opens recordings, to be read one behind the other.
+impl Source {
+    /// Opens recordings, to be read one behind the other, for who needs no message that was received before a time: see
+    /// [`RecordingReader::open_at`].
     ///
     /// # Errors
     /// [`Error::File`].
-    pub fn recordings(paths: &[PathBuf]) -> Result<Self, Error> {
-        Self::recordings_at(paths, 0)
-    }
-
-    /// Likewise, for who needs no message that was received before a time: see [`RecordingReader::open_at`].
-    ///
-    /// # Errors
-    /// [`Error::File`].
-    pub fn recordings_at(paths: &[PathBuf], before_ns: u64) -> Result<Self, Error> {
+    pub(crate) fn recordings(paths: &[PathBuf], before_ns: u64) -> Result<(Self, Progress), Error> {
         let mut total = 0;
         for path in paths {
             let length = std::fs::metadata(path).map(|metadata| metadata.len());
@@ -84,7 +71,7 @@ impl Log {
         }
         let read = Arc::new(AtomicU64::new(0));
         let reader = RecordingReader::open_at(paths, before_ns, Arc::clone(&read))?;
-        Ok(Self { source: Source::Recording(Box::new(reader)), progress: Progress::new(read, total) })
+        Ok((Self::Recording(Box::new(reader)), Progress::new(read, total)))
     }
 
     /// Opens a part of a text log of a unit, to be put into batches of so many gyro ticks.
@@ -97,65 +84,57 @@ impl Log {
         unit: &UnitId,
         batch_ticks: usize,
         part: &Part,
-    ) -> Result<Self, Error> {
-        let events = LogReader::open(mapping, paths)?;
+    ) -> Result<(Self, Progress), Error> {
+        let events = LogReader::open(mapping, paths)?.within(part);
         let progress = events.progress();
-        let events = Window::new(events, part.start, part.duration());
         let text = TextLog { events, unit: unit.clone(), batcher: Batcher::new(batch_ticks), over: false };
-        Ok(Self { source: Source::Text(Box::new(text)), progress })
+        Ok((Self::Text(Box::new(text)), progress))
     }
 
     /// Opens a part of a CSV of corrected ticks of a unit.
     ///
     /// # Errors
     /// [`Error::File`].
-    pub(crate) fn corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
+    pub(crate) fn corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<(Self, Progress), Error> {
         let ticks = CorrectedLog::open(path, &Part { units: BTreeSet::new(), ..part.clone() }, unit)?;
         let progress = ticks.progress();
         let csv = CorrectedCsv { ticks, ready: VecDeque::new(), rows: 0 };
-        Ok(Self { source: Source::Corrected(Box::new(csv)), progress })
+        Ok((Self::Corrected(Box::new(csv)), progress))
     }
 
     /// The next message; `None` behind the last.
     ///
     /// # Errors
     /// [`Error::File`] and [`Error::Log`].
-    pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
-        match &mut self.source {
-            Source::Recording(reader) => reader.next_message(),
-            Source::Text(text) => text.next_message(),
-            Source::Corrected(csv) => csv.next_message(),
+    pub(crate) fn next_message(&mut self) -> Result<Option<Message>, Error> {
+        match self {
+            Self::Recording(reader) => reader.next_message(),
+            Self::Text(text) => text.next_message(),
+            Self::Corrected(csv) => csv.next_message(),
         }
     }
 
-    /// How far it has been read.
-    #[must_use]
-    pub fn progress(&self) -> Progress {
-        self.progress.clone()
-    }
-
     /// What reading came to so far.
-    #[must_use]
-    pub fn report(&self) -> LogReport {
-        match &self.source {
-            Source::Recording(reader) => LogReport::Recording(reader.report().clone()),
-            Source::Text(text) => LogReport::Text(text.events.inner().report()),
-            Source::Corrected(csv) => LogReport::Text(ReadReport { rows: csv.rows, ..ReadReport::default() }),
+    pub(crate) fn report(&self) -> LogReport {
+        match self {
+            Self::Recording(reader) => LogReport::Recording(reader.report().clone()),
+            Self::Text(text) => LogReport::Text(text.events.report()),
+            Self::Corrected(csv) => LogReport::Text(ReadReport { rows: csv.rows, ..ReadReport::default() }),
         }
     }
 
     /// The recordings behind it, for what they hold beside messages; `None` for a text log.
-    pub fn recording(&mut self) -> Option<&mut RecordingReader> {
-        match &mut self.source {
-            Source::Recording(reader) => Some(reader),
-            Source::Text(_) | Source::Corrected(_) => None,
+    pub(crate) fn recording(&mut self) -> Option<&mut RecordingReader> {
+        match self {
+            Self::Recording(reader) => Some(reader),
+            Self::Text(_) | Self::Corrected(_) => None,
         }
     }
 }
 
 /// Corrected ticks of a CSV, put into batches of one calibration each.
 #[derive(Debug)]
-struct CorrectedCsv {
+pub(crate) struct CorrectedCsv {
     ticks: CorrectedLog,
     ready: VecDeque<Message>,
     rows: u64,
@@ -192,8 +171,8 @@ impl CorrectedCsv {
 
 /// A text log, put into batches.
 #[derive(Debug)]
-struct TextLog {
-    events: Window<LogReader>,
+pub(crate) struct TextLog {
+    events: LogReader,
     unit: UnitId,
     batcher: Batcher,
     over: bool,

@@ -12,18 +12,20 @@ mod row;
 #[cfg(test)]
 mod tests;
 pub mod timeline;
-mod window;
 
 use std::path::{Path, PathBuf};
+use std::slice;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::unit::Event;
 use isotherm_correction::units::Timestamp;
 use serde::Serialize;
 
 use crate::error::Error;
 use crate::mapping::{Delimiter, Encoding, Mapping};
+use crate::part::{Part, Stretch};
 use crate::progress::Progress;
 use file::FileReader;
 
@@ -31,8 +33,6 @@ pub(crate) use dates::{DAY_NS, is_date, is_next_day, says_order, stamp_ns};
 pub(crate) use input::{Source as Bytes, open as open_raw};
 
 pub use error::{LogError, LogFault, Reason};
-pub(crate) use window::Stretch;
-pub use window::Window;
 
 /// Lines of a file, decompressed and decoded.
 pub(crate) fn open_decoded(path: &Path, encoding: Encoding) -> Result<input::Lines, Error> {
@@ -85,6 +85,15 @@ impl LogEvent {
         }
     }
 
+    /// When it began: the start of a tick, or the time of a reading.
+    fn began(&self) -> Timestamp {
+        match self {
+            Self::Gyro { tick, .. } => tick.end_time - tick.duration,
+            Self::Accel { tick, .. } => tick.end_time - tick.duration,
+            Self::Temperature(reading) => reading.time,
+        }
+    }
+
     /// Place among events of the same time: temperature, accelerometers, gyros.
     fn rank(&self) -> u8 {
         match self {
@@ -97,6 +106,16 @@ impl LogEvent {
     /// What events are ordered by.
     fn order(&self) -> (Timestamp, u8) {
         (self.time(), self.rank())
+    }
+}
+
+impl<'e> From<&'e LogEvent> for Event<'e> {
+    fn from(event: &'e LogEvent) -> Self {
+        match event {
+            LogEvent::Gyro { output, tick } => Self::Gyro { output: *output, ticks: slice::from_ref(tick) },
+            LogEvent::Accel { output, tick } => Self::Accel { output: *output, ticks: slice::from_ref(tick) },
+            LogEvent::Temperature(reading) => Self::Temperature(slice::from_ref(reading)),
+        }
     }
 }
 
@@ -156,6 +175,8 @@ pub struct LogReader {
     files: Vec<(FileReader, Option<LogEvent>)>,
     /// Where they are.
     paths: Vec<PathBuf>,
+    /// The part of its time that is given.
+    part: Stretch,
     /// How far it has been read.
     progress: Progress,
     /// The next events have been asked for.
@@ -180,7 +201,14 @@ impl LogReader {
             total += size;
             files.push((FileReader::new(path, source, mapping)?, None));
         }
-        Ok(Self { files, paths, progress: Progress::new(read, total), primed: false, failed: false })
+        let (part, progress) = (Stretch::default(), Progress::new(read, total));
+        Ok(Self { files, paths, part, progress, primed: false, failed: false })
+    }
+
+    /// The same log, of which a part of the time is given.
+    #[must_use]
+    pub fn within(self, part: &Part) -> Self {
+        Self { part: Stretch::of(part), ..self }
     }
 
     /// Its files.
@@ -229,12 +257,15 @@ impl Iterator for LogReader {
     type Item = Result<LogEvent, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.failed {
-            return None;
+        while !self.failed && !self.part.over {
+            let event = self.merge();
+            self.failed = event.is_err();
+            match event.transpose()? {
+                Ok(event) if !self.part.holds(event.began(), event.time()) => {}
+                event => return Some(event),
+            }
         }
-        let event = self.merge();
-        self.failed = event.is_err();
-        event.transpose()
+        None
     }
 }
 

@@ -2,12 +2,13 @@
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::units::{Span, Timestamp};
+use isotherm_log::mapping::SensorUnit;
 use isotherm_log::ros2::{CdrError, Imu, Temperature, Time, from_cdr};
 use isotherm_log::text::timeline::{Timeline, Timing};
 use thiserror::Error;
 
 use crate::attachment::{Attachment, AttachmentError};
-use crate::mapping::{SensorsMapping, UnitMapping};
+use crate::mapping::UnitMapping;
 use crate::name::Gid;
 
 /// Messages in a row that must contradict what came before until they are believed.
@@ -137,7 +138,7 @@ impl Feeder {
     /// Has taken nothing yet.
     #[must_use]
     pub fn new(mapping: &UnitMapping) -> Self {
-        let timeline = Timeline::new(&mapping.time);
+        let timeline = Timeline::new(&mapping.time.to_time());
         Self { mapping: mapping.clone(), timeline, last: None, gone: false, contradicting: 0 }
     }
 
@@ -169,15 +170,17 @@ impl Feeder {
         }
         let rates = <[f64; 3]>::from(angular_velocity);
         let forces = <[f64; 3]>::from(linear_acceleration);
-        let accel = self.mapping.accel.filter(|_| !is_missing(&linear_acceleration_covariance));
-        if !fits(self.mapping.gyro, rates) || accel.is_some_and(|accel| !fits(accel, forces)) {
+        let gyro = self.mapping.gyro.unit;
+        let accel = self.mapping.accel.map(|accel| accel.unit);
+        let accel = accel.filter(|_| !is_missing(&linear_acceleration_covariance));
+        if !fits(gyro, rates) || accel.is_some_and(|accel| !fits(accel, forces)) {
             return Err(Refusal::NotCounts);
         }
 
         let last = self.follows(&attachment, stamp)?;
         let restart = last.is_none();
         if restart {
-            self.timeline = Timeline::new(&self.mapping.time);
+            self.timeline = Timeline::new(&self.mapping.time.to_time());
         }
         // What was lost on the way is missing by number, what the driver never sent by time.
         let missing = last.map_or(0, |last| {
@@ -188,19 +191,19 @@ impl Feeder {
         let timing = self.timeline.tick(stamp, Some(tick), None);
         let deviation_ns = last
             .filter(|_| missing == 0)
-            .map(|last| stamp.saturating_sub(last.stamp).saturating_sub(self.mapping.tick.as_ns()));
+            .map(|last| stamp.saturating_sub(last.stamp).saturating_sub(self.mapping.time.tick().as_ns()));
         self.last = Some(Last { gid: attachment.gid, sequence: attachment.sequence, stamp, tick });
         (self.gone, self.contradicting) = (false, 0);
         let Timing { sequence, end_ns, duration } = timing;
         let end_time = Timestamp::from_ns(end_ns);
         let accel = accel.map(|accel| {
             let readings = readings(accel, forces, duration).collect();
-            (accel.output, AccelTick { sequence, end_time, duration, readings })
+            (output(accel), AccelTick { sequence, end_time, duration, readings })
         });
-        let readings = readings(self.mapping.gyro, rates, duration).collect();
+        let readings = readings(gyro, rates, duration).collect();
         Ok(Ticks {
             restart,
-            output: self.mapping.gyro.output,
+            output: output(gyro),
             gyro: GyroTick { sequence, end_time, duration, readings, ..GyroTick::default() },
             accel,
             frame_id: header.frame_id,
@@ -268,19 +271,25 @@ fn is_missing(covariance: &[f64; 9]) -> bool {
     covariance.first().is_some_and(|first| first.total_cmp(&-1.0).is_eq())
 }
 
-/// Whether readings that the mapping says to be counts are whole numbers of 32 bits.
-fn fits(mapping: SensorsMapping, readings: [f64; 3]) -> bool {
-    let is_count =
-        |reading: f64| reading.fract().abs().total_cmp(&0.0).is_eq() && reading.abs() <= f64::from(i32::MAX);
-    mapping.output == OutputKind::Mean || readings.into_iter().all(is_count)
+/// What readings in a unit stand for.
+fn output(unit: impl SensorUnit) -> OutputKind {
+    if unit.in_si().is_none() { OutputKind::Counts } else { OutputKind::Mean }
 }
 
-fn readings(mapping: SensorsMapping, values: [f64; 3], duration: Span) -> impl Iterator<Item = f64> {
-    let SensorsMapping { output, conversion, .. } = mapping;
-    values.into_iter().map(move |value| match output {
-        OutputKind::Counts => value,
-        OutputKind::Mean if conversion.per_tick => conversion.of(value) / duration.as_s(),
-        OutputKind::Mean => conversion.of(value),
+/// Whether readings that the mapping says to be counts are whole numbers of 32 bits.
+fn fits(unit: impl SensorUnit, readings: [f64; 3]) -> bool {
+    let is_count =
+        |reading: f64| reading.fract().abs().total_cmp(&0.0).is_eq() && reading.abs() <= f64::from(i32::MAX);
+    output(unit) == OutputKind::Mean || readings.into_iter().all(is_count)
+}
+
+/// Readings in SI units, increments divided by the duration of their tick.
+fn readings(unit: impl SensorUnit, values: [f64; 3], duration: Span) -> impl Iterator<Item = f64> {
+    let in_si = unit.in_si();
+    values.into_iter().map(move |value| match in_si {
+        None => value,
+        Some((factor, false)) => value * factor,
+        Some((factor, true)) => value * factor / duration.as_s(),
     })
 }
 

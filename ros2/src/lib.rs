@@ -37,9 +37,9 @@ pub mod noise;
 pub mod outgoing;
 pub mod qos;
 pub mod session;
-pub mod totals;
 #[cfg(test)]
-mod vectors;
+mod tests;
+pub mod totals;
 
 pub use bridge::Bridge;
 pub use error::Error;

@@ -153,6 +153,4 @@ fn plain(chunk: &str) -> String {
 }
 
 #[cfg(test)]
-mod hiroz;
-#[cfg(test)]
 mod tests;

@@ -39,9 +39,9 @@ impl Noise {
             let slow = square(drift.initial_sigma_rad_per_s) + square(drift.sigma_rad_per_s);
             Some((square(drift.angle_random_walk_rad_per_sqrt_s), slow))
         });
-        let otherwise = mapping.gyro.random_walk.map(|walk| (square(walk), 0.0));
+        let otherwise = mapping.gyro.random_walk().map(|walk| (square(walk), 0.0));
         let gyro: Option<Vec<_>> = stated.map(|stated| stated.or(otherwise)).collect();
-        let accel = parts.accel_orientation.zip(mapping.accel.and_then(|accel| accel.random_walk));
+        let accel = parts.accel_orientation.zip(mapping.accel.and_then(|accel| accel.random_walk()));
         Self {
             digest,
             gyro: gyro.and_then(|noise| Resolved::new(&parts.gyro_orientation, noise)),

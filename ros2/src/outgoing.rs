@@ -33,7 +33,7 @@ pub fn message(
     if tick.duration.as_ns() <= 0 {
         return Err(Unstated::Time);
     }
-    let marked = match mapping.time.marks {
+    let marked = match mapping.time.stamp {
         Marks::End => tick.end_time,
         Marks::Start => tick.end_time - tick.duration,
     };

@@ -7,16 +7,17 @@
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::slice;
 use std::time::{Duration, Instant};
 
 use isotherm_bus::session::set;
 use isotherm_bus::{Consumer, Producer, ProducerOptions, SessionOptions, close, open, open_config};
 use isotherm_correction::sample::{CorrectedTick, OutputKind};
-use isotherm_correction::unit::UnitSettings;
-use isotherm_log::offline::{Offline, load_calibration};
+use isotherm_correction::unit::{Event, UnitSettings};
+use isotherm_log::offline::load_calibration;
 use isotherm_log::ros2::{Header, Imu, Temperature, from_cdr, time, to_cdr};
-use isotherm_log::text::LogEvent;
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::stream::UnitStream;
 use isotherm_ros::attachment::Attachment;
 use isotherm_ros::interface::{
     DIAGNOSTICS, DiagnosticArray, IMU, Interface, Level, TEMPERATURE, TRIGGER, TriggerRequest,
@@ -257,14 +258,14 @@ fn message(step: &Step) -> Imu {
 
 /// What `isotherm-replay correct` makes of the same readings: its own code. Durations are those between stamps.
 struct Correct {
-    offline: Offline,
+    offline: UnitStream,
     last_ns: Option<i64>,
 }
 
 impl Correct {
     fn new(folder: &Path) -> Self {
         let loaded = load_calibration(&folder.join("units").join(format!("{UNIT}.toml"))).unwrap();
-        Self { offline: Offline::new(&loaded, UnitSettings::default()), last_ns: None }
+        Self { offline: loaded.stream(UnitSettings::default()), last_ns: None }
     }
 
     fn take(&mut self, step: &Step) -> Vec<CorrectedTick> {
@@ -273,16 +274,16 @@ impl Correct {
             isotherm_correction::units::Span::from_ns(end - self.last_ns.unwrap_or(end - 10_000_000));
         self.last_ns = Some(end);
         for reading in &step.temperatures {
-            self.offline.handle(&LogEvent::Temperature(*reading));
+            self.offline.handle(Event::Temperature(slice::from_ref(reading)));
         }
         if let Some(tick) = step.accel.clone() {
             let tick =
                 isotherm_correction::sample::AccelTick { duration, end_time: step.gyro.end_time, ..tick };
-            self.offline.handle(&LogEvent::Accel { output: OutputKind::Mean, tick });
+            self.offline.handle(Event::Accel { output: OutputKind::Mean, ticks: &[tick] });
         }
         let tick = isotherm_correction::sample::GyroTick { duration, ..step.gyro.clone() };
-        self.offline.handle(&LogEvent::Gyro { output: OutputKind::Mean, tick });
-        self.offline.take()
+        self.offline.handle(Event::Gyro { output: OutputKind::Mean, ticks: &[tick] });
+        self.offline.take_ready()
     }
 }
 
@@ -343,8 +344,8 @@ async fn imu_messages_come_back_corrected_to_the_bit_and_none_is_lost() {
             received.push(corrected.imu().await);
         }
     }
-    correct.offline.finish();
-    expected.extend(correct.offline.take());
+    correct.offline.flush();
+    expected.extend(correct.offline.take_ready());
     while received.len() < messages {
         received.push(corrected.imu().await);
     }

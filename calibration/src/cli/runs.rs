@@ -8,7 +8,6 @@ use isotherm_correction::units::Span;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part, are_recordings};
-use isotherm_log::source::Log;
 use isotherm_protocol::key::UnitId;
 
 use crate::document::{name_of, recordings_in};
@@ -137,7 +136,7 @@ impl Reading {
             Some(unit) => drop(of_units.insert(unit, files.clone())),
             None => {
                 for file in files {
-                    let mut log = Log::recordings(std::slice::from_ref(file))?;
+                    let mut log = LogFiles::Recordings(vec![file.clone()]).open(&Part::default())?;
                     let (units, cut) = units_of(&mut log)?;
                     if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
                         return Err(Error::refused(format!("no raw readings can be read: {cut}")));

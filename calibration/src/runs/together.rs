@@ -5,8 +5,9 @@ use std::slice;
 
 use isotherm_correction::sample::{CorrectedTick, GyroTick, OutputKind};
 use isotherm_correction::unit::{Unit, UnitSettings};
-use isotherm_log::offline::{Loaded, Offline};
+use isotherm_log::offline::{Loaded, troubles};
 use isotherm_log::text::LogEvent;
+use isotherm_protocol::stream::UnitStream;
 
 use super::series::Series;
 use super::{Fed, Run, Troubles};
@@ -72,22 +73,23 @@ impl Run {
             match fed {
                 fed if !has_accelerometers && fed.is_accel() => {}
                 Fed::Event(event) => units.handle(&self.taken(&self.kept(event))),
-                Fed::Frame(input, frame) => {
-                    units.units.iter_mut().for_each(|unit| unit.receive(input, frame));
-                }
+                Fed::Frame(input, frame) => units.units.iter_mut().for_each(|unit| {
+                    // One that cannot be read is counted, and its ticks are a gap.
+                    let _ = unit.receive(input, frame);
+                }),
             }
             units.give_out(&mut each);
             Ok(())
         })?;
-        units.units.iter_mut().for_each(Offline::finish);
+        units.units.iter_mut().for_each(UnitStream::flush);
         units.give_out(&mut each);
-        units.units.iter().map(|unit| self.judge_troubles(units.count, unit.troubles())).collect()
+        units.units.iter().map(|unit| self.judge_troubles(units.count, troubles(unit))).collect()
     }
 }
 
 /// Units that are fed with the same readings.
 struct Together {
-    units: Vec<Offline>,
+    units: Vec<UnitStream>,
     raw: VecDeque<GyroTick>,
     corrected: Vec<VecDeque<CorrectedTick>>,
     count: u64,
@@ -95,7 +97,7 @@ struct Together {
 
 impl Together {
     fn new(loaded: &[Loaded]) -> Self {
-        let unit = |loaded| Offline::new(loaded, UnitSettings::default());
+        let unit = |loaded: &Loaded| loaded.stream(UnitSettings::default());
         let corrected = vec![VecDeque::new(); loaded.len()];
         Self { units: loaded.iter().map(unit).collect(), raw: VecDeque::new(), corrected, count: 0 }
     }
@@ -104,13 +106,13 @@ impl Together {
         if let LogEvent::Gyro { tick, .. } = event {
             self.raw.push_back(tick.clone());
         }
-        self.units.iter_mut().for_each(|unit| unit.handle(event));
+        self.units.iter_mut().for_each(|unit| unit.handle(event.into()));
     }
 
     /// Gives out what all of them have.
     fn give_out(&mut self, mut each: impl FnMut(&GyroTick, &[CorrectedTick], &Unit)) {
         for (unit, ticks) in self.units.iter_mut().zip(&mut self.corrected) {
-            ticks.extend(unit.take());
+            ticks.extend(unit.take_ready());
         }
         while self.corrected.iter().all(|ticks| !ticks.is_empty()) {
             let ticks: Vec<CorrectedTick> =

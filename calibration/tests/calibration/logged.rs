@@ -6,9 +6,10 @@ use isotherm_calibration::document::Written;
 use isotherm_calibration::runs::Run;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::rows::{write_header, write_tick};
-use isotherm_log::offline::{Offline, unit_id};
+use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
+use isotherm_protocol::stream::UnitStream;
 use serde_json::Value;
 
 use crate::command::{calibrate, json, shipped};
@@ -27,13 +28,13 @@ fn logs(folder: &Path) -> [String; 3] {
     run.correct_with_series(&loaded, |tick| write_tick(&mut csv, tick).unwrap()).1.unwrap();
     std::fs::write(path("corrected.csv"), csv).unwrap();
     // As the service records what it publishes.
-    let mut stream = Offline::new(&loaded, isotherm_correction::unit::UnitSettings::default());
+    let mut stream = loaded.stream(isotherm_correction::unit::UnitSettings::default());
     let mut reader = RecordingReader::open(std::slice::from_ref(&raw), std::sync::Arc::default()).unwrap();
     let mut writer = RecordingWriter::create(&path("corrected.mcap"), RecordingOptions::default()).unwrap();
     let mut received_ns = 0;
-    let mut give_out = |stream: &mut Offline, received_ns: u64| {
+    let mut give_out = |stream: &mut UnitStream, received_ns: u64| {
         let mut frame = Vec::new();
-        while stream.next_frame(&mut frame) {
+        while stream.next_frame(&mut frame).is_some() {
             let topic = Topic::Corrected(unit.clone());
             writer.write(&Message { topic, received_ns, frame: std::mem::take(&mut frame) }).unwrap();
         }
@@ -41,10 +42,10 @@ fn logs(folder: &Path) -> [String; 3] {
     while let Some(message) = reader.next_message().unwrap() {
         let Topic::Raw(_, input) = message.topic else { continue };
         received_ns = message.received_ns;
-        stream.receive(input, &message.frame);
+        stream.receive(input, &message.frame).unwrap();
         give_out(&mut stream, received_ns);
     }
-    stream.finish();
+    stream.flush();
     give_out(&mut stream, received_ns);
     writer.finish().unwrap();
     [raw, path("corrected.csv"), path("corrected.mcap")].map(|path| path.display().to_string())

@@ -10,7 +10,6 @@ use isotherm_calibration::fits::positions::times::Times;
 use isotherm_calibration::fits::positions::track::Track;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
-use isotherm_log::offline::Offline;
 use isotherm_protocol::document::{Curve, OrientationThermal, Shape};
 use nalgebra::DVector;
 
@@ -217,14 +216,14 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
     }
     // The same through the corrector once more, tick by tick.
     for (judgement, (pose, position)) in judged.iter().zip(&found.poses) {
-        let mut unit = Offline::new(&written.loaded, UnitSettings::default());
+        let mut unit = written.loaded.stream(UnitSettings::default());
         let mut ticks = Vec::new();
         for event in &logs[pose.run] {
-            unit.handle(event);
-            ticks.extend(unit.take());
+            unit.handle(event.into());
+            ticks.extend(unit.take_ready());
         }
-        unit.finish();
-        ticks.extend(unit.take());
+        unit.flush();
+        ticks.extend(unit.take_ready());
         let own = &ticks[pose.interval.first..pose.interval.end];
         let seconds: f64 = own.iter().map(|tick| tick.duration.as_s()).sum();
         let up = plan.up(&plan.positions[*position].attitude, errors);

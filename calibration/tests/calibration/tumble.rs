@@ -15,7 +15,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::Topic;
-use isotherm_log::offline::{Offline, unit_id};
+use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_protocol::document::{AccelOutput, Document, Shape};
 use isotherm_simulator::instrument::{Gyros, Instrument};
@@ -138,16 +138,16 @@ fn through_the_service(written: &Written, files: &[PathBuf; 2], mapping: &Path, 
     let mapping = Box::new(Mapping::load(mapping).unwrap());
     let files = LogFiles::Text { paths: files.to_vec(), mapping, unit, batch_ticks: 100 };
     let mut messages = files.open(&Part::default()).unwrap();
-    let mut offline = Offline::new(&written.loaded, UnitSettings::default());
+    let mut offline = written.loaded.stream(UnitSettings::default());
     let mut ticks = Vec::new();
     while let Some(message) = messages.next_message().unwrap() {
         if let Topic::Raw(_, input) = &message.topic {
-            offline.receive(*input, &message.frame);
-            ticks.extend(offline.take());
+            offline.receive(*input, &message.frame).unwrap();
+            ticks.extend(offline.take_ready());
         }
     }
-    offline.finish();
-    ticks.extend(offline.take());
+    offline.flush();
+    ticks.extend(offline.take_ready());
     let first_ns = ticks[0].end_time.as_ns() - ticks[0].duration.as_ns();
     let rows = poses["rows"].as_array().unwrap();
     let number = |cell: &Value| -> f64 { cell.as_str().unwrap().parse().unwrap() };

@@ -53,14 +53,7 @@ impl Sensors {
 }
 
 /// A gyro tick.
-pub(super) fn gyro(
-    row: &mut Row<'_>,
-    sensors: Sensors,
-    received_ns: u64,
-    output: OutputKind,
-    tick: &GyroTick,
-) {
-    row.full("received_ns", U64, received_ns);
+pub(super) fn gyro(row: &mut Row<'_>, sensors: Sensors, output: OutputKind, tick: &GyroTick) {
     row.full("sequence", U64, tick.sequence);
     row.full("series", U64, tick.series);
     row.full("end_time_ns", I64, tick.end_time.as_ns());
@@ -78,14 +71,7 @@ pub(super) fn gyro(
 }
 
 /// An accelerometer tick.
-pub(super) fn accel(
-    row: &mut Row<'_>,
-    sensors: Sensors,
-    received_ns: u64,
-    output: OutputKind,
-    tick: &AccelTick,
-) {
-    row.full("received_ns", U64, received_ns);
+pub(super) fn accel(row: &mut Row<'_>, sensors: Sensors, output: OutputKind, tick: &AccelTick) {
     row.full("sequence", U64, tick.sequence);
     row.full("end_time_ns", I64, tick.end_time.as_ns());
     row.full("duration_ns", U64, length_ns(tick.duration));
@@ -95,20 +81,17 @@ pub(super) fn accel(
 /// A reading of a temperature, or of the instrument's health: what its name and its value are called, and are.
 pub(super) fn reading(
     row: &mut Row<'_>,
-    received_ns: u64,
     time_ns: i64,
     (name, of): (&str, &str),
     (value, reading): (&str, f64),
 ) {
-    row.full("received_ns", U64, received_ns);
     row.full("time_ns", I64, time_ns);
     row.full(name, Kind::Text, of);
     row.full(value, Kind::Double, reading);
 }
 
 /// A reference.
-pub(super) fn reference(row: &mut Row<'_>, received_ns: u64, reference: &Reference) {
-    row.full("received_ns", U64, received_ns);
+pub(super) fn reference(row: &mut Row<'_>, reference: &Reference) {
     row.full("start_ns", I64, reference.start_ns);
     row.full("end_ns", I64, reference.end_ns);
     axes(row, "angular_rate", "rad_per_s", reference.angular_rate_rad_per_s);
@@ -116,14 +99,7 @@ pub(super) fn reference(row: &mut Row<'_>, received_ns: u64, reference: &Referen
 }
 
 /// A corrected tick.
-pub(super) fn corrected(
-    row: &mut Row<'_>,
-    shape: CorrectedShape,
-    received_ns: u64,
-    revision: Revision,
-    tick: &CorrectedTick,
-) {
-    row.full("received_ns", U64, received_ns);
+pub(super) fn corrected(row: &mut Row<'_>, shape: CorrectedShape, revision: Revision, tick: &CorrectedTick) {
     row.full("sequence", U64, tick.sequence);
     row.full("end_time_ns", I64, tick.end_time.as_ns());
     row.full("duration_ns", U64, length_ns(tick.duration));
@@ -158,8 +134,7 @@ pub(super) fn corrected(
 }
 
 /// A channel's temperature as it was applied up to a tick.
-pub(super) fn applied(row: &mut Row<'_>, received_ns: u64, end_time_ns: i64, applied: &AppliedTemperature) {
-    row.full("received_ns", U64, received_ns);
+pub(super) fn applied(row: &mut Row<'_>, end_time_ns: i64, applied: &AppliedTemperature) {
     row.full("end_time_ns", I64, end_time_ns);
     row.full("channel", Kind::Text, applied.channel.as_str());
     row.full("temperature_deg_c", Kind::Double, applied.temperature_deg_c);
@@ -167,12 +142,11 @@ pub(super) fn applied(row: &mut Row<'_>, received_ns: u64, end_time_ns: i64, app
 }
 
 /// A status: the state's name, and all of it as JSON.
-pub(super) fn status(row: &mut Row<'_>, received_ns: u64, status: &serde_json::Value) {
+pub(super) fn status(row: &mut Row<'_>, status: &serde_json::Value) {
     let state = status.get("state").map_or(String::new(), |state| match state.as_str() {
         Some(word) => word.to_owned(),
         None => state.to_string(),
     });
-    row.full("received_ns", U64, received_ns);
     row.full("state", Kind::Text, &*state);
     row.full("status", Kind::Json, &*status.to_string());
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use isotherm_protocol::key::UnitId;
 
 use super::rows::{self, Sensors};
-use super::table::{Row, Table};
+use super::table::{Row, Table, U64};
 use crate::Written;
 use isotherm_log::error::Error;
 use isotherm_log::streams::contents::{CorrectedShape, Shapes, UnitContents};
@@ -67,53 +67,54 @@ impl UnitTables {
     pub(crate) fn take(&mut self, received_ns: u64, decoded: &Decoded) -> Result<bool, Error> {
         let Self { gyros, accels, shape, .. } = *self;
         match decoded {
-            Decoded::Gyro(batch) => self.write("raw_gyro", &batch.ticks, |row, tick| {
-                rows::gyro(row, gyros, received_ns, batch.output, tick);
+            Decoded::Gyro(batch) => self.write(received_ns, "raw_gyro", &batch.ticks, |row, tick| {
+                rows::gyro(row, gyros, batch.output, tick);
             })?,
-            Decoded::Accel(batch) => self.write("raw_accel", &batch.ticks, |row, tick| {
-                rows::accel(row, accels, received_ns, batch.output, tick);
+            Decoded::Accel(batch) => self.write(received_ns, "raw_accel", &batch.ticks, |row, tick| {
+                rows::accel(row, accels, batch.output, tick);
             })?,
             Decoded::Temperature(batch) => {
-                self.write("raw_temperature", &batch.readings, |row, reading| {
+                self.write(received_ns, "raw_temperature", &batch.readings, |row, reading| {
                     let (name, value) = (("channel", reading.channel.as_str()), ("raw", reading.raw));
-                    rows::reading(row, received_ns, reading.time.as_ns(), name, value);
+                    rows::reading(row, reading.time.as_ns(), name, value);
                 })?;
             }
             Decoded::Health(batch) => {
                 let readings =
                     batch.ticks.iter().flat_map(|tick| tick.readings.iter().map(|of| (tick.time_ns, of)));
-                self.write("raw_health", readings, |row, (time_ns, reading)| {
+                self.write(received_ns, "raw_health", readings, |row, (time_ns, reading)| {
                     let (name, value) = (("name", reading.name.as_str()), ("value", reading.value));
-                    rows::reading(row, received_ns, time_ns, name, value);
+                    rows::reading(row, time_ns, name, value);
                 })?;
             }
-            Decoded::Reference(reference) => self.write("reference", [reference], |row, reference| {
-                rows::reference(row, received_ns, reference);
-            })?,
+            Decoded::Reference(reference) => {
+                self.write(received_ns, "reference", [reference], rows::reference)?;
+            }
             Decoded::Corrected(batch) => {
-                self.write("corrected", &batch.ticks, |row, tick| {
-                    rows::corrected(row, shape, received_ns, batch.revision, tick);
+                self.write(received_ns, "corrected", &batch.ticks, |row, tick| {
+                    rows::corrected(row, shape, batch.revision, tick);
                 })?;
                 let last = batch.ticks.last().map(|last| last.end_time.as_ns());
                 let applied =
                     last.into_iter().flat_map(|end| batch.temperatures.iter().map(move |t| (end, t)));
-                self.write("applied_temperature", applied, |row, (end_ns, applied)| {
-                    rows::applied(row, received_ns, end_ns, applied);
+                self.write(received_ns, "applied_temperature", applied, |row, (end_ns, applied)| {
+                    rows::applied(row, end_ns, applied);
                 })?;
             }
             Decoded::Status(status) => {
                 // Plain structures of numbers and texts always serialise.
                 let status = serde_json::to_value(status).unwrap_or_default();
-                self.write("status", [status], |row, status| rows::status(row, received_ns, &status))?;
+                self.write(received_ns, "status", [status], |row, status| rows::status(row, &status))?;
             }
             Decoded::Journal => return Ok(false),
         }
         Ok(true)
     }
 
-    /// A row for each item, where the log has the stream.
+    /// A row for each item, where the log has the stream; each begins with the time of reception.
     fn write<T>(
         &mut self,
+        received_ns: u64,
         stream: &str,
         items: impl IntoIterator<Item = T>,
         row: impl Fn(&mut Row<'_>, T),
@@ -121,7 +122,12 @@ impl UnitTables {
         let Some((_, table)) = self.tables.iter_mut().find(|(name, _)| *name == stream) else {
             return Ok(());
         };
-        items.into_iter().try_for_each(|item| table.push(|cells| row(cells, item)))
+        items.into_iter().try_for_each(|item| {
+            table.push(|cells| {
+                cells.full("received_ns", U64, received_ns);
+                row(cells, item);
+            })
+        })
     }
 
     /// Ends the files; gives each stream with its rows.

@@ -16,12 +16,12 @@ use crate::file::begins_with;
 use crate::message::{Message, Topic};
 use crate::offline::rows::{FIRST_COLUMNS, read_tick};
 use crate::offline::unit_id;
-use crate::part::{LogFiles, Messages, Part};
+use crate::part::{LogFiles, Messages, Part, Stretch};
 use crate::progress::Progress;
 use crate::recording::RecordingReport;
 use crate::replica::{entry_words, join};
 use crate::source::{LogReport, is_recording};
-use crate::text::{Bytes, Stretch, open_raw};
+use crate::text::{Bytes, open_raw};
 
 /// Rows of a CSV that are read together.
 const ROWS: usize = 512;
@@ -98,7 +98,7 @@ impl CorrectedLog {
             };
             (source, Progress::new(read, length))
         };
-        let part = Stretch::new(part.start, part.duration());
+        let part = Stretch::of(part);
         Ok(Self { path: path.to_owned(), source, part, progress })
     }
 

@@ -244,7 +244,7 @@ impl Figures {
             if !begun || comment || line.trim().is_empty() {
                 continue;
             }
-            let mut cells = cells(&line, found.split_at);
+            let mut cells = cells(&line, found.delimiter);
             if select.is_some_and(|(column, value)| cells.get(column).is_none_or(|cell| cell != value)) {
                 continue;
             }
@@ -275,7 +275,7 @@ impl Figures {
 /// Median of the size of the vectors that three columns hold in the first rows.
 pub(super) fn usual_size(found: &Found, columns: [usize; 3]) -> Option<f64> {
     let size = |line: &String| {
-        let cells = cells(line, found.split_at);
+        let cells = cells(line, found.delimiter);
         let numbers = columns.map(|column| parse_float(cells.get(column)?, found.decimal_mark));
         let sum: Option<f64> = numbers.into_iter().map(|number| number.map(|number| number * number)).sum();
         sum.map(f64::sqrt)

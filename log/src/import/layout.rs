@@ -18,22 +18,15 @@ const SAMPLE_LINES: usize = 600;
 const MOST_ODD: usize = 10;
 /// Prefixes of lines that are no data.
 const COMMENTS: [&str; 5] = ["//", "#", "%", ";", "!"];
-/// Delimiters in the order in which they are preferred, as the mapping spells them.
-const DELIMITERS: [(&str, Delimiter); 5] = [
-    ("tab", Delimiter::Character(b'\t')),
-    ("semicolon", Delimiter::Character(b';')),
-    ("comma", Delimiter::Character(b',')),
-    ("pipe", Delimiter::Character(b'|')),
-    ("whitespace", Delimiter::Whitespace),
-];
+/// Delimiters in the order in which they are preferred.
+const DELIMITERS: [Delimiter; 5] =
+    [Delimiter::Tab, Delimiter::Semicolon, Delimiter::Comma, Delimiter::Pipe, Delimiter::Whitespace];
 
 /// What was found of a file's form.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     pub(super) encoding: Encoding,
-    /// As the mapping spells it.
-    pub(super) delimiter: &'static str,
-    pub(super) split_at: Delimiter,
+    pub(super) delimiter: Delimiter,
     pub(super) decimal_mark: u8,
     pub(super) comment: Option<&'static str>,
     pub(super) skip_lines: usize,
@@ -71,19 +64,15 @@ pub(super) fn find(path: &Path, hints: &Hints) -> Result<Found, Error> {
             "is a NovAtel ASCII log, whose last cell carries a checksum: convert it to CSV first (NovAtel Convert, `RAWIMU` to ASCII columns)",
         ));
     }
-    let delimiters: Vec<_> = match &hints.delimiter {
-        Some(word) => DELIMITERS.into_iter().filter(|(name, _)| name == word).collect(),
-        None => DELIMITERS.to_vec(),
-    };
+    let delimiters = hints.delimiter.map_or(DELIMITERS.to_vec(), |delimiter| vec![delimiter]);
     let marks = match hints.decimal_mark {
         Some(',') => vec![b','],
         Some(_) => vec![b'.'],
         None => vec![b'.', b','],
     };
     let both = delimiters.into_iter().flat_map(|split| marks.iter().map(move |mark| (split, *mark)));
-    let apart = both.filter(|((_, delimiter), mark)| *delimiter != Delimiter::Character(*mark));
-    let best =
-        apart.filter_map(|((name, delimiter), mark)| block(&lines, name, delimiter, mark)).reduce(better);
+    let apart = both.filter(|(delimiter, mark)| delimiter.byte() != Some(*mark));
+    let best = apart.filter_map(|(delimiter, mark)| block(&lines, delimiter, mark)).reduce(better);
     let (_, block) = best.ok_or_else(|| {
         refuse(path, format!("no rows of numbers in the first {} lines: is it a text log?", lines.len()))
     })?;
@@ -96,7 +85,6 @@ type Score = (usize, usize);
 /// The longest run of rows of numbers.
 #[derive(Debug, Clone, Copy)]
 struct Block {
-    name: &'static str,
     delimiter: Delimiter,
     mark: u8,
     start: usize,
@@ -109,7 +97,7 @@ fn better(first: (Score, Block), second: (Score, Block)) -> (Score, Block) {
 }
 
 /// The longest run of lines that are rows of numbers of one width.
-fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -> Option<(Score, Block)> {
+fn block(lines: &[String], delimiter: Delimiter, mark: u8) -> Option<(Score, Block)> {
     // Where a run begins, its width, its rows, and the sum of their shares of numbers.
     let mut runs: Vec<(usize, usize, usize, usize)> = Vec::new();
     let mut goes_on = false;
@@ -129,7 +117,7 @@ fn block(lines: &[String], name: &'static str, delimiter: Delimiter, mark: u8) -
     }
     let scored = runs
         .into_iter()
-        .map(|(start, width, rows, sum)| ((rows, sum / rows), Block { name, delimiter, mark, start, width }));
+        .map(|(start, width, rows, sum)| ((rows, sum / rows), Block { delimiter, mark, start, width }));
     scored.reduce(better)
 }
 
@@ -148,7 +136,7 @@ fn numeric(line: &str, delimiter: Delimiter, mark: u8) -> Option<(usize, usize)>
 
 /// Adds what stands before the rows.
 fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
-    let Block { name, delimiter, mark, start, width } = block;
+    let Block { delimiter, mark, start, width } = block;
     let before: Vec<&String> = lines.iter().take(start).filter(|line| !line.trim().is_empty()).collect();
     let wordy = |cells: &[String]| {
         let words = cells
@@ -204,8 +192,7 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
     let date_and_time = date_and_time(&rows, delimiter, comment);
     Found {
         encoding,
-        delimiter: name,
-        split_at: delimiter,
+        delimiter,
         decimal_mark: mark,
         comment,
         skip_lines,
@@ -256,8 +243,7 @@ fn odd_rows(rows: &[String], delimiter: Delimiter, mark: u8) -> usize {
 
 /// Prefixes that comments may have: a line that begins with the delimiter is a row whose first cell is empty.
 fn comments(delimiter: Delimiter) -> impl Iterator<Item = &'static str> {
-    let splits =
-        move |prefix: &str| matches!(delimiter, Delimiter::Character(byte) if prefix.as_bytes() == [byte]);
+    let splits = move |prefix: &str| delimiter.byte().is_some_and(|byte| prefix.as_bytes() == [byte]);
     COMMENTS.into_iter().filter(move |prefix| !splits(prefix))
 }
 

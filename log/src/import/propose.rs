@@ -132,9 +132,10 @@ impl<'a> File<'a> {
         let Found { encoding, delimiter, decimal_mark, .. } = self.found;
         let header = if self.found.header.is_some() { "a header" } else { "no header" };
         proposal.notes.push(format!(
-            "{}: {}, {delimiter}, decimal mark {:?}, {header}, {} columns, {} rows",
+            "{}: {}, {}, decimal mark {:?}, {header}, {} columns, {} rows",
             self.name,
             encoding.word(),
+            delimiter.word(),
             char::from(*decimal_mark),
             self.found.width,
             self.figures.rows

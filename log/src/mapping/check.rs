@@ -30,7 +30,7 @@ pub(super) fn check(r: &mut Reader<'_>, Mapping { files, .. }: &Mapping) {
 
 fn check_file(r: &mut Reader<'_>, path: &str, file: &FileMapping) {
     let (delimiter, gyro, accel) = (file.layout.delimiter, file.gyro.as_ref(), file.accel.as_ref());
-    if delimiter == Delimiter::Character(file.layout.decimal_mark as u8) {
+    if delimiter.byte() == Some(file.layout.decimal_mark as u8) {
         r.report(&join(path, "decimal_mark"), "is also the delimiter: choose another");
     }
     if gyro.is_none() && accel.is_none() && file.temperatures.is_empty() {
@@ -51,7 +51,8 @@ fn check_file(r: &mut Reader<'_>, path: &str, file: &FileMapping) {
         let what = "must have either `good = [\"0\"]`, the cells of valid rows, or `bad_bits = 3`";
         r.report(&join(path, "status"), what);
     }
-    if let Some(name) = file.columns().find_map(Column::name).filter(|_| !file.layout.header) {
+    let name = |column: &mut Column| column.name().map(str::to_owned);
+    if let Some(name) = file.clone().columns_mut().find_map(name).filter(|_| !file.layout.header) {
         r.report(path, format!("column {name:?} is given by name, but the file has no header: set header = true, or use numbers from 1"));
     }
     let empties = [gyro.is_some_and(|gyro| gyro.ticks.may_be_empty), accel.is_some_and(|a| a.may_be_empty)];

@@ -119,11 +119,12 @@ impl SensorUnit for AccelUnit {
 }
 
 /// Unit of a temperature channel's readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(inline)]
 pub enum TemperatureUnit {
     /// °C.
+    #[default]
     DegC,
     /// °F.
     DegF,

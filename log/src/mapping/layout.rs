@@ -40,13 +40,45 @@ impl Encoding {
 
 /// What stands between two cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(from = "DelimiterWord")]
+#[serde(rename_all = "snake_case")]
 #[schemars(inline)]
 pub enum Delimiter {
+    /// `,`; as with the other characters, cells may be quoted with `"`.
+    Comma,
+    /// `;`.
+    Semicolon,
+    /// A tab.
+    Tab,
+    /// `|`.
+    Pipe,
     /// Any run of spaces and tabs; leading ones do not count.
     Whitespace,
-    /// One ASCII character; cells may be quoted with `"`.
-    Character(u8),
+}
+
+impl Delimiter {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe, Self::Whitespace];
+
+    const fn spelled(self) -> (&'static str, Option<u8>) {
+        match self {
+            Self::Comma => ("comma", Some(b',')),
+            Self::Semicolon => ("semicolon", Some(b';')),
+            Self::Tab => ("tab", Some(b'\t')),
+            Self::Pipe => ("pipe", Some(b'|')),
+            Self::Whitespace => ("whitespace", None),
+        }
+    }
+
+    /// As the mapping spells it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        self.spelled().0
+    }
+
+    /// The character, where it is one.
+    pub(crate) const fn byte(self) -> Option<u8> {
+        self.spelled().1
+    }
 }
 
 /// What happens to a row that cannot be read.
@@ -106,28 +138,4 @@ pub enum DecimalMark {
     /// A comma.
     #[serde(rename = ",")]
     Comma = b',',
-}
-
-/// A delimiter by its word.
-#[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(inline)]
-enum DelimiterWord {
-    Comma,
-    Semicolon,
-    Tab,
-    Pipe,
-    Whitespace,
-}
-
-impl From<DelimiterWord> for Delimiter {
-    fn from(word: DelimiterWord) -> Self {
-        Self::Character(match word {
-            DelimiterWord::Comma => b',',
-            DelimiterWord::Semicolon => b';',
-            DelimiterWord::Tab => b'\t',
-            DelimiterWord::Pipe => b'|',
-            DelimiterWord::Whitespace => return Self::Whitespace,
-        })
-    }
 }

@@ -76,13 +76,14 @@ pub struct TimeColumn {
 }
 
 /// Which end of the tick a stamp marks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(inline)]
 pub enum Marks {
     /// The start.
     Start,
     /// The end.
+    #[default]
     End,
 }
 
@@ -115,7 +116,8 @@ pub(super) struct TimeKeys {
     /// Column of the date, where stamps are the time of day alone.
     date_column: Option<Column>,
     /// Which end of the tick a stamp marks.
-    marks: Option<Marks>,
+    #[serde(default)]
+    marks: Marks,
     /// Where a tick's duration comes from: the difference of stamps, or the nominal tick.
     duration: Option<DurationRule>,
     /// More than this many nominal ticks between two stamps are a gap.
@@ -139,11 +141,14 @@ pub(super) struct TimeKeys {
     tick_s: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+/// Where a tick's duration comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(inline)]
-enum DurationRule {
+pub enum DurationRule {
+    /// The difference of successive stamps.
     Measured,
+    /// The nominal tick.
     Nominal,
 }
 
@@ -158,7 +163,7 @@ impl From<TimeKeys> for TimeMapping {
                 unit,
                 date: keys.date_column,
             }),
-            marks: keys.marks.unwrap_or(Marks::End),
+            marks: keys.marks,
             tick: ns.map(|ns| Span::from_s(ns * 1e-9)),
             gap_after_ticks: keys.gap_after_ticks,
             origin_ns: keys.origin_ns,

@@ -11,7 +11,6 @@ use std::thread;
 use isotherm_protocol::key::UnitId;
 
 use super::unit::{Form, Output, UnitPlan, UnitReport, UnitWork};
-use crate::diff::DiffOptions;
 use crate::error::Error;
 use crate::message::Message;
 use crate::part::{LogFiles, Messages, Part};
@@ -35,8 +34,6 @@ pub struct RunOptions {
     pub form: Form,
     /// Ticks that were made of messages received earlier are not given out (ns since 1970-01-01 UTC).
     pub from_ns: u64,
-    /// How ticks are compared with those that the service published.
-    pub diff: DiffOptions,
 }
 
 /// What has been made of one block: by the unit's place in the plans, in that order.
@@ -63,7 +60,7 @@ pub fn correct(
     let places: Places = plans.iter().enumerate().map(|(place, plan)| (plan.id.clone(), place)).collect();
     let mut of_worker: Vec<Worker> = (0..workers).map(|_| Worker::default()).collect();
     for (place, plan) in plans.into_iter().enumerate() {
-        let work = UnitWork::new(plan, options.form, options.from_ns, options.diff);
+        let work = UnitWork::new(plan, options.form, options.from_ns);
         if let Some(worker) = of_worker.get_mut(place % workers) {
             worker.units.push((place, work));
         }

@@ -9,6 +9,7 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::stream::UnitStream;
 use serde::Serialize;
 
+use super::counters;
 use super::published::{Published, RawEnd};
 use super::rows::{write_frame, write_tick};
 use super::sums::{Summary, Sums};
@@ -77,7 +78,7 @@ pub struct Output {
 
 impl Output {
     /// Takes what is ready, as rows or frames; `frame` is a place to make them in.
-    pub(super) fn give_out(&mut self, stream: &mut UnitStream, form: Form, frame: &mut Vec<u8>) {
+    pub fn give_out(&mut self, stream: &mut UnitStream, form: Form, frame: &mut Vec<u8>) {
         // Writing to a vector does not fail.
         if form == Form::Wire {
             while stream.next_frame(frame).is_some() {
@@ -146,7 +147,7 @@ struct Taker {
 }
 
 impl UnitWork {
-    pub(super) fn new(plan: UnitPlan, form: Form, from_ns: u64, diff: DiffOptions) -> Self {
+    pub(super) fn new(plan: UnitPlan, form: Form, from_ns: u64) -> Self {
         let UnitPlan { id, basis, compare } = plan;
         let by_journal = matches!(basis, Basis::Journal { .. });
         let replica = match basis {
@@ -161,7 +162,7 @@ impl UnitWork {
             from_ns,
             received_ns: 0,
             sums: Sums::default(),
-            comparison: compare.then(|| Comparison::new(diff, false)),
+            comparison: compare.then(|| Comparison::new(DiffOptions::default(), false)),
             made: None,
             event: None,
             output: Output::default(),
@@ -220,13 +221,11 @@ impl UnitWork {
         if let Some(comparison) = &mut self.taker.comparison {
             self.published.compare(comparison, true);
         }
-        let counters = self.replica.stream().map(UnitStream::counters).unwrap_or_default();
-        let counters = counters.into_iter().filter(|counter| counter.value > 0);
         UnitReport {
             unit: self.taker.id,
             by_journal: self.by_journal,
             summary: self.taker.sums.summary(),
-            counters: counters.map(|counter| (counter.name, counter.value)).collect(),
+            counters: self.replica.stream().into_iter().flat_map(counters).collect(),
             replica: self.replica.report().clone(),
             published: self.taker.comparison.map(|comparison| {
                 comparison.finish_with(|end_time| self.raw_end.reaches(end_time, self.taker.made))

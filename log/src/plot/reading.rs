@@ -193,7 +193,7 @@ impl Plot {
         }
         // Documents may also lie in the recording as files.
         for (log, source) in self.logs.iter_mut().enumerate() {
-            let Some(recording) = source.log.messages.log().recording() else { continue };
+            let Some(recording) = source.log.messages.recording() else { continue };
             for attachment in recording.take_attachments() {
                 let Ok(Parsed { document, .. }) = Document::parse_bytes(&attachment.bytes, None) else {
                     continue;

@@ -171,7 +171,7 @@ fn part_of(paths: &[PathBuf], start_ns: i64) -> (Vec<Message>, u64) {
         messages.push(message);
     }
     let LogReport::Recording(report) = part.report() else { unreachable!("it is a recording") };
-    assert_eq!(part.log().recording().unwrap().take_attachments().len(), paths.len());
+    assert_eq!(part.recording().unwrap().take_attachments().len(), paths.len());
     (messages, report.messages)
 }
 

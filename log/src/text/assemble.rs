@@ -7,7 +7,7 @@ use isotherm_correction::unit::MAX_TICK_DURATION;
 use isotherm_correction::units::{Span, Timestamp};
 
 use super::LogEvent;
-use super::resolve::{Columns, SwitchCells, TickCells};
+use super::resolve::{Columns, TickCells};
 use super::row::{GyroStates, Readings};
 use super::timeline::{Timeline, Timing};
 use crate::mapping::TimeMapping;
@@ -85,7 +85,8 @@ impl Assembler {
         for reading in temperatures {
             self.enqueue(LogEvent::Temperature(*reading));
         }
-        if let (Some(readings), Some(cells)) = (accel, &columns.accel) {
+        let [of_gyros, of_accels] = &columns.ticks;
+        if let (Some(readings), Some(cells)) = (accel, of_accels) {
             let output = cells.output;
             let waits = self.accel.waits(readings.duration.is_some());
             let timing = self.accel.tick(stamp, readings.sequence, readings.duration);
@@ -97,11 +98,9 @@ impl Assembler {
             };
             self.add(ACCEL, waits, stamp, LogEvent::Accel { output, tick }, columns);
         }
-        if let (Some((readings, states)), Some(cells)) = (gyro, &columns.gyro) {
-            let output = cells.ticks.output;
-            let changed = matches!(cells.switch, SwitchCells::ModeChange)
-                && self.mode.is_some()
-                && self.mode != states.mode;
+        if let (Some((readings, states)), Some(cells)) = (gyro, of_gyros) {
+            let output = cells.output;
+            let changed = columns.by_mode && self.mode.is_some() && self.mode != states.mode;
             self.mode = states.mode;
             let waits = self.gyro.waits(readings.duration.is_some());
             let timing = self.gyro.tick(stamp, readings.sequence, readings.duration);
@@ -235,7 +234,7 @@ impl<'e> Tick<'e> {
 /// Divides increments by the duration of their tick.
 fn to_means(event: &mut LogEvent, columns: &Columns) {
     let Some(Tick { kind, duration, readings, .. }) = Tick::of(event) else { return };
-    let cells = columns.ticks().get(kind).copied().flatten();
+    let cells = columns.ticks.get(kind).and_then(Option::as_ref);
     let Some(TickCells { output: OutputKind::Mean, sensors, .. }) = cells else { return };
     for (reading, (_, conversion)) in readings.iter_mut().zip(sensors) {
         if conversion.per_tick {

@@ -20,10 +20,10 @@ pub(super) struct OpenQuote(pub(super) usize);
 /// Cuts a line into cells, reusing `cells`. Quoted cells are unquoted in place.
 pub(super) fn split(line: &mut [u8], delimiter: Delimiter, cells: &mut Vec<Cell>) -> Result<(), OpenQuote> {
     cells.clear();
-    match delimiter {
-        Delimiter::Whitespace => split_whitespace(line, cells),
-        Delimiter::Character(_) if line.contains(&b'"') => return split_quoted(line, delimiter, cells),
-        Delimiter::Character(character) => {
+    match delimiter.byte() {
+        None => split_whitespace(line, cells),
+        Some(character) if line.contains(&b'"') => return split_quoted(line, character, cells),
+        Some(character) => {
             let mut start = 0;
             for piece in line.split(|byte| *byte == character) {
                 push_trimmed(line, start, start + piece.len(), cells);
@@ -53,15 +53,14 @@ fn split_whitespace(line: &[u8], cells: &mut Vec<Cell>) {
 }
 
 /// Cuts at a character outside quotes; `""` inside quotes is one quote.
-fn split_quoted(line: &mut [u8], delimiter: Delimiter, cells: &mut Vec<Cell>) -> Result<(), OpenQuote> {
+fn split_quoted(line: &mut [u8], delimiter: u8, cells: &mut Vec<Cell>) -> Result<(), OpenQuote> {
     let (mut read, mut write) = (0, 0);
-    let is_delimiter = |byte: u8| Delimiter::Character(byte) == delimiter;
     loop {
         let (start, column) = (write, read);
         let mut quote = None;
         // What is written never overtakes what is read, so a cell can be unquoted where it stands.
         while let Some(&byte) = line.get(read) {
-            if quote.is_none() && is_delimiter(byte) {
+            if quote.is_none() && byte == delimiter {
                 break;
             }
             read += 1;
@@ -130,10 +129,10 @@ mod tests {
         let table: &[Case<'_>] = &[
             ("  1 \t 22  3 ", Delimiter::Whitespace, &[("1", 3), ("22", 7), ("3", 11)]),
             ("", Delimiter::Whitespace, &[]),
-            ("1,, 3 ", Delimiter::Character(b','), &[("1", 1), ("", 3), ("3", 5)]),
-            ("1\t2\t", Delimiter::Character(b'\t'), &[("1", 1), ("2", 3), ("", 5)]),
-            ("\"a,b\",\"c\"\"d\",5", Delimiter::Character(b','), &[("a,b", 1), ("c\"d", 7), ("5", 14)]),
-            ("\"\",\"x\"", Delimiter::Character(b','), &[("", 1), ("x", 4)]),
+            ("1,, 3 ", Delimiter::Comma, &[("1", 1), ("", 3), ("3", 5)]),
+            ("1\t2\t", Delimiter::Tab, &[("1", 1), ("2", 3), ("", 5)]),
+            ("\"a,b\",\"c\"\"d\",5", Delimiter::Comma, &[("a,b", 1), ("c\"d", 7), ("5", 14)]),
+            ("\"\",\"x\"", Delimiter::Comma, &[("", 1), ("x", 4)]),
         ];
         for (line, delimiter, expected) in table {
             let expected: Vec<_> =
@@ -145,6 +144,6 @@ mod tests {
     #[test]
     fn a_quote_must_end_on_its_line() {
         let mut line = b"1,\"2,3".to_vec();
-        assert_eq!(split(&mut line, Delimiter::Character(b','), &mut Vec::new()), Err(OpenQuote(2)));
+        assert_eq!(split(&mut line, Delimiter::Comma, &mut Vec::new()), Err(OpenQuote(2)));
     }
 }

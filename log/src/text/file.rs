@@ -14,7 +14,7 @@ use super::input::{LONGEST_LINE, Line, Lines, Source, decoded};
 use super::resolve::{Columns, TickCells, resolve};
 use super::row::{Fault, Readings, Row};
 use super::{LogEvent, ReadReport};
-use crate::mapping::{Delimiter, FileMapping, Layout, OnBadRow, TimeMapping, TimeUnit};
+use crate::mapping::{Delimiter, FileMapping, OnBadRow, SelectMapping, TimeUnit};
 
 /// Most nominal ticks between two rows of a log without gaps.
 const LONGEST_STEP: u64 = 10;
@@ -30,11 +30,9 @@ pub(super) struct FileReader {
     cells: Vec<Cell>,
     /// Names of the columns, where it has a header.
     header: Vec<String>,
-    /// How bytes become rows.
-    layout: Layout,
-    /// How rows get their time.
-    time: TimeMapping,
-    /// Where the columns are.
+    /// How it is read; behind the header every column is an index.
+    mapping: FileMapping,
+    /// What that comes to.
     columns: Columns,
     /// Makes events of rows.
     assembler: Assembler,
@@ -66,8 +64,7 @@ impl FileReader {
             lines: Lines::new(decoded(source, mapping.layout.encoding)),
             cells: Vec::new(),
             header: Vec::new(),
-            layout: mapping.layout.clone(),
-            time: mapping.time.clone(),
+            mapping: mapping.clone(),
             columns: Columns::default(),
             assembler: Assembler::new(&mapping.time),
             readings: Vec::new(),
@@ -80,18 +77,18 @@ impl FileReader {
             ended: false,
             report: ReadReport::default(),
         };
-        let resolved =
-            reader.skip_and_name().and_then(|()| resolve(mapping, &reader.header).map_err(Fault::from));
-        reader.columns = resolved.map_err(|fault| reader.error(fault))?;
+        let named = reader.skip_and_name();
+        let resolved = named.and_then(|()| Ok(resolve(&mut reader.mapping, &reader.header)?));
+        reader.columns = resolved.map_err(|fault: Fault| reader.error(fault))?;
         Ok(reader)
     }
 
     /// Passes over the lines in front and reads the header.
     fn skip_and_name(&mut self) -> Result<(), Fault> {
-        for _ in 0..self.layout.skip_lines {
+        for _ in 0..self.mapping.layout.skip_lines {
             self.line()?;
         }
-        if self.layout.header {
+        if self.mapping.layout.header {
             if !self.line()? {
                 return Err(Reason::NoHeader.into());
             }
@@ -120,8 +117,12 @@ impl FileReader {
                 Line::Read => {}
             }
             let text = self.lines.line().trim_ascii_start();
-            let comment =
-                self.layout.comment.as_ref().is_some_and(|prefix| text.starts_with(prefix.as_bytes()));
+            let comment = self
+                .mapping
+                .layout
+                .comment
+                .as_ref()
+                .is_some_and(|prefix| text.starts_with(prefix.as_bytes()));
             if !text.is_empty() && !comment {
                 return Ok(true);
             }
@@ -130,11 +131,13 @@ impl FileReader {
 
     /// Cuts the current line into cells.
     fn split(&mut self) -> Result<(), Fault> {
-        split(self.lines.line_mut(), self.layout.delimiter, &mut self.cells).map_err(|OpenQuote(at)| {
-            let column = u32::try_from(at + 1).unwrap_or(u32::MAX);
-            self.cells.push(Cell { start: at, end: self.lines.line().len(), column });
-            Reason::OpenQuote.at(self.cells.len() - 1)
-        })
+        split(self.lines.line_mut(), self.mapping.layout.delimiter, &mut self.cells).map_err(
+            |OpenQuote(at)| {
+                let column = u32::try_from(at + 1).unwrap_or(u32::MAX);
+                self.cells.push(Cell { start: at, end: self.lines.line().len(), column });
+                Reason::OpenQuote.at(self.cells.len() - 1)
+            },
+        )
     }
 
     /// The next event in time order.
@@ -159,7 +162,7 @@ impl FileReader {
                 self.end();
                 return Ok(());
             }
-            Ok(true) if self.report.dropped_rows < self.layout.drop_rows => {
+            Ok(true) if self.report.dropped_rows < self.mapping.layout.drop_rows => {
                 self.report.dropped_rows += 1;
                 return Ok(());
             }
@@ -185,7 +188,8 @@ impl FileReader {
 
     /// Keeps the line of a good row with a stamp, for what comes after it.
     fn keep_line(&mut self) {
-        let stamp = self.columns.stamps.and_then(|stamp| self.cells.get(stamp.cell));
+        let stamps = self.mapping.time.stamps.as_ref();
+        let stamp = stamps.and_then(|stamps| self.cells.get(stamps.column.index()));
         let Some(&Cell { start, end, .. }) = stamp else { return };
         let (text, of_stamp, number) = &mut self.last_line;
         text.clear();
@@ -206,7 +210,7 @@ impl FileReader {
         let a_gap = matches!(fault.reason, Reason::Gap { .. });
         let skippable = cut_short || fault.reason.concerns_one_row();
         let error = self.error(fault);
-        if self.layout.on_bad_row == OnBadRow::Refuse || !skippable {
+        if self.mapping.layout.on_bad_row == OnBadRow::Refuse || !skippable {
             return Err(error);
         }
         self.report.first_skipped.get_or_insert_with(|| error.to_string());
@@ -227,10 +231,10 @@ impl FileReader {
 
     /// Leaves a gap where the row had ticks.
     fn skip(&mut self, stamp: Option<i64>) {
-        let row = Row::new(self.lines.line(), &self.cells, &self.layout);
+        let row = Row::new(self.lines.line(), &self.cells, &self.mapping.layout);
         // Of a row without a cell nobody knows.
         let has = |cells: &TickCells| !cells.may_be_empty || row.has_readings(cells).unwrap_or(false);
-        let had = self.columns.ticks().map(|ticks| ticks.is_some_and(has));
+        let had = self.columns.ticks.each_ref().map(|ticks| ticks.as_ref().is_some_and(has));
         self.assembler.skip(stamp, had, &self.columns);
     }
 
@@ -246,17 +250,17 @@ impl FileReader {
         let line = self.lines.line();
         let filled = |cell: &Cell| line.get(cell.start..cell.end).is_some_and(|text| !text.is_empty());
         let Some(surplus) = self.cells.iter().skip(columns).position(filled) else { return Ok(()) };
-        let commas = self.layout.delimiter == Delimiter::Character(b',');
-        Err(Reason::TooManyCells { columns, named: self.layout.header, commas }.at(columns + surplus))
+        let commas = self.mapping.layout.delimiter == Delimiter::Comma;
+        Err(Reason::TooManyCells { columns, named: self.mapping.layout.header, commas }.at(columns + surplus))
     }
 
     /// The step of time to a row, where it is longer than any tick can be and the mapping knows of no gaps.
     fn gap(&self, now: i64) -> Option<Reason> {
-        let tick = self.time.tick?.as_ns();
+        let tick = self.mapping.time.tick?.as_ns();
         let numbered_by_rows = self.columns.leading().is_some_and(|ticks| ticks.sequence.is_none());
         let step = Span::from_ns(now.saturating_sub(self.last_stamp?));
         let most = i64::try_from(LONGEST_STEP + self.bad_since).unwrap_or(i64::MAX);
-        let gap = self.time.gap_after_ticks.is_none()
+        let gap = self.mapping.time.gap_after_ticks.is_none()
             && numbered_by_rows
             && tick > 0
             && step.as_ns() > tick.saturating_mul(most);
@@ -274,15 +278,16 @@ impl FileReader {
 
     /// Reads all cells of the row that are used, where it is one of this stream; `stamp` is set as soon as it is known to be good.
     fn parts(&mut self, stamp: &mut Option<i64>) -> Result<Option<Parts>, Fault> {
-        let row = Row::new(self.lines.line(), &self.cells, &self.layout);
-        if let Some((cell, value)) = &self.columns.select
-            && row.text(*cell)? != value.as_bytes()
+        let row = Row::new(self.lines.line(), &self.cells, &self.mapping.layout);
+        let FileMapping { time, gyro, temperatures, status, select, .. } = &self.mapping;
+        if let Some(SelectMapping { column, value }) = select
+            && row.text(column.index())? != value.as_bytes()
         {
             self.report.rows_of_others += 1;
             return Ok(None);
         }
-        let now = if let Some(cell) = self.columns.stamps {
-            let mut now = row.time_ns(cell)?.saturating_add(self.time.origin_ns).saturating_add(self.days_ns);
+        let now = if let Some(cell) = &time.stamps {
+            let mut now = row.time_ns(cell)?.saturating_add(time.origin_ns).saturating_add(self.days_ns);
             if cell.unit == TimeUnit::TimeOfDay && self.last_stamp.is_some_and(|last| is_next_day(last, now))
             {
                 now = now.saturating_add(DAY_NS);
@@ -297,42 +302,41 @@ impl FileReader {
                 }
                 let before =
                     String::from_utf8_lossy(text.get(stamp.clone()).unwrap_or_default()).into_owned();
-                return Err(
-                    Reason::TimeNotIncreasing { before, line: *line, again: now == last }.at(cell.cell)
-                );
+                let reason = Reason::TimeNotIncreasing { before, line: *line, again: now == last };
+                return Err(reason.at(cell.column.index()));
             }
             now
         } else {
-            let tick = self.time.tick.unwrap_or(Span::ZERO).as_ns();
-            let last = self.last_stamp.unwrap_or(self.time.origin_ns);
+            let tick = time.tick.unwrap_or(Span::ZERO).as_ns();
+            let last = self.last_stamp.unwrap_or(time.origin_ns);
             last.saturating_add(tick.saturating_mul(self.ticks_to(row)?))
         };
         *stamp = Some(now);
-        if let (Some(cell), Some(reason)) = (self.columns.stamps, self.gap(now)) {
-            return Err(reason.at(cell.cell));
+        if let (Some(cell), Some(reason)) = (&time.stamps, self.gap(now)) {
+            return Err(reason.at(cell.column.index()));
         }
-        if let Some((cell, status)) = &self.columns.status {
-            row.check_status(*cell, status)?;
+        if let Some(status) = status {
+            row.check_status(status)?;
         }
-        let gyro = match &self.columns.gyro {
-            Some(cells) => match row.readings(&cells.ticks)? {
-                Some(readings) => Some((readings, row.states(cells)?)),
-                None => None,
-            },
-            None => None,
+        let [of_gyros, of_accels] = &self.columns.ticks;
+        let readings = |cells: &Option<TickCells>| match cells {
+            Some(cells) => row.readings(cells),
+            None => Ok(None),
         };
-        let accel = match &self.columns.accel {
-            Some(cells) => row.readings(cells)?,
-            None => None,
+        let gyro = match (readings(of_gyros)?, gyro) {
+            (Some(readings), Some(gyro)) => Some((readings, row.states(gyro)?)),
+            _ => None,
         };
+        let accel = readings(of_accels)?;
         self.readings.clear();
-        for temperature in &mut self.columns.temperatures {
-            let due = temperature.since == 0;
-            if temperature.may_be_empty && row.is_empty(temperature.cell)? {
+        for (temperature, since) in temperatures.iter().zip(&mut self.columns.since) {
+            let due = *since == 0;
+            let cell = temperature.column.index();
+            if temperature.may_be_empty && row.is_empty(cell)? {
                 continue;
             }
-            let raw = temperature.unit.read(row.float(temperature.cell)?);
-            temperature.since = (temperature.since + 1) % temperature.every_rows;
+            let raw = temperature.unit.read(row.float(cell)?);
+            *since = (*since + 1) % temperature.every_rows;
             if due {
                 let reading =
                     TemperatureReading { channel: temperature.channel, time: Timestamp::from_ns(now), raw };

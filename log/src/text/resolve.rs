@@ -1,27 +1,15 @@
 //! A file's mapping with every column as an index.
 
-use isotherm_correction::sample::{ChannelName, OutputKind, Sensors};
+use isotherm_correction::sample::{OutputKind, Sensors};
 use isotherm_document::escape::clipped;
 
 use super::error::Reason;
 use crate::mapping::{
-    Column, Conversion, FileMapping, ModeMapping, SensorUnit, StatusMapping, SwitchMapping, TemperatureUnit,
-    TickMapping, TimeColumn, TimeUnit,
+    Column, Conversion, FileMapping, SensorMapping, SensorUnit, TemperatureMapping, TickMapping, TimeColumn,
 };
 
 /// What of a header is shown, in characters.
 const LONGEST_HEADER: usize = 300;
-
-/// A column of times or durations.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TimeCell {
-    /// Which cell.
-    pub(super) cell: usize,
-    /// Its unit.
-    pub(super) unit: TimeUnit,
-    /// Cell of the date, where the other has the time of day alone.
-    pub(super) date: Option<usize>,
-}
 
 /// Where a sensor's reading comes from.
 #[derive(Debug, Clone, Copy)]
@@ -52,94 +40,26 @@ pub(super) struct TickCells {
     /// Sequence numbers.
     pub(super) sequence: Option<usize>,
     /// Durations.
-    pub(super) duration: Option<TimeCell>,
+    pub(super) duration: Option<TimeColumn>,
     /// Rows without these sensors are in order.
     pub(super) may_be_empty: bool,
 }
 
-/// A cell of two states.
-#[derive(Debug, Clone)]
-pub(super) struct StateCell {
-    /// Which cell.
-    pub(super) cell: usize,
-    /// What means +1, or yes.
-    pub(super) plus: String,
-    /// What means −1, or no.
-    pub(super) minus: String,
-    /// An empty cell is no state at all.
-    pub(super) may_be_empty: bool,
-}
-
-/// Where switch commands come from.
-#[derive(Debug, Clone)]
-pub(super) enum SwitchCells {
-    /// There are none.
-    None,
-    /// A cell.
-    Cell(StateCell),
-    /// Changes of mode.
-    ModeChange,
-}
-
-/// The gyros.
-#[derive(Debug, Clone)]
-pub(super) struct GyroCells {
-    /// Sensors and their ticks.
-    pub(super) ticks: TickCells,
-    /// Lasing mode.
-    pub(super) mode: Option<StateCell>,
-    /// Switch commands.
-    pub(super) switch: SwitchCells,
-    /// Phase of the slow meander.
-    pub(super) meander: Option<StateCell>,
-    /// Half-period counts.
-    pub(super) half_periods: Sensors<(usize, usize)>,
-}
-
-/// One temperature channel.
-#[derive(Debug, Clone)]
-pub(super) struct TemperatureCell {
-    /// Name.
-    pub(super) channel: ChannelName,
-    /// Which cell.
-    pub(super) cell: usize,
-    /// Its unit.
-    pub(super) unit: TemperatureUnit,
-    /// Every how many rows a reading is taken.
-    pub(super) every_rows: u64,
-    /// Rows without a reading are in order.
-    pub(super) may_be_empty: bool,
-    /// Rows since the last reading that was taken.
-    pub(super) since: u64,
-}
-
-/// All columns of a file.
+/// What a file's mapping comes to.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Columns {
-    /// Stamps.
-    pub(super) stamps: Option<TimeCell>,
-    /// The gyros.
-    pub(super) gyro: Option<GyroCells>,
-    /// The accelerometers.
-    pub(super) accel: Option<TickCells>,
-    /// Temperature channels.
-    pub(super) temperatures: Vec<TemperatureCell>,
-    /// What says whether a row holds, and where.
-    pub(super) status: Option<(usize, StatusMapping)>,
-    /// What the unit's rows hold, and where.
-    pub(super) select: Option<(usize, String)>,
+    /// Ticks of each kind: gyros, accelerometers.
+    pub(super) ticks: [Option<TickCells>; 2],
+    /// A change of mode is a switch.
+    pub(super) by_mode: bool,
+    /// Rows of each temperature channel since the last reading that was taken.
+    pub(super) since: Vec<u64>,
 }
 
 impl Columns {
-    /// The ticks of each kind: gyros, accelerometers.
-    pub(super) fn ticks(&self) -> [Option<&TickCells>; 2] {
-        [self.gyro.as_ref().map(|gyro| &gyro.ticks), self.accel.as_ref()]
-    }
-
     /// Those that number the rows: the gyros, else the accelerometers.
     pub(super) fn leading(&self) -> Option<&TickCells> {
-        let [gyro, accel] = self.ticks();
-        gyro.or(accel)
+        self.ticks.iter().flatten().next()
     }
 
     /// Cell of the number that every row has: that of its gyros, in a file without gyros of its accelerometers.
@@ -148,10 +68,10 @@ impl Columns {
     }
 
     /// Refuses a sensor's column that is something else, too. Two temperature channels may share a thermometer.
-    fn apart(&self) -> Result<(), Reason> {
+    fn apart(&self, mapping: &FileMapping) -> Result<(), Reason> {
         let mut sensors: Vec<(usize, String)> = Vec::new();
         let mut others: Vec<(usize, String)> = Vec::new();
-        for (kind, ticks) in ["gyro", "accelerometer"].into_iter().zip(self.ticks()) {
+        for (kind, ticks) in ["gyro", "accelerometer"].into_iter().zip(&self.ticks) {
             let Some(ticks) = ticks else { continue };
             let numbered = ticks.sensors.iter().zip(1..);
             sensors.extend(
@@ -159,14 +79,18 @@ impl Columns {
                     .filter_map(|((source, _), number)| Some((source.cell()?, format!("{kind} {number}")))),
             );
             others.extend(ticks.sequence.map(|cell| (cell, format!("sequence number of the {kind}s"))));
-            others.extend(ticks.duration.map(|time| (time.cell, format!("duration of the {kind}s"))));
+            others.extend(
+                ticks.duration.iter().map(|time| (time.column.index(), format!("duration of the {kind}s"))),
+            );
         }
-        let stamps = self.stamps.iter().flat_map(|time| std::iter::once(time.cell).chain(time.date));
-        others.extend(stamps.map(|cell| (cell, "time".to_owned())));
-        others.extend(self.status.as_ref().map(|(cell, _)| (*cell, "status".to_owned())));
-        let channel =
-            |of: &TemperatureCell| (of.cell, format!("temperature channel {:?}", of.channel.as_str()));
-        others.extend(self.temperatures.iter().map(channel));
+        let FileMapping { time, temperatures, status, .. } = mapping;
+        let stamps = time.stamps.iter().flat_map(|time| std::iter::once(&time.column).chain(&time.date));
+        others.extend(stamps.map(|column| (column.index(), "time".to_owned())));
+        others.extend(status.iter().map(|status| (status.column.index(), "status".to_owned())));
+        let channel = |of: &TemperatureMapping| {
+            (of.column.index(), format!("temperature channel {:?}", of.channel.as_str()))
+        };
+        others.extend(temperatures.iter().map(channel));
         for (at, (column, first)) in sensors.iter().enumerate() {
             let mut others = sensors.iter().skip(at + 1).chain(&others);
             if let Some((_, second)) = others.find(|(other, _)| other == column) {
@@ -178,87 +102,53 @@ impl Columns {
     }
 }
 
-/// Finds every column of a mapping among the names of a header.
-pub(super) fn resolve(mapping: &FileMapping, header: &[String]) -> Result<Columns, Reason> {
-    let find = |column: &Column| find(column, header);
-    let stamps = mapping.time.stamps.as_ref().map(|stamps| time(stamps, header)).transpose()?;
-    let gyro = match &mapping.gyro {
-        None => None,
-        Some(gyro) => {
-            let mut half_periods = Sensors::new();
-            for half in &gyro.half_periods {
-                half_periods.push((find(&half.positive)?, find(&half.negative)?));
-            }
-            Some(GyroCells {
-                ticks: ticks(&gyro.ticks, header)?,
-                mode: gyro.mode.as_ref().map(|mode| state(mode, header)).transpose()?,
-                switch: match &gyro.switch {
-                    None => SwitchCells::None,
-                    Some(SwitchMapping { column: None, .. }) => SwitchCells::ModeChange,
-                    Some(SwitchMapping { column: Some(column), .. }) => SwitchCells::Cell(StateCell {
-                        cell: find(column)?,
-                        plus: "1".into(),
-                        minus: "0".into(),
-                        may_be_empty: false,
-                    }),
-                },
-                meander: gyro.meander.as_ref().map(|mode| state(mode, header)).transpose()?,
-                half_periods,
-            })
-        }
-    };
-    let accel = mapping.accel.as_ref().map(|accel| ticks(accel, header)).transpose()?;
-    let temperatures = mapping.temperatures.iter().map(|temperature| {
-        Ok(TemperatureCell {
-            channel: temperature.channel,
-            cell: find(&temperature.column)?,
-            unit: temperature.unit,
-            every_rows: temperature.every_rows,
-            may_be_empty: temperature.may_be_empty,
-            since: 0,
-        })
-    });
-    let temperatures = temperatures.collect::<Result<_, Reason>>()?;
-    let status =
-        mapping.status.as_ref().map(|status| Ok((find(&status.column)?, status.clone()))).transpose()?;
-    let select = mapping.select.as_ref();
-    let select =
-        select.map(|select| Ok((find(&select.column)?, select.value.trim().to_owned()))).transpose()?;
-    let columns = Columns { stamps, gyro, accel, temperatures, status, select };
-    columns.apart().map(|()| columns)
-}
-
-/// Sensors of one kind.
-fn ticks<U: SensorUnit>(mapping: &TickMapping<U>, header: &[String]) -> Result<TickCells, Reason> {
-    let mut sensors = Sensors::new();
-    for sensor in &mapping.sensors {
-        let constant = Source::Constant(sensor.constant.unwrap_or_default());
-        let cell = sensor.column.as_ref().map(|column| find(column, header)).transpose()?;
-        sensors.push((cell.map_or(constant, Source::Cell), sensor.conversion()));
+/// Finds every column of a mapping among the names of a header: each is an index from then on.
+pub(super) fn resolve(mapping: &mut FileMapping, header: &[String]) -> Result<Columns, Reason> {
+    for column in mapping.columns_mut() {
+        *column = Column::Index(find(column, header)?);
     }
-    Ok(TickCells {
-        output: mapping.output,
-        sensors,
-        sequence: mapping.sequence.as_ref().map(|column| find(column, header)).transpose()?,
-        duration: mapping.duration().map(|duration| time(&duration, header)).transpose()?,
-        may_be_empty: mapping.may_be_empty,
-    })
+    // As cells are.
+    let trim = |text: &mut String| *text = text.trim().to_owned();
+    if let Some(gyro) = &mut mapping.gyro {
+        let states = gyro.mode.iter_mut().chain(&mut gyro.meander);
+        states.for_each(|state| [&mut state.plus, &mut state.minus].into_iter().for_each(trim));
+    }
+    mapping.select.iter_mut().for_each(|select| trim(&mut select.value));
+    mapping.status.iter_mut().flat_map(|status| &mut status.good).for_each(trim);
+    let gyro = mapping.gyro.as_ref();
+    let ticks = [gyro.map(|gyro| TickCells::of(&gyro.ticks)), mapping.accel.as_ref().map(TickCells::of)];
+    let switch = gyro.and_then(|gyro| gyro.switch.as_ref());
+    let by_mode = switch.is_some_and(|switch| switch.column.is_none());
+    let columns = Columns { ticks, by_mode, since: vec![0; mapping.temperatures.len()] };
+    columns.apart(mapping).map(|()| columns)
 }
 
-/// A column of times.
-fn time(mapping: &TimeColumn, header: &[String]) -> Result<TimeCell, Reason> {
-    let date = mapping.date.as_ref().map(|date| find(date, header)).transpose()?;
-    Ok(TimeCell { cell: find(&mapping.column, header)?, unit: mapping.unit, date })
+impl TickCells {
+    /// Of sensors whose columns are found.
+    fn of<U: SensorUnit>(mapping: &TickMapping<U>) -> Self {
+        let sensor = |sensor: &SensorMapping<U>| {
+            let constant = Source::Constant(sensor.constant.unwrap_or_default());
+            let cell = sensor.column.as_ref().map(Column::index);
+            (cell.map_or(constant, Source::Cell), sensor.conversion())
+        };
+        Self {
+            output: mapping.output,
+            sensors: mapping.sensors.iter().map(sensor).collect(),
+            sequence: mapping.sequence.as_ref().map(Column::index),
+            duration: mapping.duration(),
+            may_be_empty: mapping.may_be_empty,
+        }
+    }
 }
 
-/// A column of two states.
-fn state(mapping: &ModeMapping, header: &[String]) -> Result<StateCell, Reason> {
-    Ok(StateCell {
-        cell: find(&mapping.column, header)?,
-        plus: mapping.plus.trim().to_owned(),
-        minus: mapping.minus.trim().to_owned(),
-        may_be_empty: mapping.may_be_empty,
-    })
+impl Column {
+    /// Its place; none that a row has, of a column that has not been found.
+    pub(super) fn index(&self) -> usize {
+        match self {
+            Self::Index(index) => *index,
+            Self::Name(_) => usize::MAX,
+        }
+    }
 }
 
 /// Index of a column.

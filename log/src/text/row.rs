@@ -7,8 +7,8 @@ use super::cells::Cell;
 use super::dates::stamp_ns;
 use super::error::Reason;
 use super::number;
-use super::resolve::{GyroCells, Source, StateCell, TickCells, TimeCell};
-use crate::mapping::{Layout, StatusMapping};
+use super::resolve::{Source, TickCells};
+use crate::mapping::{GyroMapping, Layout, ModeMapping, StatusMapping, TimeColumn};
 
 /// What is wrong with a row: the cell's index and the reason.
 #[derive(Debug)]
@@ -108,47 +108,45 @@ impl<'a> Row<'a> {
     }
 
     /// A time (ns).
-    pub(super) fn time_ns(&self, time: TimeCell) -> Result<i64, Fault> {
-        let text = self.filled(time.cell)?;
-        let (ns, reason) = match (time.unit.scale(), time.date) {
+    pub(super) fn time_ns(&self, time: &TimeColumn) -> Result<i64, Fault> {
+        let cell = time.column.index();
+        let text = self.filled(cell)?;
+        let (ns, reason) = match (time.unit.scale(), &time.date) {
             (Some(scale), _) => (number::time_ns(text, scale, self.decimal_mark), Reason::NotATime),
             (None, None) => (stamp_ns(text, time.unit), Reason::NotADateTime { unit: time.unit }),
             (None, Some(date)) => {
-                let whole = [self.filled(date)?, text].join(&b' ');
+                let whole = [self.filled(date.index())?, text].join(&b' ');
                 (stamp_ns(&whole, time.unit), Reason::NotADateTime { unit: time.unit })
             }
         };
-        ns.ok_or(reason.at(time.cell))
+        ns.ok_or(reason.at(cell))
     }
 
     /// A duration.
-    fn span(&self, time: TimeCell) -> Result<Span, Fault> {
+    fn span(&self, time: &TimeColumn) -> Result<Span, Fault> {
         match self.time_ns(time)? {
-            ns if ns < 0 => Err(Reason::NegativeDuration.at(time.cell)),
+            ns if ns < 0 => Err(Reason::NegativeDuration.at(time.column.index())),
             ns => Ok(Span::from_ns(ns)),
         }
     }
 
     /// A state.
-    fn state(&self, state: &StateCell) -> Result<bool, Fault> {
-        match self.filled(state.cell)? {
-            text if text == state.plus.as_bytes() => Ok(true),
-            text if text == state.minus.as_bytes() => Ok(false),
-            _ => {
-                let (plus, minus) = (state.plus.clone(), state.minus.clone());
-                Err(Reason::UnknownState { plus, minus }.at(state.cell))
-            }
+    fn state(&self, cell: usize, plus: &str, minus: &str) -> Result<bool, Fault> {
+        match self.filled(cell)? {
+            text if text == plus.as_bytes() => Ok(true),
+            text if text == minus.as_bytes() => Ok(false),
+            _ => Err(Reason::UnknownState { plus: plus.to_owned(), minus: minus.to_owned() }.at(cell)),
         }
     }
 
     /// A mode, where the file has a column for it.
-    fn mode(&self, state: Option<&StateCell>) -> Result<Option<LasingMode>, Fault> {
+    fn mode(&self, mapping: Option<&ModeMapping>) -> Result<Option<LasingMode>, Fault> {
         let sign = |plus| if plus { LasingMode::Plus } else { LasingMode::Minus };
-        match state {
-            Some(state) if state.may_be_empty && self.is_empty(state.cell)? => Ok(None),
-            Some(state) => self.state(state).map(sign).map(Some),
-            None => Ok(None),
+        let Some(ModeMapping { column, plus, minus, may_be_empty }) = mapping else { return Ok(None) };
+        if *may_be_empty && self.is_empty(column.index())? {
+            return Ok(None);
         }
+        self.state(column.index(), plus, minus).map(sign).map(Some)
     }
 
     /// Whether a cell holds nothing.
@@ -170,15 +168,16 @@ impl<'a> Row<'a> {
             });
         }
         let sequence = cells.sequence.map(|cell| self.sequence(cell));
-        let duration = cells.duration.map(|duration| self.span(duration));
+        let duration = cells.duration.as_ref().map(|duration| self.span(duration));
         Ok(Some(Readings { values, sequence: sequence.transpose()?, duration: duration.transpose()? }))
     }
 
     /// Refuses a row that does not hold by its status.
-    pub(super) fn check_status(&self, cell: usize, status: &StatusMapping) -> Result<(), Fault> {
+    pub(super) fn check_status(&self, status: &StatusMapping) -> Result<(), Fault> {
+        let cell = status.column.index();
         let text = self.filled(cell)?;
         let holds = match status.bad_bits {
-            None => status.good.iter().any(|good| good.trim().as_bytes() == text),
+            None => status.good.iter().any(|good| good.as_bytes() == text),
             Some(bits) => number::word(text).ok_or(Reason::NotAWord.at(cell))? & bits == 0,
         };
         if holds { Ok(()) } else { Err(Reason::BadStatus.at(cell)) }
@@ -201,22 +200,20 @@ impl<'a> Row<'a> {
     }
 
     /// What gyros have beside their readings.
-    pub(super) fn states(&self, cells: &GyroCells) -> Result<GyroStates, Fault> {
+    pub(super) fn states(&self, gyro: &GyroMapping) -> Result<GyroStates, Fault> {
         let mut half_periods = Sensors::new();
-        for (positive, negative) in &cells.half_periods {
+        for half in &gyro.half_periods {
             half_periods.push(HalfPeriodCounts {
-                positive: self.count(*positive)?,
-                negative: self.count(*negative)?,
+                positive: self.count(half.positive.index())?,
+                negative: self.count(half.negative.index())?,
             });
         }
-        let switch_command = match &cells.switch {
-            super::resolve::SwitchCells::Cell(cell) => self.state(cell)?,
-            _ => false,
-        };
+        let switch = gyro.switch.as_ref().and_then(|switch| switch.column.as_ref());
+        let switch_command = switch.map(|column| self.state(column.index(), "1", "0")).transpose()?;
         Ok(GyroStates {
-            mode: self.mode(cells.mode.as_ref())?,
-            switch_command,
-            meander: self.mode(cells.meander.as_ref())?,
+            mode: self.mode(gyro.mode.as_ref())?,
+            switch_command: switch_command.unwrap_or(false),
+            meander: self.mode(gyro.meander.as_ref())?,
             half_periods,
         })
     }

@@ -462,7 +462,8 @@ fn a_part_of_a_log() {
     let reader =
         LogReader::open(&mapping("delimiter = \"comma\"", STAMPS), &[file.path().to_path_buf()]).unwrap();
     let span = |ms| isotherm_correction::units::Span::from_ms(ms);
-    let part: Vec<_> = Window::new(reader, span(100), Some(span(200))).map(Result::unwrap).collect();
+    let part = Part { start: span(100), end: Some(span(300)), ..Part::default() };
+    let part: Vec<_> = reader.within(&part).map(Result::unwrap).collect();
     let ends: Vec<_> = gyro(&part).into_iter().map(|(_, end, ..)| end).collect();
     // The log begins with its first temperature reading, at 10 ms.
     assert_eq!((ends.first(), ends.last(), ends.len()), (Some(&120), Some(&310), 20));

@@ -10,7 +10,7 @@ use isotherm_correction::units::Span;
 use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
-use isotherm_log::mapping::{Encoding, Mapping};
+use isotherm_log::mapping::{Delimiter, Encoding, Mapping};
 use serde::Serialize;
 
 use super::log_args::LogArgs;
@@ -60,7 +60,7 @@ pub(super) struct ImportArgs {
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
     /// Delimiter (default: detected)
-    #[arg(long, value_name = "WORD", value_parser = PossibleValuesParser::new(["comma", "semicolon", "tab", "pipe", "whitespace"]))]
+    #[arg(long, value_name = "WORD", value_parser = PossibleValuesParser::new(Delimiter::ALL.map(Delimiter::word)))]
     delimiter: Option<String>,
     /// Decimal mark (default: detected)
     #[arg(long, value_name = "MARK", value_parser = PossibleValuesParser::new([".", ","]))]
@@ -89,9 +89,10 @@ fn rate(text: &str) -> Result<f64, String> {
 
 impl ImportArgs {
     fn hints(&self) -> Hints {
+        let delimiter = |word: &String| Delimiter::ALL.into_iter().find(|delimiter| delimiter.word() == word);
         let encoding = |word: &String| Encoding::ALL.into_iter().find(|encoding| encoding.word() == word);
         Hints {
-            delimiter: self.delimiter.clone(),
+            delimiter: self.delimiter.as_ref().and_then(delimiter),
             decimal_mark: self.decimal_mark.as_ref().and_then(|mark| mark.chars().next()),
             encoding: self.encoding.as_ref().and_then(encoding),
             columns: self.columns.clone(),

@@ -6,7 +6,6 @@ pub(super) mod tables;
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
-use isotherm_log::text::LogReader;
 
 use super::log_args::{LogArgs, unnamed};
 use super::{print, show};
@@ -46,7 +45,7 @@ pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
     let mut bar = Bar::over_log(messages.progress().watch());
     loop {
         let message = messages.next_message()?;
-        if let Some(recordings) = messages.log().recording() {
+        if let Some(recordings) = messages.recording() {
             survey.beside(recordings.take_attachments(), recordings.take_metadata());
         }
         let Some(message) = message else { break };
@@ -72,8 +71,6 @@ impl LogArgs {
         if self.is_recording()? {
             return Ok(self.log.clone());
         }
-        let events = self.events()?;
-        let reader: &LogReader = events.inner();
-        Ok(reader.paths().to_vec())
+        Ok(self.events()?.paths().to_vec())
     }
 }

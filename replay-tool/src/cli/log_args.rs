@@ -9,7 +9,7 @@ use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Messages, Part, are_recordings};
 use isotherm_log::replica::check_units;
-use isotherm_log::text::{LogReader, Window};
+use isotherm_log::text::LogReader;
 use isotherm_protocol::key::UnitId;
 
 use super::seconds;
@@ -139,12 +139,12 @@ impl LogArgs {
     ///
     /// # Errors
     /// As [`LogArgs::files`], and where the log is a recording.
-    pub(crate) fn events(&self) -> Result<Window<LogReader>, Error> {
+    pub(crate) fn events(&self) -> Result<LogReader, Error> {
         if self.is_recording()? {
             return Err(Error::Usage("this needs a text log, the log is recordings".to_owned()));
         }
         let part = self.part()?;
-        Ok(Window::new(LogReader::open(&self.text_mapping()?, &self.log)?, part.start, part.duration()))
+        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.within(&part))
     }
 
     /// The file of a text log's mapping: the one given, else the one beside the log.

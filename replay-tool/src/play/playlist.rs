@@ -9,10 +9,10 @@ use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::part::{LogFiles, Messages};
 use isotherm_log::schedule::Schedule;
+use isotherm_log::streams::decoded::Decoded;
 use isotherm_protocol::codec;
 use isotherm_protocol::key::{Input, RawStream, UnitId};
-use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, HealthTick, TemperatureBatch};
-use isotherm_protocol::reference::Reference;
+use isotherm_protocol::raw::{GyroBatch, HealthBatch, HealthTick};
 use zenoh::bytes::ZBytes;
 use zenoh::key_expr::{OwnedKeyExpr, keyexpr};
 
@@ -131,61 +131,46 @@ impl<'a> Playlist<'a> {
             Topic::Reference(unit) => (unit.clone(), Input::Reference),
             _ => return,
         };
-        let (load, bytes, times, begins_series) = self.load(&unit, input, frame);
+        let decoded = Decoded::of_input(input, &frame).ok();
+        let times = decoded.as_ref().and_then(Decoded::times);
+        let (load, bytes, begins_series) = self.load(&unit, decoded, frame);
         // Its time is noted also where it is left out: a filter does not move what is left.
-        let at_ns = self.schedule.due(Some(&unit), received_ns, times.map(|(_, last)| last));
-        if let (Load::Gyro(_), Some((first, _))) = (load, times) {
+        let at_ns = self.schedule.due(Some(&unit), received_ns, times.map(|[_, last]| last));
+        if let (Load::Gyro(_), Some([first, _])) = (load, times) {
             self.report_health(&unit, at_ns, first);
         }
         if wanted(&self.options.topics, &topic) {
-            let frame = Arc::new(Frame { input, bytes, load });
+            let frame = Arc::new(Frame { input, bytes: bytes.into(), load });
             self.ready.push_back(Cue { unit, at_ns, frame, begins_series });
         }
     }
 
-    /// What a frame carries, its bytes with a series of this player, the times of its first and last tick, and whether it
-    /// begins a series.
-    fn load(&mut self, unit: &UnitId, input: Input, frame: Vec<u8>) -> Loaded {
-        let at = Timestamp::from_ns;
-        let unreadable = (Load::Unreadable, None);
-        let (load, times) = match input {
-            Input::Raw(RawStream::Gyro) => return self.gyro(unit, frame),
-            Input::Raw(RawStream::Accel) => codec::decode::<AccelBatch>(&frame).map_or(unreadable, |batch| {
-                (Load::Accel(batch.ticks.len() as u64), ends(&batch.ticks, |tick| tick.end_time))
-            }),
-            Input::Raw(RawStream::Temperature) => {
-                codec::decode::<TemperatureBatch>(&frame).map_or(unreadable, |batch| {
-                    let channels = self.channels.entry(unit.clone()).or_default();
-                    channels.extend(batch.readings.iter().map(|reading| reading.channel));
-                    let readings = batch.readings;
-                    (Load::Temperature(readings.len() as u64), ends(&readings, |reading| reading.time))
-                })
+    /// What a frame carries, its bytes with a series of this player, and whether it begins a series.
+    fn load(&mut self, unit: &UnitId, decoded: Option<Decoded>, frame: Vec<u8>) -> (Load, Vec<u8>, bool) {
+        let load = match decoded {
+            Some(Decoded::Gyro(batch)) => return self.gyro(unit, batch, frame),
+            Some(Decoded::Accel(batch)) => Load::Accel(batch.ticks.len() as u64),
+            Some(Decoded::Temperature(batch)) => {
+                let channels = self.channels.entry(unit.clone()).or_default();
+                channels.extend(batch.readings.iter().map(|reading| reading.channel));
+                Load::Temperature(batch.readings.len() as u64)
             }
-            Input::Raw(RawStream::Health) => codec::decode::<HealthBatch>(&frame)
-                .map_or(unreadable, |batch| {
-                    (Load::Health(batch.ticks.len() as u64), ends(&batch.ticks, |tick| at(tick.time_ns)))
-                }),
-            Input::Reference => codec::decode::<Reference>(&frame).map_or(unreadable, |reference| {
-                (Load::Reference, Some((at(reference.start_ns), at(reference.end_ns))))
-            }),
+            Some(Decoded::Health(batch)) => Load::Health(batch.ticks.len() as u64),
+            Some(Decoded::Reference(_)) => Load::Reference,
+            _ => Load::Unreadable,
         };
-        (load, frame.into(), times, false)
+        (load, frame, false)
     }
 
-    fn gyro(&mut self, unit: &UnitId, frame: Vec<u8>) -> Loaded {
-        let Ok(mut batch) = codec::decode::<GyroBatch>(&frame) else {
-            return (Load::Unreadable, frame.into(), None, false);
-        };
+    fn gyro(&mut self, unit: &UnitId, mut batch: GyroBatch, frame: Vec<u8>) -> (Load, Vec<u8>, bool) {
         let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else {
-            return (Load::Unreadable, frame.into(), None, false);
+            return (Load::Unreadable, frame, false);
         };
         let (series, begins) = self.series.number(unit, first, last);
-        let times = Some((first.end_time, last.end_time));
         let ticks = GyroTicks { series, first: first.sequence, count: batch.ticks.len() as u64 };
         batch.ticks.iter_mut().for_each(|tick| tick.series = series);
         // What could be decoded can be encoded.
-        let bytes = codec::encode(&batch).unwrap_or(frame);
-        (Load::Gyro(ticks), bytes.into(), times, begins)
+        (Load::Gyro(ticks), codec::encode(&batch).unwrap_or(frame), begins)
     }
 
     /// Adds the health readings that are due before a gyro batch.
@@ -204,14 +189,6 @@ impl<'a> Playlist<'a> {
         }
     }
 }
-
-/// Times of the first and the last.
-fn ends<T>(items: &[T], time: impl Fn(&T) -> Timestamp) -> Option<(Timestamp, Timestamp)> {
-    items.first().zip(items.last()).map(|(first, last)| (time(first), time(last)))
-}
-
-/// Load, bytes, times of the first and the last tick, whether it begins a series.
-type Loaded = (Load, ZBytes, Option<(Timestamp, Timestamp)>, bool);
 
 fn schedule(options: &PlayOptions) -> Schedule {
     match options.files {

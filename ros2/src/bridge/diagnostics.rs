@@ -104,7 +104,7 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
     if gaps > 0 {
         found.push((Level::Warn, format!("{gaps} gaps, {} ticks missing", since(|totals| totals.missing))));
     }
-    if let Some((jitter, stated)) = jitter_s.zip(mapping.stamp_uncertainty_s)
+    if let Some((jitter, stated)) = jitter_s.zip(mapping.time.uncertainty_s())
         && jitter > FACTOR * stated
     {
         let words = format!("stamps jitter by {:.0} us, stated are {:.0} us", jitter * 1e6, stated * 1e6);
@@ -138,7 +138,7 @@ fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
     }
     let stated =
         |uncertainty: Option<f64>| uncertainty.map_or("not stated".to_owned(), |s| format!("{:.1}", s * 1e6));
-    say("stamp uncertainty, stated (us)", stated(mapping.stamp_uncertainty_s));
+    say("stamp uncertainty, stated (us)", stated(mapping.time.uncertainty_s()));
     if let Some(jitter) = jitter_s {
         say("stamp jitter, last second (us)", format!("{:.1}", jitter * 1e6));
     }

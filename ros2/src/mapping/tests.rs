@@ -24,10 +24,10 @@ fn the_shipped_mapping_is_read() {
         unit.output,
         Qos { reliability: Reliability::Reliable, history: History::KeepLast, depth: 10 }
     );
-    assert!(unit.time.measured && unit.tick.as_ns() == 10_000_000);
+    assert!(unit.time.is_measured() && unit.time.tick().as_ns() == 10_000_000);
     // 0.15 °/√h.
-    assert!((unit.gyro.random_walk.unwrap() - 4.363_323e-5).abs() < 1e-10);
-    assert!((unit.accel.unwrap().random_walk.unwrap() - 5e-4).abs() < 1e-15);
+    assert!((unit.gyro.random_walk().unwrap() - 4.363_323e-5).abs() < 1e-10);
+    assert!((unit.accel.unwrap().random_walk().unwrap() - 5e-4).abs() < 1e-15);
 }
 
 #[test]
@@ -35,8 +35,8 @@ fn what_is_left_out_has_its_default() {
     let mapping = Mapping::parse(GOOD, "m").unwrap();
     let unit = &mapping.units[0];
     assert_eq!((mapping.namespace.as_str(), mapping.diagnostics.as_str()), ("/", "/diagnostics"));
-    assert_eq!((unit.accel, unit.stamp_uncertainty_s, unit.frame_id.as_deref()), (None, None, None));
-    assert_eq!(unit.gyro.conversion.factor.to_bits(), 1.0_f64.to_bits());
+    assert_eq!((unit.accel, unit.time.uncertainty_s(), unit.frame_id.as_deref()), (None, None, None));
+    assert_eq!(unit.gyro.unit, GyroUnit::RadPerS);
 }
 
 #[test]

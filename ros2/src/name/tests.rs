@@ -1,5 +1,7 @@
 //! Tokens as others write them. What is written here is frozen in `vectors.json`.
 
+mod hiroz;
+
 use super::*;
 use crate::Mapping;
 use crate::graph::{Finding, Topics};

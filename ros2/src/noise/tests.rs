@@ -37,10 +37,7 @@ fn the_document_comes_before_the_mapping() {
     let walk = 0.06_f64.to_radians() / 60.0;
     assert!(close(mems.rate(0.01)[4], walk * walk / 0.01), "{:?}", mems.rate(0.01));
     assert!(close(mems.force(0.01)[8], 1e-4 / 0.01), "{:?}", mems.force(0.01));
-    let unstated = UnitMapping {
-        gyro: crate::mapping::SensorsMapping { random_walk: None, ..mapping().gyro },
-        ..mapping()
-    };
+    let unstated = UnitMapping { gyro: crate::mapping::GyroMapping::default(), ..mapping() };
     assert_eq!(Noise::of(&document("MEMS-0001"), [2; 8], &unstated).gyro, None, "unknown");
 }
 

@@ -35,8 +35,8 @@ async fn a_service_elsewhere_and_a_zenoh_configuration_of_ones_own() {
         raw.put(to_cdr(&message(&step)).unwrap()).await;
         expected.extend(correct.take(&step));
     }
-    correct.offline.finish();
-    expected.extend(correct.offline.take());
+    correct.offline.flush();
+    expected.extend(correct.offline.take_ready());
     assert_eq!(expected.len(), MESSAGES);
     for tick in &expected {
         assert_eq!(bits(&corrected.imu().await), bits(&Imu::of_tick(header(tick.end_time.as_ns()), tick)));

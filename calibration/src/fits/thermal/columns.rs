@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 use std::iter;
 use std::ops::RangeInclusive;
+use std::slice;
 use std::sync::Arc;
 
 use isotherm_correction::calibration::{
@@ -17,10 +18,9 @@ use isotherm_correction::sample::{
     GyroTick, MAX_SENSORS, MIN_SENSORS, OutputKind, SensorFlags, Sensors, TemperatureReading,
 };
 use isotherm_correction::thermal::Feature;
-use isotherm_correction::unit::{MAX_TICK_DURATION, UnitSettings};
+use isotherm_correction::unit::{Event, MAX_TICK_DURATION, UnitSettings};
 use isotherm_correction::units::{AngularRate, Span, Timestamp};
-use isotherm_log::offline::{Loaded, Offline, unit_id};
-use isotherm_log::text::LogEvent;
+use isotherm_log::offline::{Loaded, unit_id};
 use isotherm_protocol::document::{Argument, Channel, Curve, Filter, Shape};
 
 use super::samples::Samples;
@@ -225,7 +225,7 @@ impl Basis {
         let padding = iter::repeat_n(Effect::Static.power(0), MIN_SENSORS.saturating_sub(terms.len()));
         let padded: Vec<Term> = terms.iter().copied().chain(padding).collect();
         let loaded = self.unit(&padded)?;
-        let mut unit = Offline::new(&loaded, UnitSettings::default());
+        let mut unit = loaded.stream(UnitSettings::default());
         let readings: &[TemperatureReading] =
             run.temperatures.get(&self.channel.name).map_or(&[], Vec::as_slice);
         // Some to a window, each no longer than the corrector takes.
@@ -239,7 +239,7 @@ impl Basis {
         while end < last {
             end += step.as_ns();
             while let Some(reading) = readings.next_if(|reading| reading.time.as_ns() <= end) {
-                unit.handle(&LogEvent::Temperature(*reading));
+                unit.handle(Event::Temperature(slice::from_ref(reading)));
             }
             let tick = GyroTick {
                 sequence,
@@ -254,8 +254,8 @@ impl Basis {
             };
             sequence += 1;
             // Without accelerometers every other tick goes through at once.
-            unit.handle(&LogEvent::Gyro { output: OutputKind::Mean, tick });
-            unit.take();
+            unit.handle(Event::Gyro { output: OutputKind::Mean, ticks: &[tick] });
+            unit.drop_ready();
             if let Some(seen) = unit.unit().observation() {
                 sums.take(seen, step.as_s());
             }

@@ -7,7 +7,7 @@ use isotherm_calibration::report::{Report, residuals};
 use isotherm_calibration::runs::Run;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
-use isotherm_log::offline::{Offline, load_calibration};
+use isotherm_log::offline::load_calibration;
 use isotherm_log::text::LogEvent;
 use isotherm_protocol::document::{AccelOutput, Curve, Document, Sample, Shape};
 use isotherm_simulator::Scenario;
@@ -246,12 +246,12 @@ fn the_residual_of_runs_in_two_attitudes_is_that_of_the_service() {
         let mut left: [Vec<f64>; 3] = Default::default();
         for (scenario, stand) in scenarios.iter().zip(&stands) {
             let Site::Known { force_m_per_s2: Some(force), .. } = stand.site else { panic!() };
-            let mut unit = Offline::new(&loaded, UnitSettings::default());
+            let mut unit = loaded.stream(UnitSettings::default());
             for event in events(scenario) {
-                unit.handle(&event);
+                unit.handle((&event).into());
             }
-            unit.finish();
-            for window in unit.take().chunks(10).filter(|window| window.len() == 10) {
+            unit.flush();
+            for window in unit.take_ready().chunks(10).filter(|window| window.len() == 10) {
                 for axis in 0..3 {
                     let mean = window.iter().map(|tick| tick.delta_velocity[axis]).sum::<f64>()
                         / window.iter().map(|tick| tick.duration.as_s()).sum::<f64>();

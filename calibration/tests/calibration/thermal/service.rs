@@ -10,7 +10,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
 use isotherm_log::mapping::Mapping;
-use isotherm_log::offline::{Offline, load_calibration, unit_id};
+use isotherm_log::offline::{load_calibration, unit_id};
 use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::text::LogReader;
 use isotherm_protocol::document::{Curve, Document, Sample, Shape};
@@ -79,12 +79,12 @@ fn the_residual_of_the_report_is_that_of_the_service() {
         assert_eq!(curves > 0, method == Method::Sequential, "{}", made.report.headline());
 
         // As isotherm-replay correct does it: the document from its file, the log event by event.
-        let mut unit = Offline::new(&load_calibration(&out).unwrap(), UnitSettings::default());
+        let mut unit = load_calibration(&out).unwrap().stream(UnitSettings::default());
         for event in LogReader::open(&mapping, std::slice::from_ref(&log)).unwrap() {
-            unit.handle(&event.unwrap());
+            unit.handle((&event.unwrap()).into());
         }
-        unit.finish();
-        let ticks = unit.take();
+        unit.flush();
+        let ticks = unit.take_ready();
         let residuals = residuals(&made.report.verdicts);
         for (axis, name) in ["gyro.x", "gyro.y", "gyro.z"].into_iter().enumerate() {
             let mut means = Vec::new();

@@ -114,7 +114,7 @@ impl File<'_> {
 
     /// The first stamp of a column, as it is written.
     fn stamp(self, column: usize) -> String {
-        let cells = self.found.rows.first().map(|row| layout::cells(row, self.found.split_at));
+        let cells = self.found.rows.first().map(|row| layout::cells(row, self.found.delimiter));
         let cell = |index: usize| cells.as_ref()?.get(index).cloned();
         let date =
             self.found.date_and_time.filter(|(_, time)| *time == column).and_then(|(date, _)| cell(date));

@@ -42,7 +42,7 @@ impl File<'_> {
             &[
                 ("name", named.then(|| quoted(self.name))),
                 ("encoding", (found.encoding != Encoding::Utf8).then(|| quoted(found.encoding.word()))),
-                ("delimiter", Some(quoted(found.delimiter))),
+                ("delimiter", Some(quoted(found.delimiter.word()))),
                 ("decimal_mark", (found.decimal_mark != b'.').then(|| quoted(","))),
                 ("comment", found.comment.map(quoted)),
                 ("skip_lines", counted(found.skip_lines)),

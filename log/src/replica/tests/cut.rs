@@ -2,7 +2,7 @@
 
 use super::session::Session;
 use super::*;
-use crate::diff::{Account, DiffOptions};
+use crate::diff::Account;
 use crate::offline::{Basis, Form, RunOptions, UnitPlan, correct};
 use crate::part::{LogFiles, Part};
 use crate::recording::{RecordingOptions, RecordingWriter};
@@ -22,7 +22,7 @@ fn corrected(messages: &[Message]) -> Account {
         UnitPlan { id, basis, compare: true }
     };
     let plans = outlines.units.into_iter().map(plan).collect();
-    let options = RunOptions { threads: 1, form: Form::Sums, from_ns: 0, diff: DiffOptions::default() };
+    let options = RunOptions { threads: 1, form: Form::Sums, from_ns: 0 };
     let files = LogFiles::Recordings(vec![path]);
     let (mut units, _) = correct(&files, &Part::default(), plans, options, &mut |_, _| Ok(())).unwrap();
     units.remove(0).published.unwrap()

@@ -7,7 +7,6 @@ use std::thread::available_parallelism;
 use isotherm_cli::{Bar, Exit};
 use isotherm_correction::units::Span;
 use isotherm_document::few;
-use isotherm_log::diff::DiffOptions;
 use isotherm_log::file::read_small_text;
 use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
 use isotherm_log::part::{LogFiles, Part};
@@ -87,7 +86,6 @@ fn make(
         threads: args.threads.map_or(cores, usize::from),
         form: sink.form(args.format),
         from_ns,
-        diff: DiffOptions::default(),
     };
     let (mut bar, mut ticks) = (None, 0);
     let result = correct(files, part, plans, options, &mut |made, progress| {

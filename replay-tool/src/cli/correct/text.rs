@@ -4,8 +4,9 @@ use std::path::Path;
 
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::offline::sums::{Summary, Sums};
-use isotherm_log::offline::{Form, Made, Offline, load_calibration};
+use isotherm_log::offline::{Form, Made, Output, counters, load_calibration, troubles};
 use isotherm_log::text::ReadReport;
+use isotherm_protocol::stream::UnitStream;
 use serde::Serialize;
 
 use super::sink::Sink;
@@ -60,30 +61,31 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         show::warn(&warning.to_string());
     }
     let mut events = args.log.events()?;
-    let mut inputs = events.inner().paths().to_vec();
+    let mut inputs = events.paths().to_vec();
     inputs.extend(args.log.mapping_file().into_iter().chain([calibration.to_owned()]));
     let mut sink = Sink::open(args, std::slice::from_ref(&loaded.unit), &inputs)?;
     let form = sink.form(args.format);
-    let mut unit = Offline::new(&loaded, settings);
+    let mut stream = loaded.stream(settings);
     let mut sums = Sums::default();
-    let mut bar = Bar::over_log(events.inner().progress().watch());
+    let mut bar = Bar::over_log(events.progress().watch());
     for event in &mut events {
-        unit.handle(&event?);
-        if unit.ready() >= BLOCK {
-            sink.write(take(&mut unit, &mut sums, form))?;
+        stream.handle((&event?).into());
+        if stream.ready().len() >= BLOCK {
+            sink.write(take(&mut stream, &mut sums, form))?;
         }
         bar.step_saying(|| Some(format!("{} ticks", sums.ticks())));
     }
-    unit.finish();
-    if unit.unit().counters().gyro_ticks_in == 0 && !events.inner().report().lost_data() {
+    stream.flush();
+    let ticks_in = stream.unit().counters().gyro_ticks_in;
+    if ticks_in == 0 && !events.report().lost_data() {
         return Err(Error::Nothing("corrected"));
     }
-    sink.write(take(&mut unit, &mut sums, form))?;
+    sink.write(take(&mut stream, &mut sums, form))?;
     sink.finish(&inputs)?;
     bar.finish();
 
-    let (summary, log) = (sums.summary(), events.inner().report());
-    for trouble in unit.troubles().into_iter().chain(summary.doubts()) {
+    let (summary, log) = (sums.summary(), events.report());
+    for trouble in troubles(&stream).into_iter().chain(summary.doubts()) {
         show::warn(&trouble);
     }
     let digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
@@ -91,17 +93,21 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         unit: loaded.unit.as_str(),
         calibration_digest: digest,
         summary: &summary,
-        counters: unit.counters().into_iter().collect(),
+        counters: counters(&stream).collect(),
         log: &log,
     };
     print_summary(args, &if args.json { show::json(&report) } else { human(&report) })?;
-    Ok(Exit::of_loss(log.lost_data() || unit.refused() > 0))
+    // What went in did not all go out corrected, though the log has it.
+    let refused = ticks_in > stream.unit().counters().ticks_out;
+    Ok(Exit::of_loss(log.lost_data() || refused))
 }
 
 /// Takes what is ready and sums it up.
-fn take(unit: &mut Offline, sums: &mut Sums, form: Form) -> Made {
-    unit.peek().for_each(|tick| sums.add(tick));
-    vec![(0, unit.give_out(form))]
+fn take(stream: &mut UnitStream, sums: &mut Sums, form: Form) -> Made {
+    stream.ready().ticks().iter().for_each(|tick| sums.add(tick));
+    let mut output = Output::default();
+    output.give_out(stream, form, &mut Vec::new());
+    vec![(0, output)]
 }
 
 /// The summary as tables.

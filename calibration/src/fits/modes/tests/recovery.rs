@@ -1,7 +1,7 @@
 //! Constants are recovered within what is stated of them.
 
 use isotherm_correction::unit::UnitSettings;
-use isotherm_log::offline::{Offline, load_calibration};
+use isotherm_log::offline::load_calibration;
 use isotherm_protocol::document::Sample;
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
@@ -176,14 +176,14 @@ fn what_is_reported_is_what_offline_correction_gives(made: &Made, scenario: &Sce
     let path = folder.path().join("modes.toml");
     made.written.save(&path, false).unwrap();
     let loaded = load_calibration(&path).unwrap();
-    let mut unit = Offline::new(&loaded, UnitSettings::default());
+    let mut unit = loaded.stream(UnitSettings::default());
     let mut ticks = Vec::new();
     for event in events(scenario) {
-        unit.handle(&event);
-        ticks.extend(unit.take());
+        unit.handle((&event).into());
+        ticks.extend(unit.take_ready());
     }
-    unit.finish();
-    ticks.extend(unit.take());
+    unit.flush();
+    ticks.extend(unit.take_ready());
     let per_window = (made.window_s / TICK_S).round();
     let earth = place().earth_rate_in_case(None).unwrap();
     for (axis, name) in ["gyro x", "gyro y", "gyro z"].iter().enumerate() {

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::{Kind, parse};
+use crate::name::{Kind, parse};
 
 /// Quality of service: reliable, volatile, messages kept (`None`: all). What is left out or 0 is the system's default; its depth is 10.
 fn qos(text: &str) -> Option<(bool, bool, Option<u32>)> {
@@ -46,7 +46,7 @@ fn its_own_cases_of_quality_are_read_as_it_reads_them() {
 
 #[test]
 fn every_frozen_token_says_by_its_rules_what_was_meant() {
-    let vectors: Value = serde_json::from_str(include_str!("../../vectors.json")).unwrap();
+    let vectors: Value = serde_json::from_str(include_str!("../../../vectors.json")).unwrap();
     for node in vectors["nodes"].as_array().unwrap() {
         let text = |value: &Value| value.as_str().unwrap().to_owned();
         let (domain, session) = (node["domain"].to_string(), text(&node["session"]));
