@@ -75,7 +75,7 @@ pub fn details(made: &Made) -> Value {
     };
     let left = |found: &GyroRates| found.left.iter().map(|left| tidy(*left)).collect();
     let mut details = json!({
-        "rate_deg_per_s": made.steps.iter().map(|step| step.matched.step.rate_deg_per_s).collect::<Vec<_>>(),
+        "rate_deg_per_s": made.steps.iter().map(|one| one.step.rate_deg_per_s).collect::<Vec<_>>(),
         "nonlinearity_deg_per_h": by_name(gyros().map(|(name, found)| (name, left(found)))),
         "covariance": by_name(gyros().map(|(name, found)| (name, rows(&found.covariance)))),
     });

@@ -29,6 +29,11 @@ impl Plateau {
     pub fn size(&self) -> f64 {
         norm(self.rate.iter().copied())
     }
+
+    /// Its bins.
+    pub fn own<'a>(&self, bins: &'a [Bin]) -> &'a [Bin] {
+        bins.get(self.bins[0]..self.bins[1]).unwrap_or_default()
+    }
 }
 
 /// Standard deviation of a bin's rate by gyro (°/h), from the differences of neighbours; most of a run is steady.
