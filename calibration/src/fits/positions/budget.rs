@@ -88,25 +88,21 @@ impl Budget {
     /// Standard error of the elements of C that the least-squares fit of a plan will state, mean and largest (″); `None` where
     /// the plan does not determine them.
     pub fn of_plan(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
-        let taken: Vec<Taken> = plan
-            .positions
-            .iter()
-            .enumerate()
-            .map(|(position, stated)| Taken {
-                position,
-                outputs: plan.up(&stated.attitude, [0.0; 3]).map(|c| c * self.scale).to_vec(),
-                ratio: vec![1.0; 3],
-                duration_s: self.seconds,
-                sensor_t: vec![0.0; 3],
-                axes_t: 0.0,
-                level: 0,
-            })
-            .collect();
+        let taken = |position| Taken {
+            position,
+            outputs: plan.up(position, [0.0; 3]).map(|c| c * self.scale).to_vec(),
+            ratio: vec![1.0; 3],
+            duration_s: self.seconds,
+            sensor_t: vec![0.0; 3],
+            axes_t: 0.0,
+            level: 0,
+        };
+        let taken: Vec<Taken> = (0..plan.positions.len()).map(taken).collect();
         let guess = guesses(plan, &taken, 3).ok()?;
         let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
-        let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights };
-        let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
+        let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights, degrees: Degrees::NONE };
+        let found = all.planned().ok()?;
         let covariance = found.axes_covariance(0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / real(sigma.len())).sqrt();
@@ -269,8 +265,8 @@ mod tests {
     fn a_plan_without_a_stand_is_budgeted_as_it_is_fitted() {
         use crate::fits::positions::plan::Attitude;
         let mut plan = Plan::twelve();
-        for position in &mut plan.positions {
-            position.attitude = Attitude::Up(Plan::twelve().up(&position.attitude, [0.0; 3]).map(f64::round));
+        for (index, position) in plan.positions.iter_mut().enumerate() {
+            position.attitude = Attitude::Up(Plan::twelve().up(index, [0.0; 3]).map(f64::round));
         }
         // Two pairs for every element, each out of level by the stand's 60″: half of that, as the fit says.
         let [mean, most] = example().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();

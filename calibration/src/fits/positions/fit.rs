@@ -131,14 +131,14 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, (&bad, sensors)))?;
     let most = levels_deg_c.len() - 1;
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
-    let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights };
-    let found = all.fit(degrees).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
-    let quadratic =
-        (most >= 2).then(|| all.fit(Degrees { axes: 2, ..degrees }).ok()).flatten().map(|quadratic| {
-            let (chi_square, terms) = quadratic_terms(&quadratic);
-            let accident = survival(chi_square, terms);
-            (quadratic, chi_square, terms, accident)
-        });
+    let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights, degrees };
+    let found = all.fit().map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
+    let bent = Positions { degrees: Degrees { axes: 2, ..degrees }, ..all };
+    let quadratic = (most >= 2).then(|| bent.fit().ok()).flatten().map(|quadratic| {
+        let (chi_square, terms) = quadratic_terms(&quadratic);
+        let accident = survival(chi_square, terms);
+        (quadratic, chi_square, terms, accident)
+    });
     let curved = quadratic.as_ref().filter(|found| found.3 < ACCIDENT);
     let best = curved.map_or(&found, |found| &found.0);
     let widened = widening(best, &mut warnings);

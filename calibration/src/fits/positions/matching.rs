@@ -32,7 +32,7 @@ pub type Matched = (Vec<Option<usize>>, Option<String>);
 pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, String> {
     let directions = directions(poses)?;
     let fits = |pose: usize, position: usize| {
-        let up = plan.up(&plan.positions[position].attitude, [0.0; 3]);
+        let up = plan.up(position, [0.0; 3]);
         directions[pose].angle(&Vector3::from(up)) < DIRECTION_RAD
     };
     let candidates: Vec<Vec<usize>> = (0..poses.len())
@@ -127,7 +127,7 @@ fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 
 /// Words where a plan's neighbours differ by a turn about the vertical, which no accelerometer feels: without the turns in the log
 /// one is taken for the other, or both for one pose.
 fn unseen(plan: &Plan) -> Option<String> {
-    let up = |position: usize| Vector3::from(plan.up(&plan.positions[position].attitude, [0.0; 3]));
+    let up = |position: usize| Vector3::from(plan.up(position, [0.0; 3]));
     let pair =
         (1..plan.positions.len()).find(|position| up(*position).angle(&up(position - 1)) < DIRECTION_RAD)?;
     Some(format!(
