@@ -32,6 +32,20 @@ pub fn main_axis(row: &[f64; 3]) -> usize {
     (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best })
 }
 
+/// The two axes beside one.
+pub const fn others(axis: usize) -> [usize; 2] {
+    match axis {
+        0 => [1, 2],
+        1 => [0, 2],
+        _ => [0, 1],
+    }
+}
+
+/// The two case axes that an axis is across.
+pub fn across(row: &[f64; 3]) -> [usize; 2] {
+    others(main_axis(row))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,7 +5,7 @@ use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
-use crate::axes::{AXES, main_axis};
+use crate::axes::{AXES, across};
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::bars;
 
@@ -38,12 +38,6 @@ fn at(axis: &[[f64; 3]], x: f64) -> [f64; 3] {
     axis.iter().rev().fold([0.0; 3], |sum, row| [0, 1, 2].map(|i| sum[i] * x + row[i]))
 }
 
-/// Elements of a row that say where the axis points: all but the largest.
-pub(super) fn across(row: [f64; 3]) -> impl Iterator<Item = usize> {
-    let largest = main_axis(&row);
-    (0..3).filter(move |i| *i != largest)
-}
-
 /// What is left by itself: beside what was there before, it is a line at zero.
 pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
     let panel = |axis: usize| {
@@ -60,7 +54,7 @@ pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
 /// Elements that are shown over temperature: sensor, element.
 pub(super) fn shown(analysis: &Analysis) -> Vec<(usize, usize)> {
     let sensors = analysis.fit.sensors.iter().enumerate();
-    sensors.flat_map(|(index, sensor)| across(sensor.axis[0]).map(move |i| (index, i))).collect()
+    sensors.flat_map(|(index, sensor)| across(&sensor.axis[0]).map(move |i| (index, i))).collect()
 }
 
 /// An element of C at each temperature by itself with its standard error (″); `None` where the positions of one do not tell.

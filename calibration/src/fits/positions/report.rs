@@ -3,14 +3,14 @@
 use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::charts::{across, axes_chart, bend, by_level, left_chart, shown};
+use super::charts::{axes_chart, bend, by_level, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::judged::{Judgement, curves, lengths};
 use super::model::SMALL;
 use super::solve::Fit;
-use crate::axes::AXES;
+use crate::axes::{AXES, across};
 use crate::document::accel_name;
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Curve, Report, Verdict, counted, fixed, or_dash, output_unit, per_deg_c, short, six};
@@ -175,7 +175,7 @@ fn coefficients(
             for (power, row) in sensor.axis.iter().enumerate().skip(from) {
                 let factor = by_power(power) * ARCSEC_PER_RAD;
                 let sigma = fit.axis_sigma(index, power);
-                for i in across(sensor.axis[0]) {
+                for i in across(&sensor.axis[0]) {
                     let name = format!("accelerometer {name} C{power}{what} along {}", AXES[i]);
                     let sigma = sigma[i] * factor * analysis.widened;
                     report.coefficient(name, per_deg_c("″", power), row[i] * factor, sigma);

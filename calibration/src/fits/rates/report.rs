@@ -8,7 +8,7 @@ use super::fit::Made;
 use super::matching::Matched;
 use super::model::GyroRates;
 use super::over_temperature::OverTemperature;
-use crate::axes::{AXES, main_axis};
+use crate::axes::{AXES, across};
 use crate::finding::Kind;
 use crate::numbers::dot;
 use crate::report::{Report, counted, fixed, gyros, per_deg_c, short, together};
@@ -100,8 +100,7 @@ fn over_temperature(made: &Made, over: &OverTemperature, report: &mut Report) {
                 *sigma,
             );
         }
-        let main = main_axis(&line.axis);
-        for along in (0..3).filter(|along| *along != main) {
+        for along in across(&line.axis) {
             let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
             let name = format!("C1 along {}", AXES[along]);
             add(name, per_deg_c("″", 1), arcsec(line.slope[along]), arcsec(line.slope_sigma[along]));
