@@ -14,9 +14,7 @@ use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::solve::{Fit, Positions, Weights, guesses};
 use super::still::{StillLimits, still};
-use super::temperature::{
-    Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
-};
+use super::temperature::{blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck};
 use super::times::Times;
 use super::track::Track;
 use crate::document::accel_name;
@@ -49,8 +47,6 @@ pub struct Settings {
 pub struct Analysis {
     /// All poses that are positions, with the position's number.
     pub poses: Vec<(Pose, usize)>,
-    /// The positions as the fit had them.
-    pub taken: Vec<Taken>,
     /// Mean temperature of each level (°C); one that is no number where nothing measures it.
     pub levels_deg_c: Vec<f64>,
     /// What the document will hold: C constant or linear.
@@ -66,8 +62,8 @@ pub struct Analysis {
     pub half_deg_c: f64,
     /// Lowest and highest temperature that the orientation follows (°C).
     pub range_deg_c: [f64; 2],
-    /// What K and S of each accelerometer were taken at: the temperatures of its own channel.
-    pub sensors_deg_c: Vec<Temperatures>,
+    /// What K and S of each accelerometer were taken at: the temperatures of its own channel, by position (°C).
+    pub sensors_deg_c: Vec<Vec<f64>>,
     /// Mean temperature of the channels that the slopes of the document's C follow (°C).
     pub slopes_deg_c: f64,
     /// Channels that the orientation follows.
@@ -159,7 +155,6 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     }
     let analysis = Analysis {
         poses,
-        taken,
         levels_deg_c,
         fit: found,
         quadratic,
@@ -167,7 +162,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         reference_deg_c: reference,
         half_deg_c: half,
         range_deg_c: [low, high],
-        sensors_deg_c: own.iter().map(|deg_c| Temperatures::of(deg_c)).collect(),
+        sensors_deg_c: own,
         slopes_deg_c: slopes_deg_c(document, &plain).unwrap_or(document.temperature.assumed_deg_c),
         channels,
         weights,
