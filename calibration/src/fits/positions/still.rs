@@ -68,22 +68,12 @@ pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Inte
     // False for no number too.
     let calm: Vec<bool> = variance.iter().map(|value| *value <= limit).collect();
     let turning = turning(track, limits, half, &calm);
-    let gap = |tick: usize| {
-        tick > 0 && (track.start_s(tick) - track.start_s(tick - 1)) > 1.5 * track.duration_s[tick - 1] + 1e-6
-    };
-    let mut found: Vec<Interval> = Vec::new();
-    let mut first = None;
-    for tick in 0..=track.len() {
-        let still = calm.get(tick).is_some_and(|calm| *calm) && !turning.get(tick).is_none_or(|turns| *turns);
-        if let Some(begin) = first.filter(|_| !still || gap(tick)) {
-            found.push(Interval { first: begin, end: tick });
-            first = None;
-        }
-        if still && first.is_none() {
-            first = Some(tick);
-        }
-    }
-    found.into_iter().filter_map(|interval| settled(track, interval, limits)).collect()
+    let gap =
+        |tick: usize| track.start_s(tick) - track.start_s(tick - 1) > 1.5 * track.duration_s[tick - 1] + 1e-6;
+    let still: Vec<usize> = (0..track.len()).filter(|tick| calm[*tick] && !turning[*tick]).collect();
+    let together = still.chunk_by(|last, tick| *tick == last + 1 && !gap(*tick));
+    let intervals = together.map(|ticks| Interval { first: ticks[0], end: ticks[0] + ticks.len() });
+    intervals.filter_map(|interval| settled(track, interval, limits)).collect()
 }
 
 /// The interval without the time that the unit takes to settle; `None` where what is left is too short.

@@ -70,7 +70,11 @@ pub(super) fn in_case(axes: &[[f64; 3]]) -> impl Fn(&dyn Fn(usize) -> f64) -> [f
 /// Carries the Earth's rate through the bins of runs whose attitude is known, and adds it to the rates of their steps.
 pub(super) fn carry_earth(runs: &mut [Turned], axes: &[[f64; 3]], gains: &[f64], biases: &[f64]) {
     let in_case = in_case(axes);
-    let turning = |bin: &Bin| in_case(&|sensor| (bin.rate[sensor] - biases[sensor]) / gains[sensor]);
+    // What the gyros show is relative to the stars: the Earth's own turning is in it.
+    let turning = |bin: &Bin, earth: [f64; 3]| {
+        let rate = in_case(&|sensor| (bin.rate[sensor] - biases[sensor]) / gains[sensor]);
+        [0, 1, 2].map(|axis| rate[axis] - earth[axis])
+    };
     for run in runs {
         let Some(start) = run.earth_start else { continue };
         let bins = &mut run.binned.bins;
