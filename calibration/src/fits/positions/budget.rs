@@ -109,14 +109,7 @@ impl Budget {
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
     }
 
-    /// How well an axis is known by the plan's own fit, and with what the housing and the measured temperature add (″); `None` where
-    /// the plan does not determine it.
-    pub fn known_by(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
-        let [mean, _] = self.of_plan(plan, levelling_rad)?;
-        Some([mean, mean.hypot(self.thermal_arcsec())])
-    }
-
-    /// What this plan comes to.
+    /// What this plan comes to: how well an axis is known by its own fit, and with what the housing and the measured temperature add (″).
     fn words(plan: &Plan, known: Option<[f64; 2]>) -> String {
         let count = counted(plan.positions.len(), "position", "positions");
         if let Some([known, later]) = known {
@@ -132,7 +125,8 @@ impl Budget {
 
     /// All that is said of it.
     pub fn report(&self, plan: &Plan, levelling_rad: f64) -> Report {
-        let known = self.known_by(plan, levelling_rad);
+        let of_plan = self.of_plan(plan, levelling_rad);
+        let known = of_plan.map(|[mean, _]| [mean, mean.hypot(self.thermal_arcsec())]);
         let mut report = Report::saying("Error budget of positions", "budget", Self::words(plan, known));
         let formula = "By the formula of 004, which adds its errors independent of the plan";
         report.notes.push(format!("{formula}: {:.1}″.", self.total_arcsec()));
@@ -140,7 +134,6 @@ impl Budget {
             TYPICAL_ARCSEC_PER_DEG_C.map(|(name, rate)| (name, rate, self.temperature_arcsec(rate)));
         let words = typical.map(|(name, rate, error)| format!("{error:.1}″ for {name} ({rate} ″/°C)"));
         report.notes.push(format!("Error by the measured temperature: {}.", words.join(", ")));
-        let of_plan = self.of_plan(plan, levelling_rad);
         if let Some([mean, largest]) = of_plan {
             let level =
                 format!(", with a level known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD);
@@ -254,7 +247,8 @@ mod tests {
     fn the_first_line_is_of_the_plan() {
         let budget = example();
         let first = |plan: &Plan| budget.report(plan, 60.0 / ARCSEC_PER_RAD).headline();
-        let [known, later] = budget.known_by(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
+        let [known, _] = budget.of_plan(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
+        let later = known.hypot(budget.thermal_arcsec());
         assert!(known > 20.0 && later > known && later < known + 5.0, "{known} {later}");
         let mut flat = Plan::twelve();
         flat.positions.retain(|position| !position.name.starts_with('Z'));

@@ -116,28 +116,24 @@ fn turning(track: &Track, limits: &StillLimits, half: usize, calm: &[bool]) -> V
 fn spread(column: &[f64], half: usize) -> (Vec<f64>, Vec<f64>) {
     // Sums of squares would lose the variance beside a large mean.
     let about = quantile(column, 0.5);
-    let mut sums = Vec::with_capacity(column.len() + 1);
-    let (mut first, mut second) = (0.0, 0.0);
-    sums.push((0.0, 0.0));
-    let mut broken_until = 0;
-    let mut broken = vec![false; column.len()];
-    for (tick, value) in column.iter().enumerate() {
+    // Up to each tick: sums of both powers, and how many readings are not numbers.
+    let (mut first, mut second, mut broken) = (0.0, 0.0, 0_usize);
+    let mut sums = vec![(first, second, broken)];
+    for value in column {
         let away = value - about;
         if away.is_finite() {
             first += away;
             second += away * away;
         } else {
-            let low = tick.saturating_sub(half).max(broken_until);
-            broken_until = (tick + half + 1).min(column.len());
-            broken[low..broken_until].fill(true);
+            broken += 1;
         }
-        sums.push((first, second));
+        sums.push((first, second, broken));
     }
     let of = |tick: usize| {
-        if broken[tick] {
+        let (low, high) = (tick.saturating_sub(half), (tick + half + 1).min(column.len()));
+        if sums[high].2 > sums[low].2 {
             return (f64::NAN, f64::NAN);
         }
-        let (low, high) = (tick.saturating_sub(half), (tick + half + 1).min(column.len()));
         let count = real(high - low);
         let mean = (sums[high].0 - sums[low].0) / count;
         let square = (sums[high].1 - sums[low].1) / count;

@@ -61,8 +61,6 @@ pub struct Made {
     pub earth_known: bool,
     /// Whether the weights of the base are near those of the unit.
     pub scale_known: bool,
-    /// White noise of each gyro (°/√h).
-    pub walk: Vec<f64>,
     /// Verdicts, by case axis.
     pub verdicts: Vec<Verdict>,
     /// Mean temperature of each run (°C).
@@ -121,7 +119,7 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         }
     }
     let steps = steps_of(&runs);
-    let rates: Vec<[f64; 3]> = steps.iter().map(|step| step.rate).collect();
+    let rates: Vec<[f64; 3]> = steps.iter().map(|one| one.rate).collect();
     let mut doubted = Vec::new();
     for (sensor, found) in gyros.iter_mut().enumerate() {
         let what =
@@ -150,7 +148,6 @@ pub fn make(wanted: &Wanted<'_>, watch: &mut dyn Watch) -> Result<Made, Error> {
         judged,
         earth_known: !wanted.place.is_empty(),
         scale_known: wanted.scale_known,
-        walk,
         verdicts: Vec::new(),
         temperatures_deg_c: temperatures,
         over_temperature,
@@ -258,9 +255,9 @@ impl Made {
         for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
             let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
             let ticks = Table::of_rows(run, &self.written.loaded, Rows::TICKS, &mut *watch)?;
-            for step in steps.iter_mut().filter(|step| step.step.run == number) {
-                let mean = ticks.mean_rate_within(step.plateau.window_s);
-                step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
+            for one in steps.iter_mut().filter(|one| one.step.run == number) {
+                let mean = ticks.mean_rate_within(one.plateau.window_s);
+                one.error[sample] = [0, 1, 2].map(|axis| mean[axis] - one.rate[axis]);
             }
         }
         Ok(())
@@ -282,7 +279,7 @@ impl Made {
 /// bias is not what rates are about, so means are taken off.
 fn verdicts(steps: &[Matched], judged: &[Matched]) -> Vec<Verdict> {
     let of = |steps: &[Matched], axis: usize, sample: usize| -> Vec<f64> {
-        let errors: Vec<f64> = steps.iter().map(|step| step.error[sample][axis]).collect();
+        let errors: Vec<f64> = steps.iter().map(|one| one.error[sample][axis]).collect();
         let mean = Size::of(&errors).mean;
         errors.iter().map(|error| error - mean).collect()
     };
