@@ -6,7 +6,7 @@ use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
 use crate::axes::{AXES, across};
-use crate::numbers::ARCSEC_PER_RAD;
+use crate::numbers::{ARCSEC_PER_RAD, norm};
 use crate::report::bars;
 
 /// Points of a curve over temperature.
@@ -20,8 +20,7 @@ pub fn bend(analysis: &Analysis) -> f64 {
         let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
         for (bent, straight) in quadratic.sensors.iter().zip(&analysis.fit.sensors) {
             let (a, b) = (at(&bent.axis, x), at(&straight.axis, x));
-            let away = libm::sqrt((0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum());
-            largest = largest.max(away);
+            largest = largest.max(norm([0, 1, 2].map(|i| a[i] - b[i])));
         }
     }
     largest

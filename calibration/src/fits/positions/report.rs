@@ -149,25 +149,20 @@ fn coefficients(
     let fit = &analysis.fit;
     let output = output_unit(document);
     let by_power = |power: usize| analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
-    let of_sensor = fit.degrees.of_sensor();
-    let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
-        let sigma = |offset: usize, scale: f64| {
-            fit.solution.sigma(index * of_sensor + offset) * SMALL * scale * analysis.widened
-        };
         let guess = fit.guess[index].scale;
-        for (power, k) in sensor.scale.iter().enumerate() {
-            let factor = by_power(power);
-            let value = k * factor / gravity;
-            let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
-            let sigma = sigma(power, guess / gravity * factor);
-            report.coefficient(format!("accelerometer {name} K{power}"), unit, value, sigma);
-        }
-        for (power, bias) in sensor.bias.iter().enumerate() {
-            let factor = by_power(power);
-            let unit = per_deg_c(output, power);
-            let sigma = sigma(s + power, guess * factor);
-            report.coefficient(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma);
+        let mut place = index * fit.degrees.of_sensor();
+        let per_input = format!("{output}/(m/s²)");
+        for (letter, values, unit, per) in
+            [("K", &sensor.scale, per_input.as_str(), gravity), ("S", &sensor.bias, output, 1.0)]
+        {
+            for (power, value) in values.iter().enumerate() {
+                let factor = by_power(power);
+                let sigma = fit.solution.sigma(place) * SMALL * (guess / per * factor) * analysis.widened;
+                let name = format!("accelerometer {name} {letter}{power}");
+                report.coefficient(name, per_deg_c(unit, power), value * factor / per, sigma);
+                place += 1;
+            }
         }
     }
     let mut axes = |fit: &Fit, from: usize, what: &str| {
