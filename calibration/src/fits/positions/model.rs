@@ -5,7 +5,7 @@
 //! ```
 //!
 //! n is a sensor's first guess, t and w are at right angles to it. K, S, a and b are polynomials of temperature. This is the form
-//! that the service evaluates ([`Guess::found`] only moves the length of C's row into K), so that nothing is lost between the
+//! that the service evaluates (`Guess::found` only moves the length of C's row into K), so that nothing is lost between the
 //! fit and the document.
 
 use crate::lsq::linear::{self, SINGULAR, Weak};

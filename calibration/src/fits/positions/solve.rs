@@ -143,7 +143,7 @@ impl Positions<'_> {
     fn residuals(&self) -> impl Fn(&[f64]) -> Vec<f64> {
         let whitening: Vec<DMatrix<f64>> = self.taken.iter().map(|taken| self.whitening(taken)).collect();
         let prior = self.weights.levelling_rad / SMALL;
-        move |p| {
+        move |p: &[f64]| {
             let mut all = Vec::with_capacity(self.taken.len() * self.guess.len() + 3);
             for (taken, whitening) in self.taken.iter().zip(&whitening) {
                 let up = self.plan.up(taken.position, errors(p));

@@ -19,7 +19,8 @@ pub(super) fn white(base: &Document, runs: &[Turned], sensor: usize, gain: [f64;
     let count = count_arcsec(base, sensor);
     let (mut sum, mut number) = (0.0, 0.0);
     let own = |bin: &Bin| bin.rate[sensor] - dot(gain, bin.earth);
-    let steps = runs.iter().flat_map(|run| run.matched.iter().map(|one| one.plateau.own(&run.binned.bins)));
+    let steps =
+        runs.iter().flat_map(|run| run.matched.iter().map(move |one| one.plateau.own(&run.binned.bins)));
     for three in steps.flat_map(|bins| bins.windows(3)) {
         let second = own(&three[0]) - 2.0 * own(&three[1]) + own(&three[2]);
         let length = three[1].good_s;
