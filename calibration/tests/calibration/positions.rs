@@ -225,7 +225,7 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
         }
         unit.finish();
         ticks.extend(unit.take());
-        let own = &ticks[pose.interval.first..pose.interval.end];
+        let own = &ticks[pose.ticks.clone()];
         let seconds: f64 = own.iter().map(|tick| tick.duration.as_s()).sum();
         let up = plan.up(*position, errors);
         for (axis, up) in up.iter().enumerate() {

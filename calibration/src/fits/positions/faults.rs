@@ -37,7 +37,7 @@ pub fn clipped(tracks: &[Track], poses: &[&Pose]) -> Vec<String> {
     let of = |sensor: usize| {
         let constant = |pose: &&Pose| {
             let column = tracks.get(pose.run)?.outputs.get(sensor)?;
-            faults::dead(column.get(pose.interval.first..pose.interval.end)?)
+            faults::dead(column.get(pose.ticks.clone())?)
         };
         let at: Vec<f64> = poses.iter().filter_map(constant).collect();
         let first = at.first().filter(|_| at.len() < poses.len())?;

@@ -194,7 +194,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             continue;
         }
         let intervals = still(track, &settings.limits, None);
-        let poses = Pose::of(track, run, &intervals);
+        let poses = Pose::of(track, run, intervals);
         if poses.is_empty() {
             reasons.push(format!(
                 "{}: the unit is never still for {} s after {} s of settling: reduce --least and --settle, or give \

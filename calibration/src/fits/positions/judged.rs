@@ -40,7 +40,7 @@ pub fn judge(
     let one = |(pose, position): &(Pose, usize)| {
         let up = plan.up(*position, errors);
         let force = |tracks: &[Track]| {
-            tracks.get(pose.run).map(|track| Pose::over(track, pose.run, pose.interval).force_m_per_s2)
+            tracks.get(pose.run).map(|track| Pose::over(track, pose.run, pose.ticks.clone()).force_m_per_s2)
         };
         let forces = [force(before)?, force(after)?];
         let error = forces.map(|force| [0, 1, 2].map(|axis| force[axis] - gravity * up[axis]));

@@ -4,11 +4,12 @@
 //! do, from one pose to the next. Where they were not turned with the unit (a log of positions without the way between them), the
 //! order of the plan does, if no position is missing.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
-use super::still::Interval;
 use super::track::Track;
 use crate::numbers::{ends, real};
 use crate::report::{counted, fixed};
@@ -212,9 +213,9 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
 fn ways(track: &Track, poses: &[Pose], order: [usize; 3]) -> Vec<Matrix3<f64>> {
     let columns = order.map(|axis| &track.rate_deg_per_s[axis]);
     let way = |pair: &[Pose]| {
-        let [before, after] = [pair[0].interval, pair[1].interval];
-        let at_rest = |column: &[f64], pose: Interval| {
-            let ticks = &column[pose.first..pose.end];
+        let [before, after] = [&pair[0].ticks, &pair[1].ticks];
+        let at_rest = |column: &[f64], pose: &Range<usize>| {
+            let ticks = &column[pose.clone()];
             ticks.iter().sum::<f64>() / real(ticks.len().max(1))
         };
         let rest = columns.map(|column| 0.5 * (at_rest(column, before) + at_rest(column, after)));
@@ -223,7 +224,7 @@ fn ways(track: &Track, poses: &[Pose], order: [usize; 3]) -> Vec<Matrix3<f64>> {
             let is_known = rate.iter().all(|rate| rate.is_finite());
             if is_known { seen(rate * track.duration_s[tick]) * turned } else { turned }
         };
-        (before.end..after.first).fold(Matrix3::identity(), turn)
+        (before.end..after.start).fold(Matrix3::identity(), turn)
     };
     poses.windows(2).map(way).collect()
 }

@@ -37,7 +37,8 @@ pub struct Left {
 impl Left {
     /// Of the same ticks as the poses.
     pub fn of(track: &Track, poses: &[Pose], gravity: f64) -> Self {
-        let own: Vec<Pose> = poses.iter().map(|pose| Pose::over(track, pose.run, pose.interval)).collect();
+        let own: Vec<Pose> =
+            poses.iter().map(|pose| Pose::over(track, pose.run, pose.ticks.clone())).collect();
         let force: Vec<[f64; 3]> = own.iter().map(|pose| pose.force_m_per_s2).collect();
         let turns = transitions(&own, |pose| pose.force_m_per_s2);
         Self {
