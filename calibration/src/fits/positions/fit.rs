@@ -129,8 +129,8 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
     let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights, degrees };
     let found = all.fit().map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
-    let bent = Positions { degrees: Degrees { axes: 2, ..degrees }, ..all };
-    let quadratic = (most >= 2).then(|| bent.fit().ok()).flatten().map(|quadratic| {
+    let with_bend = Positions { degrees: Degrees { axes: 2, ..degrees }, ..all };
+    let quadratic = (most >= 2).then(|| with_bend.fit().ok()).flatten().map(|quadratic| {
         let (chi_square, terms) = quadratic_terms(&quadratic);
         let accident = survival(chi_square, terms);
         (quadratic, chi_square, terms, accident)
