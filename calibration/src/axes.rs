@@ -32,6 +32,33 @@ pub fn main_axis(row: &[f64; 3]) -> usize {
     (0..3).fold(0, |best, axis| if row[axis].abs() > row[best].abs() { axis } else { best })
 }
 
+/// What is said of sensors; those of which the same is said are named together.
+pub fn each(kind: &str, told: impl IntoIterator<Item = (usize, String)>, of: usize) -> Vec<String> {
+    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+    for (sensor, words) in told {
+        match groups.iter_mut().find(|(said, _)| *said == words) {
+            Some((_, sensors)) => sensors.push(sensor),
+            None => groups.push((words, vec![sensor])),
+        }
+    }
+    let named = |(words, sensors): (String, Vec<usize>)| format!("{}: {words}", several(kind, &sensors, of));
+    groups.into_iter().map(named).collect()
+}
+
+/// The two axes beside one.
+pub const fn others(axis: usize) -> [usize; 2] {
+    match axis {
+        0 => [1, 2],
+        1 => [0, 2],
+        _ => [0, 1],
+    }
+}
+
+/// The two case axes that an axis is across.
+pub fn across(row: &[f64; 3]) -> [usize; 2] {
+    others(main_axis(row))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

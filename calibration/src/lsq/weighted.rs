@@ -62,36 +62,51 @@ pub fn solve(
     Some(solution)
 }
 
-/// One weighted solution.
+/// One weighted solution: rows that take part are multiplied with the root of their weight.
 pub fn once(
     columns: &[&[f64]],
     target: &[f64],
     weights: &[f64],
     holding: Option<&DMatrix<f64>>,
 ) -> Option<Solution> {
-    let rows = Rows::of(columns, target, weights, holding);
     let count = columns.len();
-    if count == 0 || rows.good.len() < 2 * count + 3 {
+    let is_good = |&row: &usize| {
+        let finite = target[row].is_finite() && columns.iter().all(|column| column[row].is_finite());
+        finite && weights[row] > 0.0
+    };
+    let good: Vec<usize> = (0..target.len()).filter(is_good).collect();
+    if count == 0 || good.len() < 2 * count + 3 {
         return None;
     }
-    let ridge = Weak::Ridge { share: RIDGE, nothing: NOTHING * rows.weight.sqrt() };
-    let found = linear::solve(&rows.design, &rows.values, ridge).ok()?;
+    let root = |row: usize| weights[row].sqrt();
+    let weight: f64 = good.iter().map(|&row| weights[row]).sum();
+    let entry = |i: usize, j: usize| match (good.get(i), holding) {
+        (Some(row), _) => root(*row) * columns[j][*row],
+        // Further columns are free.
+        (None, Some(holding)) if j < holding.ncols() => weight.sqrt() * holding[(i - good.len(), j)],
+        (None, _) => 0.0,
+    };
+    let rows = good.len() + holding.map_or(0, DMatrix::nrows);
+    let design = DMatrix::from_fn(rows, count, entry);
+    let values = DVector::from_fn(rows, |i, _| good.get(i).map_or(0.0, |row| root(*row) * target[*row]));
+    let ridge = Weak::Ridge { share: RIDGE, nothing: NOTHING * weight.sqrt() };
+    let found = linear::solve(&design, &values, ridge).ok()?;
     let residual: Vec<f64> = (0..target.len())
         .map(|row| {
             let columns = columns.iter().zip(&found.coefficients);
             columns.fold(target[row], |rest, (column, c)| rest - c * column[row])
         })
         .collect();
-    let free = real(rows.good.len() - count);
-    let square = found.residual.rows(0, rows.good.len()).norm_squared();
-    let variance = square / free * inflation(&residual, &rows.good);
+    let free = real(good.len() - count);
+    let square = found.residual.rows(0, good.len()).norm_squared();
+    let variance = square / free * inflation(&residual, &good);
     let sigmas = (0..count).map(|index| variance.sqrt() * found.sigma(index)).collect();
     let finite = found.coefficients.iter().all(|c| c.is_finite());
     finite.then(|| Solution {
         coefficients: found.coefficients.iter().copied().collect(),
         sigmas,
         residual,
-        rms: (square / rows.weight).sqrt(),
+        rms: (square / weight).sqrt(),
         outliers: 0,
     })
 }
@@ -107,42 +122,6 @@ pub fn beside_cubic(
     let power = |power| places.iter().map(|place| ((place - middle) / half).powi(power)).collect();
     let powers: [Vec<f64>; 4] = [0, 1, 2, 3].map(power);
     Some(once(&powers.each_ref().map(Vec::as_slice), values, weights, None)?.residual)
-}
-
-/// Rows that take part, each multiplied with the root of its weight, and those that hold coefficients.
-struct Rows {
-    good: Vec<usize>,
-    design: DMatrix<f64>,
-    values: DVector<f64>,
-    /// Sum of the weights.
-    weight: f64,
-}
-
-impl Rows {
-    fn of(columns: &[&[f64]], target: &[f64], weights: &[f64], holding: Option<&DMatrix<f64>>) -> Self {
-        let is_good = |&row: &usize| {
-            let finite = target[row].is_finite() && columns.iter().all(|column| column[row].is_finite());
-            finite && weights[row] > 0.0
-        };
-        let good: Vec<usize> = (0..target.len()).filter(is_good).collect();
-        let root = |row: usize| weights[row].sqrt();
-        let weight: f64 = good.iter().map(|&row| weights[row]).sum();
-        let held = holding.map_or(0, DMatrix::nrows);
-        let entry = |i: usize, j: usize| match (good.get(i), holding) {
-            (Some(row), _) => root(*row) * columns[j][*row],
-            // Further columns are free.
-            (None, Some(holding)) if j < holding.ncols() => weight.sqrt() * holding[(i - good.len(), j)],
-            (None, _) => 0.0,
-        };
-        Self {
-            design: DMatrix::from_fn(good.len() + held, columns.len(), entry),
-            values: DVector::from_fn(good.len() + held, |i, _| {
-                good.get(i).map_or(0.0, |row| root(*row) * target[*row])
-            }),
-            weight,
-            good,
-        }
-    }
 }
 
 /// By how much the variance of a coefficient grows because neighbouring residuals resemble each other.

@@ -177,7 +177,7 @@ fn of_positions_at_two_temperatures() {
         let ticks = replayed(&[log], &out, &["--ignore-journal"]);
         let one = |(span, position): &([f64; 2], usize)| {
             let force = mean_within(&ticks, *span, |tick| tick.delta_velocity);
-            let up = plan.up(&plan.positions[*position].attitude, errors);
+            let up = plan.up(*position, errors);
             let [x, y, z] = [0, 1, 2].map(|axis| force[axis] - GRAVITY * up[axis]);
             [x, y, z, Vector3::from(force).norm() - GRAVITY]
         };

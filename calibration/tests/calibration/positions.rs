@@ -224,9 +224,9 @@ fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_th
         }
         unit.flush();
         ticks.extend(unit.take_ready());
-        let own = &ticks[pose.interval.first..pose.interval.end];
+        let own = &ticks[pose.ticks.clone()];
         let seconds: f64 = own.iter().map(|tick| tick.duration.as_s()).sum();
-        let up = plan.up(&plan.positions[*position].attitude, errors);
+        let up = plan.up(*position, errors);
         for (axis, up) in up.iter().enumerate() {
             let mean = own.iter().map(|tick| tick.delta_velocity[axis]).sum::<f64>() / seconds;
             let difference = mean - GRAVITY * up - judgement.error[1][axis];

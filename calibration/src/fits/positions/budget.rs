@@ -88,39 +88,28 @@ impl Budget {
     /// Standard error of the elements of C that the least-squares fit of a plan will state, mean and largest (″); `None` where
     /// the plan does not determine them.
     pub fn of_plan(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
-        let taken: Vec<Taken> = plan
-            .positions
-            .iter()
-            .enumerate()
-            .map(|(position, stated)| Taken {
-                position,
-                outputs: plan.up(&stated.attitude, [0.0; 3]).map(|c| c * self.scale).to_vec(),
-                ratio: vec![1.0; 3],
-                duration_s: self.seconds,
-                sensor_t: vec![0.0; 3],
-                axes_t: 0.0,
-                level: 0,
-            })
-            .collect();
+        let taken = |position| Taken {
+            position,
+            outputs: plan.up(position, [0.0; 3]).map(|c| c * self.scale).to_vec(),
+            ratio: vec![1.0; 3],
+            duration_s: self.seconds,
+            sensor_t: vec![0.0; 3],
+            axes_t: 0.0,
+            level: 0,
+        };
+        let taken: Vec<Taken> = (0..plan.positions.len()).map(taken).collect();
         let guess = guesses(plan, &taken, 3).ok()?;
         let positioning = self.positioning_arcsec.hypot(self.run_out_arcsec) / ARCSEC_PER_RAD;
         let weights = Weights { intensity: vec![self.noise; 3], positioning_rad: positioning, levelling_rad };
-        let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights };
-        let found = all.planned(Degrees { sensor: 0, axes: 0 }).ok()?;
+        let all = Positions { plan, taken: &taken, guess: &guess, weights: &weights, degrees: Degrees::NONE };
+        let found = all.planned().ok()?;
         let covariance = found.axes_covariance(0);
         let sigma: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt() * ARCSEC_PER_RAD).collect();
         let mean = (sigma.iter().map(|s| s * s).sum::<f64>() / real(sigma.len())).sqrt();
         Some([mean, sigma.iter().copied().fold(0.0, f64::max)])
     }
 
-    /// How well an axis is known by the plan's own fit, and with what the housing and the measured temperature add (″); `None` where
-    /// the plan does not determine it.
-    pub fn known_by(&self, plan: &Plan, levelling_rad: f64) -> Option<[f64; 2]> {
-        let [mean, _] = self.of_plan(plan, levelling_rad)?;
-        Some([mean, mean.hypot(self.thermal_arcsec())])
-    }
-
-    /// What this plan comes to.
+    /// What this plan comes to: how well an axis is known by its own fit, and with what the housing and the measured temperature add (″).
     fn words(plan: &Plan, known: Option<[f64; 2]>) -> String {
         let count = counted(plan.positions.len(), "position", "positions");
         if let Some([known, later]) = known {
@@ -136,7 +125,8 @@ impl Budget {
 
     /// All that is said of it.
     pub fn report(&self, plan: &Plan, levelling_rad: f64) -> Report {
-        let known = self.known_by(plan, levelling_rad);
+        let of_plan = self.of_plan(plan, levelling_rad);
+        let known = of_plan.map(|[mean, _]| [mean, mean.hypot(self.thermal_arcsec())]);
         let mut report = Report::saying("Error budget of positions", "budget", Self::words(plan, known));
         let formula = "By the formula of 004, which adds its errors independent of the plan";
         report.notes.push(format!("{formula}: {:.1}″.", self.total_arcsec()));
@@ -144,7 +134,6 @@ impl Budget {
             TYPICAL_ARCSEC_PER_DEG_C.map(|(name, rate)| (name, rate, self.temperature_arcsec(rate)));
         let words = typical.map(|(name, rate, error)| format!("{error:.1}″ for {name} ({rate} ″/°C)"));
         report.notes.push(format!("Error by the measured temperature: {}.", words.join(", ")));
-        let of_plan = self.of_plan(plan, levelling_rad);
         if let Some([mean, largest]) = of_plan {
             let level =
                 format!(", with a level known to {:.0}″ (--levelling)", levelling_rad * ARCSEC_PER_RAD);
@@ -258,7 +247,8 @@ mod tests {
     fn the_first_line_is_of_the_plan() {
         let budget = example();
         let first = |plan: &Plan| budget.report(plan, 60.0 / ARCSEC_PER_RAD).headline();
-        let [known, later] = budget.known_by(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
+        let [known, _] = budget.of_plan(&Plan::six(), 60.0 / ARCSEC_PER_RAD).unwrap();
+        let later = known.hypot(budget.thermal_arcsec());
         assert!(known > 20.0 && later > known && later < known + 5.0, "{known} {later}");
         let mut flat = Plan::twelve();
         flat.positions.retain(|position| !position.name.starts_with('Z'));
@@ -269,8 +259,8 @@ mod tests {
     fn a_plan_without_a_stand_is_budgeted_as_it_is_fitted() {
         use crate::fits::positions::plan::Attitude;
         let mut plan = Plan::twelve();
-        for position in &mut plan.positions {
-            position.attitude = Attitude::Up(Plan::twelve().up(&position.attitude, [0.0; 3]).map(f64::round));
+        for (index, position) in plan.positions.iter_mut().enumerate() {
+            position.attitude = Attitude::Up(Plan::twelve().up(index, [0.0; 3]).map(f64::round));
         }
         // Two pairs for every element, each out of level by the stand's 60″: half of that, as the fit says.
         let [mean, most] = example().of_plan(&plan, 60.0 / ARCSEC_PER_RAD).unwrap();

@@ -5,8 +5,8 @@ use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
-use crate::axes::{AXES, main_axis};
-use crate::numbers::ARCSEC_PER_RAD;
+use crate::axes::{AXES, across};
+use crate::numbers::{ARCSEC_PER_RAD, norm};
 use crate::report::bars;
 
 /// Points of a curve over temperature.
@@ -20,8 +20,7 @@ pub fn bend(analysis: &Analysis) -> f64 {
         let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
         for (bent, straight) in quadratic.sensors.iter().zip(&analysis.fit.sensors) {
             let (a, b) = (at(&bent.axis, x), at(&straight.axis, x));
-            let away = libm::sqrt((0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum());
-            largest = largest.max(away);
+            largest = largest.max(norm([0, 1, 2].map(|i| a[i] - b[i])));
         }
     }
     largest
@@ -36,12 +35,6 @@ fn over(analysis: &Analysis) -> Vec<f64> {
 /// A row of C at a scaled temperature.
 fn at(axis: &[[f64; 3]], x: f64) -> [f64; 3] {
     axis.iter().rev().fold([0.0; 3], |sum, row| [0, 1, 2].map(|i| sum[i] * x + row[i]))
-}
-
-/// Elements of a row that say where the axis points: all but the largest.
-pub(super) fn across(row: [f64; 3]) -> impl Iterator<Item = usize> {
-    let largest = main_axis(&row);
-    (0..3).filter(move |i| *i != largest)
 }
 
 /// What is left by itself: beside what was there before, it is a line at zero.
@@ -60,7 +53,7 @@ pub(super) fn left_chart(settings: &Settings, judged: &[Judgement]) -> Chart {
 /// Elements that are shown over temperature: sensor, element.
 pub(super) fn shown(analysis: &Analysis) -> Vec<(usize, usize)> {
     let sensors = analysis.fit.sensors.iter().enumerate();
-    sensors.flat_map(|(index, sensor)| across(sensor.axis[0]).map(move |i| (index, i))).collect()
+    sensors.flat_map(|(index, sensor)| across(&sensor.axis[0]).map(move |i| (index, i))).collect()
 }
 
 /// An element of C at each temperature by itself with its standard error (″); `None` where the positions of one do not tell.

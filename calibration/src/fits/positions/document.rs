@@ -7,7 +7,7 @@ use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationTherm
 use super::fit::Analysis;
 use super::model::Sensor;
 use crate::document::{accel_name, accelerometers, scale_at, tidy};
-use crate::numbers::{hull, unit};
+use crate::numbers::{ends, hull, mean, unit};
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
 const ROOM_DEG_C: f64 = 1.0;
@@ -20,13 +20,13 @@ pub fn complete(base: &Document, analysis: &Analysis, gravity: f64) -> Document 
     let found = analysis.fit.sensors.iter().zip(&analysis.sensors_deg_c);
     let signs = signs(base, analysis);
     for ((sensor, sign), (found, deg_c)) in accel.sensor.iter_mut().zip(&signs).zip(found) {
-        let range = with_room(deg_c.range);
+        let range = with_room(ends(deg_c.iter().copied()));
         let scale: Vec<f64> = found.scale.iter().map(|k| sign * k / gravity).collect();
         if analysis.levels_deg_c.len() > 1 {
             sensor.scale_factor = curve(analysis, &scale, range).in_unit(scale_unit);
             sensor.set(Feature::One, curve(analysis, &found.bias, range));
         } else {
-            level(sensor, scale[0], found.bias[0], deg_c.mean, scale_unit);
+            level(sensor, scale[0], found.bias[0], mean(deg_c), scale_unit);
         }
     }
     orient(accel, analysis, &signs);
@@ -55,12 +55,12 @@ pub(crate) fn held_twice(document: &Document) -> Vec<String> {
 /// Signs of the scale factors that a document states: what was found has them positive, and along the opposite axis is the same.
 fn signs(document: &Document, analysis: &Analysis) -> Vec<f64> {
     let stated = accelerometers(document).iter().zip(&analysis.sensors_deg_c);
-    stated.map(|(sensor, deg_c)| scale_at(sensor, deg_c.mean).signum()).collect()
+    stated.map(|(sensor, deg_c)| scale_at(sensor, mean(deg_c)).signum()).collect()
 }
 
 /// Range of the document (°C): of all curves, and of the axes.
 pub fn range(analysis: &Analysis) -> [f64; 2] {
-    let own = analysis.sensors_deg_c.iter().map(|deg_c| deg_c.range);
+    let own = analysis.sensors_deg_c.iter().map(|deg_c| ends(deg_c.iter().copied()));
     with_room(hull(own.chain([analysis.range_deg_c])).unwrap_or(analysis.range_deg_c))
 }
 

@@ -112,8 +112,7 @@ pub(super) fn not_as_stated(fit: &Fit, document: &Document, gravity: f64, own: &
 /// Axes that none of some positions shows up or down, such as "none has x up", or what to say where there are none.
 pub(super) fn unseen(plan: &Plan, positions: &[usize], none: &str, otherwise: &str) -> String {
     let seen = |axis: usize, sign: f64| {
-        let mut positions = positions.iter().filter_map(|position| plan.positions.get(*position));
-        positions.any(|position| sign * plan.up(&position.attitude, [0.0; 3])[axis] > 0.5)
+        positions.iter().any(|position| sign * plan.up(*position, [0.0; 3])[axis] > 0.5)
     };
     let ways = (0..3).flat_map(|axis| [(axis, 1.0, "up"), (axis, -1.0, "down")]);
     let unseen = ways.filter(|(axis, sign, _)| !seen(*axis, *sign));

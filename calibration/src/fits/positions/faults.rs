@@ -1,10 +1,8 @@
 //! Sensors that nothing can be made of.
 
-use std::collections::BTreeMap;
-
 use super::pose::Pose;
 use super::track::Track;
-use crate::axes::{sensor_name, several};
+use crate::axes::{each, sensor_name};
 use crate::report::{counted, grouped, six};
 use crate::runs::faults::{self, Fault};
 
@@ -14,15 +12,10 @@ pub fn dead(tracks: &[Track]) -> Vec<String> {
     let mut told: Vec<(&str, String)> = Vec::new();
     for track in tracks {
         for (kind, columns) in [("accelerometer", &track.outputs), ("gyro", &track.gyros)] {
-            let mut faults: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-            let found = (0..columns.len()).filter_map(|index| Some((index, Fault::among(columns, index)?)));
-            for (index, fault) in found {
-                faults.entry(fault.words(kind, columns.len())).or_default().push(index);
-            }
-            let of = |(words, sensors): (String, Vec<usize>)| {
-                (track.run.as_str(), format!("{}: {words}", several(kind, &sensors, columns.len())))
-            };
-            told.extend(faults.into_iter().map(of));
+            let count = columns.len();
+            let fault = |index| Some((index, Fault::among(columns, index)?.words(kind, count)));
+            let faults = each(kind, (0..count).filter_map(fault), count);
+            told.extend(faults.into_iter().map(|words| (track.run.as_str(), words)));
         }
     }
     grouped(&told).into_iter().map(|(words, runs)| format!("{}: {words}", logs(&runs))).collect()
@@ -44,7 +37,7 @@ pub fn clipped(tracks: &[Track], poses: &[&Pose]) -> Vec<String> {
     let of = |sensor: usize| {
         let constant = |pose: &&Pose| {
             let column = tracks.get(pose.run)?.outputs.get(sensor)?;
-            faults::dead(column.get(pose.interval.first..pose.interval.end)?)
+            faults::dead(column.get(pose.ticks.clone())?)
         };
         let at: Vec<f64> = poses.iter().filter_map(constant).collect();
         let first = at.first().filter(|_| at.len() < poses.len())?;

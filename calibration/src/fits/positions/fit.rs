@@ -14,9 +14,7 @@ use super::plan::Plan;
 use super::pose::{Pose, intensities};
 use super::solve::{Fit, Positions, Weights, guesses};
 use super::still::{StillLimits, still};
-use super::temperature::{
-    Temperatures, blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck,
-};
+use super::temperature::{blind, board_ratio, followed, levels, own_deg_c, reference, slopes_deg_c, stuck};
 use super::times::Times;
 use super::track::Track;
 use crate::document::accel_name;
@@ -49,8 +47,6 @@ pub struct Settings {
 pub struct Analysis {
     /// All poses that are positions, with the position's number.
     pub poses: Vec<(Pose, usize)>,
-    /// The positions as the fit had them.
-    pub taken: Vec<Taken>,
     /// Mean temperature of each level (°C); one that is no number where nothing measures it.
     pub levels_deg_c: Vec<f64>,
     /// What the document will hold: C constant or linear.
@@ -66,8 +62,8 @@ pub struct Analysis {
     pub half_deg_c: f64,
     /// Lowest and highest temperature that the orientation follows (°C).
     pub range_deg_c: [f64; 2],
-    /// What K and S of each accelerometer were taken at: the temperatures of its own channel.
-    pub sensors_deg_c: Vec<Temperatures>,
+    /// What K and S of each accelerometer were taken at: the temperatures of its own channel, by position (°C).
+    pub sensors_deg_c: Vec<Vec<f64>>,
     /// Mean temperature of the channels that the slopes of the document's C follow (°C).
     pub slopes_deg_c: f64,
     /// Channels that the orientation follows.
@@ -131,14 +127,14 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, (&bad, sensors)))?;
     let most = levels_deg_c.len() - 1;
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
-    let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights };
-    let found = all.fit(degrees).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
-    let quadratic =
-        (most >= 2).then(|| all.fit(Degrees { axes: 2, ..degrees }).ok()).flatten().map(|quadratic| {
-            let (chi_square, terms) = quadratic_terms(&quadratic);
-            let accident = survival(chi_square, terms);
-            (quadratic, chi_square, terms, accident)
-        });
+    let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights, degrees };
+    let found = all.fit().map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
+    let with_bend = Positions { degrees: Degrees { axes: 2, ..degrees }, ..all };
+    let quadratic = (most >= 2).then(|| with_bend.fit().ok()).flatten().map(|quadratic| {
+        let (chi_square, terms) = quadratic_terms(&quadratic);
+        let accident = survival(chi_square, terms);
+        (quadratic, chi_square, terms, accident)
+    });
     let curved = quadratic.as_ref().filter(|found| found.3 < ACCIDENT);
     let best = curved.map_or(&found, |found| &found.0);
     let widened = widening(best, &mut warnings);
@@ -159,7 +155,6 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     }
     let analysis = Analysis {
         poses,
-        taken,
         levels_deg_c,
         fit: found,
         quadratic,
@@ -167,7 +162,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
         reference_deg_c: reference,
         half_deg_c: half,
         range_deg_c: [low, high],
-        sensors_deg_c: own.iter().map(|deg_c| Temperatures::of(deg_c)).collect(),
+        sensors_deg_c: own,
         slopes_deg_c: slopes_deg_c(document, &plain).unwrap_or(document.temperature.assumed_deg_c),
         channels,
         weights,
@@ -199,7 +194,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             continue;
         }
         let intervals = still(track, &settings.limits, None);
-        let poses = Pose::of(track, run, &intervals);
+        let poses = Pose::of(track, run, intervals);
         if poses.is_empty() {
             reasons.push(format!(
                 "{}: the unit is never still for {} s after {} s of settling: reduce --least and --settle, or give \

@@ -45,7 +45,7 @@ struct Visit {
 /// Every return to a temperature that was left; `poses` are those of `all.taken`, in the order of logs and time.
 pub(super) fn returns(all: &Positions<'_>, poses: &[Pose], fit: &Fit, levels_deg_c: &[f64]) -> Vec<Return> {
     let mut order: Vec<usize> = (0..poses.len()).collect();
-    order.sort_by_key(|index| (poses[*index].run, poses[*index].interval.first));
+    order.sort_by_key(|index| (poses[*index].run, poses[*index].ticks.start));
     let visit = |visit: &[usize]| {
         let taken: Vec<Taken> = visit.iter().map(|index| all.taken[*index].clone()).collect();
         let fit = all.alone(&taken)?;

@@ -38,10 +38,9 @@ pub fn judge(
     channels: &[String],
 ) -> Vec<Judgement> {
     let one = |(pose, position): &(Pose, usize)| {
-        let stated = plan.positions.get(*position)?;
-        let up = plan.up(&stated.attitude, errors);
+        let up = plan.up(*position, errors);
         let force = |tracks: &[Track]| {
-            tracks.get(pose.run).map(|track| Pose::over(track, pose.run, pose.interval).force_m_per_s2)
+            tracks.get(pose.run).map(|track| Pose::over(track, pose.run, pose.ticks.clone()).force_m_per_s2)
         };
         let forces = [force(before)?, force(after)?];
         let error = forces.map(|force| [0, 1, 2].map(|axis| force[axis] - gravity * up[axis]));

@@ -4,6 +4,8 @@
 //! do, from one pose to the next. Where they were not turned with the unit (a log of positions without the way between them), the
 //! order of the plan does, if no position is missing.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::plan::{Attitude, Plan};
@@ -32,7 +34,7 @@ pub type Matched = (Vec<Option<usize>>, Option<String>);
 pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, String> {
     let directions = directions(poses)?;
     let fits = |pose: usize, position: usize| {
-        let up = plan.up(&plan.positions[position].attitude, [0.0; 3]);
+        let up = plan.up(position, [0.0; 3]);
         directions[pose].angle(&Vector3::from(up)) < DIRECTION_RAD
     };
     let candidates: Vec<Vec<usize>> = (0..poses.len())
@@ -53,13 +55,9 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         };
         format!("{}; {agree}: {hint}", nothing(plan, poses, &directions))
     };
-    let doubt = match swapped {
-        Some((Kind::Accelerometers, hint)) => return Err(unclear(&hint)),
-        Some((Kind::Gyros, hint)) => {
-            Some(format!("gyros and accelerometers do not agree on the turns between the poses: {hint}"))
-        }
-        None => None,
-    };
+    let doubt = swapped.transpose().map_err(|hint| unclear(&hint))?;
+    let doubt = doubt
+        .map(|hint| format!("gyros and accelerometers do not agree on the turns between the poses: {hint}"));
     let count = plan.positions.len();
     let in_order = || (0..poses.len()).all(|pose| fits(pose, pose % count));
     let positions = if candidates.iter().all(|candidates| candidates.len() <= 1) {
@@ -83,34 +81,25 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
     Ok((positions, doubt))
 }
 
-/// Sensors whose columns look swapped.
-#[derive(Clone, Copy)]
-enum Kind {
-    Accelerometers,
-    Gyros,
-}
-
-/// The order of columns, of accelerometers or gyros, with which both agree on the turns; `None` where none is.
+/// An order of columns with which both agree on the turns, in words: of the gyros, or, as an error, of the accelerometers.
 fn swapped(
     track: &Track,
     poses: &[Pose],
     (as_logged, directions): (&[Matrix3<f64>], &[Vector3<f64>]),
-) -> Option<(Kind, String)> {
+) -> Option<Result<String, String>> {
     if as_logged.len() < TELLING_WAYS {
         return None;
     }
-    let found = |kind, order| {
-        let name = if matches!(kind, Kind::Gyros) { "gyros" } else { "accelerometers" };
+    let hint = |kind: &str, order| {
         let axes = moved(order);
-        let hint = format!("with {name} {axes} swapped they would agree; check the columns in the mapping");
-        (kind, hint)
+        format!("with {kind} {axes} swapped they would agree; check the columns in the mapping")
     };
     ORDERS.into_iter().find_map(|order| {
         if agreement(as_logged, directions, order) >= AGREEMENT {
-            return Some(found(Kind::Accelerometers, order));
+            return Some(Err(hint("accelerometers", order)));
         }
         let reordered = ways(track, poses, order);
-        (agreement(&reordered, directions, AS_LOGGED) >= AGREEMENT).then(|| found(Kind::Gyros, order))
+        (agreement(&reordered, directions, AS_LOGGED) >= AGREEMENT).then(|| Ok(hint("gyros", order)))
     })
 }
 
@@ -127,7 +116,7 @@ fn agreement(ways: &[Matrix3<f64>], directions: &[Vector3<f64>], order: [usize; 
 /// Words where a plan's neighbours differ by a turn about the vertical, which no accelerometer feels: without the turns in the log
 /// one is taken for the other, or both for one pose.
 fn unseen(plan: &Plan) -> Option<String> {
-    let up = |position: usize| Vector3::from(plan.up(&plan.positions[position].attitude, [0.0; 3]));
+    let up = |position: usize| Vector3::from(plan.up(position, [0.0; 3]));
     let pair =
         (1..plan.positions.len()).find(|position| up(*position).angle(&up(position - 1)) < DIRECTION_RAD)?;
     Some(format!(
@@ -219,35 +208,25 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
     Ok(poses.iter().map(|pose| scaled(pose).normalize()).collect())
 }
 
-/// Rotations of the case from pose to pose, with the gyros in another order.
+/// Rotations of the case from each pose to the next, with the gyros in another order: each takes a fixed vector's components before to
+/// those after.
 fn ways(track: &Track, poses: &[Pose], order: [usize; 3]) -> Vec<Matrix3<f64>> {
-    poses
-        .windows(2)
-        .map(|pair| way(order.map(|axis| track.rate_deg_per_s[axis].as_slice()), &track.duration_s, pair))
-        .collect()
-}
-
-/// Rotation of the case from one pose to the next: takes a fixed vector's components before to those after.
-fn way(rate_deg_per_s: [&[f64]; 3], duration_s: &[f64], pair: &[Pose]) -> Matrix3<f64> {
-    let [before, after] = [&pair[0], &pair[1]];
-    let mean = |axis: usize| {
-        let column = rate_deg_per_s[axis];
-        let at_rest = |pose: &Pose| {
-            let ticks = &column[pose.interval.first..pose.interval.end];
-            let count = real(ticks.len().max(1));
-            ticks.iter().sum::<f64>() / count
+    let columns = order.map(|axis| &track.rate_deg_per_s[axis]);
+    let way = |pair: &[Pose]| {
+        let [before, after] = [&pair[0].ticks, &pair[1].ticks];
+        let at_rest = |column: &[f64], pose: &Range<usize>| {
+            let ticks = &column[pose.clone()];
+            ticks.iter().sum::<f64>() / real(ticks.len().max(1))
         };
-        0.5 * (at_rest(before) + at_rest(after))
+        let rest = columns.map(|column| 0.5 * (at_rest(column, before) + at_rest(column, after)));
+        let turn = |turned: Matrix3<f64>, tick: usize| {
+            let rate = Vector3::from_fn(|axis, _| (columns[axis][tick] - rest[axis]).to_radians());
+            let is_known = rate.iter().all(|rate| rate.is_finite());
+            if is_known { seen(rate * track.duration_s[tick]) * turned } else { turned }
+        };
+        (before.end..after.start).fold(Matrix3::identity(), turn)
     };
-    let rest = [0, 1, 2].map(mean);
-    let mut turned = Matrix3::identity();
-    for tick in before.interval.end..after.interval.first {
-        let rate = Vector3::from_fn(|axis, _| (rate_deg_per_s[axis][tick] - rest[axis]).to_radians());
-        if rate.iter().all(|rate| rate.is_finite()) {
-            turned = seen(rate * duration_s[tick]) * turned;
-        }
-    }
-    turned
+    poses.windows(2).map(way).collect()
 }
 
 /// How a fixed vector's components change while the case turns by a rotation vector.
@@ -263,9 +242,7 @@ pub(crate) fn seen(turn: Vector3<f64>) -> Matrix3<f64> {
 
 /// Stand to case in a position: columns are the stand's base axes in case axes. Without a stand, none.
 fn case_of(plan: &Plan, position: usize) -> Matrix3<f64> {
-    let Some(Attitude::Stand([first, second])) =
-        plan.positions.get(position).map(|position| position.attitude)
-    else {
+    let Attitude::Stand([first, second]) = plan.positions[position].attitude else {
         return Matrix3::identity();
     };
     let mounting = Matrix3::from_fn(|row, column| plan.mounting[column][row]);

@@ -5,10 +5,9 @@
 //! ```
 //!
 //! n is a sensor's first guess, t and w are at right angles to it. K, S, a and b are polynomials of temperature. This is the form
-//! that the service evaluates ([`Model::state`] only moves the length of C's row into K), so that nothing is lost between the
+//! that the service evaluates (`Guess::found` only moves the length of C's row into K), so that nothing is lost between the
 //! fit and the document.
 
-use super::plan::{Plan, StandErrors};
 use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::numbers::norm;
 
@@ -44,6 +43,9 @@ pub struct Degrees {
 }
 
 impl Degrees {
+    /// Of what was taken at one temperature.
+    pub const NONE: Self = Self { sensor: 0, axes: 0 };
+
     /// Parameters of one accelerometer: K, S, and two angles of its axis.
     pub fn of_sensor(self) -> usize {
         2 * (self.sensor + 1) + 2 * (self.axes + 1)
@@ -72,17 +74,6 @@ pub struct Guess {
     pub axis: [f64; 3],
     /// Two unit vectors at right angles to it and to each other.
     pub across: [[f64; 3]; 2],
-}
-
-/// The model of all accelerometers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Model<'a> {
-    /// The plan.
-    pub plan: &'a Plan,
-    /// First guesses.
-    pub guess: &'a [Guess],
-    /// Degrees.
-    pub degrees: Degrees,
 }
 
 /// One accelerometer as it was found, by powers of the scaled temperature.
@@ -114,6 +105,44 @@ impl Guess {
         let axis = [0, 1, 2].map(|i| found[i] / scale);
         Some(Self { scale, bias: found[3], axis, across: across(axis) })
     }
+
+    /// Output under a direction of "up", at the scaled temperatures of the accelerometer and of its axis, with the ratio of its board.
+    pub(super) fn output(
+        &self,
+        (degrees, p): (Degrees, &[f64]),
+        [own_t, axes_t]: [f64; 2],
+        ratio: f64,
+        up: [f64; 3],
+    ) -> f64 {
+        let (own, axes) = (degrees.sensor + 1, degrees.axes + 1);
+        let at = |from: usize, count: usize, x: f64| {
+            p[from..from + count].iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
+        };
+        let scale = self.scale * (1.0 + at(0, own, own_t) * SMALL);
+        let bias = self.bias + self.scale * at(own, own, own_t) * SMALL;
+        let (a, b) = (at(2 * own, axes, axes_t) * SMALL, at(2 * own + axes, axes, axes_t) * SMALL);
+        let [first, second] = self.across;
+        let along: f64 = (0..3).map(|i| (self.axis[i] + a * first[i] + b * second[i]) * up[i]).sum();
+        scale * along / ratio + bias
+    }
+
+    /// What the parameters say of the accelerometer, its row of C at the reference of length one.
+    pub(super) fn found(&self, (degrees, p): (Degrees, &[f64])) -> Sensor {
+        let (own, axes) = (degrees.sensor + 1, degrees.axes + 1);
+        let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
+        let [first, second] = self.across;
+        let row = |power: usize| {
+            let (a, b) = (p[2 * own + power] * SMALL, p[2 * own + axes + power] * SMALL);
+            [0, 1, 2].map(|i| one(power) * self.axis[i] + a * first[i] + b * second[i])
+        };
+        let rows: Vec<[f64; 3]> = (0..axes).map(row).collect();
+        let length = norm(rows[0]);
+        Sensor {
+            scale: (0..own).map(|j| self.scale * (one(j) + p[j] * SMALL) * length).collect(),
+            bias: (0..own).map(|j| one(j) * self.bias + self.scale * p[own + j] * SMALL).collect(),
+            axis: rows.iter().map(|row| row.map(|x| x / length)).collect(),
+        }
+    }
 }
 
 /// Two unit vectors at right angles to a unit vector, the first near the case axis that is farthest from it.
@@ -123,75 +152,6 @@ pub fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
     unit[n.iamin()] = 1.0;
     let first = (unit - n * n.dot(&unit)).normalize();
     [first.into(), n.cross(&first).into()]
-}
-
-impl Model<'_> {
-    /// All parameters: accelerometer by accelerometer K, S, a, b, each by powers; then δ1, δ2, δ3 (in thousandths).
-    pub fn count(&self) -> usize {
-        self.guess.len() * self.degrees.of_sensor() + 3
-    }
-
-    /// The stand's errors (rad).
-    pub fn errors(&self, parameters: &[f64]) -> StandErrors {
-        let from = self.guess.len() * self.degrees.of_sensor();
-        [0, 1, 2].map(|i| parameters.get(from + i).copied().unwrap_or(0.0) * SMALL)
-    }
-
-    /// The parameters of one accelerometer.
-    fn own<'a>(&self, parameters: &'a [f64], sensor: usize) -> &'a [f64] {
-        let count = self.degrees.of_sensor();
-        parameters.get(sensor * count..(sensor + 1) * count).unwrap_or_default()
-    }
-
-    /// Outputs of all accelerometers in a position.
-    pub fn outputs(&self, parameters: &[f64], taken: &Taken) -> Vec<f64> {
-        let Some(position) = self.plan.positions.get(taken.position) else { return Vec::new() };
-        let up = self.plan.up(&position.attitude, self.errors(parameters));
-        self.outputs_under(parameters, taken, up)
-    }
-
-    /// Outputs of all accelerometers under a direction of "up".
-    pub fn outputs_under(&self, parameters: &[f64], taken: &Taken, up: [f64; 3]) -> Vec<f64> {
-        let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
-        let output = |(index, guess): (usize, &Guess)| {
-            let p = self.own(parameters, index);
-            let t = taken.sensor_t.get(index).copied().unwrap_or(0.0);
-            let at = |from: usize, count: usize, x: f64| {
-                p[from..from + count].iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
-            };
-            let scale = guess.scale * (1.0 + at(0, own, t) * SMALL);
-            let bias = guess.bias + guess.scale * at(own, own, t) * SMALL;
-            let (a, b) =
-                (at(2 * own, axes, taken.axes_t) * SMALL, at(2 * own + axes, axes, taken.axes_t) * SMALL);
-            let [first, second] = guess.across;
-            let along: f64 = (0..3).map(|i| (guess.axis[i] + a * first[i] + b * second[i]) * up[i]).sum();
-            let ratio = taken.ratio.get(index).copied().unwrap_or(1.0);
-            scale * along / ratio + bias
-        };
-        self.guess.iter().enumerate().map(output).collect()
-    }
-
-    /// What the parameters say of each accelerometer, rows of C at the reference of length one.
-    pub fn state(&self, parameters: &[f64]) -> Vec<Sensor> {
-        let (own, axes) = (self.degrees.sensor + 1, self.degrees.axes + 1);
-        let one = |power: usize| if power == 0 { 1.0 } else { 0.0 };
-        let sensor = |(index, guess): (usize, &Guess)| {
-            let p = self.own(parameters, index);
-            let [first, second] = guess.across;
-            let row = |power: usize| {
-                let (a, b) = (p[2 * own + power] * SMALL, p[2 * own + axes + power] * SMALL);
-                [0, 1, 2].map(|i| one(power) * guess.axis[i] + a * first[i] + b * second[i])
-            };
-            let rows: Vec<[f64; 3]> = (0..axes).map(row).collect();
-            let length = norm(rows[0]);
-            Sensor {
-                scale: (0..own).map(|j| guess.scale * (one(j) + p[j] * SMALL) * length).collect(),
-                bias: (0..own).map(|j| one(j) * guess.bias + guess.scale * p[own + j] * SMALL).collect(),
-                axis: rows.iter().map(|row| row.map(|x| x / length)).collect(),
-            }
-        };
-        self.guess.iter().enumerate().map(sensor).collect()
-    }
 }
 
 /// Unit of the parameters: a thousandth of K, of K·g, of a radian.

@@ -108,10 +108,10 @@ impl Plan {
     }
 
     /// Direction of "up" in case axes in a position.
-    pub fn up(&self, attitude: &Attitude, errors: StandErrors) -> [f64; 3] {
-        let [angle_1, angle_2] = match attitude {
-            Attitude::Up(up) => return *up,
-            Attitude::Stand(angles) => *angles,
+    pub fn up(&self, position: usize, errors: StandErrors) -> [f64; 3] {
+        let [angle_1, angle_2] = match self.positions[position].attitude {
+            Attitude::Up(up) => return up,
+            Attitude::Stand(angles) => angles,
         };
         let [level, tilt, square] = errors;
         let turns = [(2, -tilt), (0, -(angle_2 + level)), (2, -square), (1, -angle_1)];
@@ -167,15 +167,15 @@ mod tests {
             for (way, sign) in [("up", 1.0), ("down", -1.0)] {
                 let seen = ["a", "b"].map(|which| {
                     let name = format!("{letter} {way} {which}");
-                    let position = &plan.positions[plan.index_of(&name).unwrap()];
-                    let nominal = plan.up(&position.attitude, [0.0; 3]);
+                    let position = plan.index_of(&name).unwrap();
+                    let nominal = plan.up(position, [0.0; 3]);
                     for (other, c) in nominal.iter().enumerate() {
                         assert!(
                             (c - if other == axis { sign } else { 0.0 }).abs() < 1e-15,
                             "{name} {nominal:?}"
                         );
                     }
-                    plan.up(&position.attitude, errors)
+                    plan.up(position, errors)
                 });
                 for other in (0..3).filter(|other| *other != axis) {
                     let mean = 0.5 * (seen[0][other] + seen[1][other]);
@@ -201,7 +201,7 @@ mod tests {
             "axis_1 = \"z\"\naxis_2 = \"x\"\n[[position]]\nname = \"t\"\nup = [0.0, 3.0, 4.0]\n",
         )
         .unwrap();
-        let slanting = up.up(&up.positions[0].attitude, [1e-3; 3]);
+        let slanting = up.up(0, [1e-3; 3]);
         assert!(slanting.iter().zip([0.0, 0.6, 0.8]).all(|(a, b)| (a - b).abs() < 1e-15), "{slanting:?}");
         for (name, text, word) in [
             ("b.csv", "a,b\n", "column \"a\""),

@@ -1,8 +1,8 @@
 //! What a unit put out while it stood still: means over static intervals, and how noisy they are.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use super::still::Interval;
 use super::track::Track;
 use crate::numbers::{mean, real};
 
@@ -12,7 +12,7 @@ pub struct Pose {
     /// Which run it is in, by number.
     pub run: usize,
     /// Its ticks.
-    pub interval: Interval,
+    pub ticks: Range<usize>,
     /// Start and end since the run's beginning (s).
     pub span_s: [f64; 2],
     /// Time that the means are over (s).
@@ -34,8 +34,8 @@ const MOST_PARTS: usize = 60;
 
 impl Pose {
     /// The poses of a run.
-    pub fn of(track: &Track, run: usize, intervals: &[Interval]) -> Vec<Self> {
-        intervals.iter().map(|interval| Self::over(track, run, *interval)).collect()
+    pub fn of(track: &Track, run: usize, intervals: Vec<Range<usize>>) -> Vec<Self> {
+        intervals.into_iter().map(|ticks| Self::over(track, run, ticks)).collect()
     }
 
     /// Mean output of one accelerometer; no number where there is none.
@@ -49,8 +49,7 @@ impl Pose {
     }
 
     /// Means over one interval.
-    pub fn over(track: &Track, run: usize, interval: Interval) -> Self {
-        let ticks = interval.first..interval.end;
+    pub fn over(track: &Track, run: usize, ticks: Range<usize>) -> Self {
         let durations = &track.duration_s[ticks.clone()];
         let length: f64 = durations.iter().sum();
         let mean = |column: &Vec<f64>| {
@@ -61,16 +60,16 @@ impl Pose {
             let mean = mean(column);
             mean.is_finite().then(|| (name.clone(), mean))
         };
-        let begin = track.start_s(interval.first);
+        let begin = track.start_s(ticks.start);
         Self {
             run,
-            interval,
             span_s: [begin, begin + length],
             duration_s: length,
             outputs: track.outputs.iter().map(mean).collect(),
             gyros: track.gyros.iter().map(mean).collect(),
             force_m_per_s2: track.force_m_per_s2.each_ref().map(mean),
             temperature_deg_c: track.temperature_deg_c.iter().filter_map(temperature).collect(),
+            ticks,
         }
     }
 
@@ -96,7 +95,7 @@ pub fn intensities(tracks: &[Track], poses: &[Pose]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); sensors];
     for pose in poses {
         let Some(track) = tracks.get(pose.run) else { continue };
-        let ticks = pose.interval.end - pose.interval.first;
+        let ticks = pose.ticks.len();
         let parts = parts(pose.duration_s).min(ticks);
         if parts < 2 {
             continue;
@@ -104,7 +103,7 @@ pub fn intensities(tracks: &[Track], poses: &[Pose]) -> Vec<f64> {
         let size = ticks / parts;
         let length_s = pose.duration_s * real(size) / real(ticks);
         for (sum, column) in sums.iter_mut().zip(&track.outputs) {
-            let means: Vec<f64> = column[pose.interval.first..pose.interval.end]
+            let means: Vec<f64> = column[pose.ticks.clone()]
                 .chunks_exact(size)
                 .map(|part| part.iter().sum::<f64>() / real(size))
                 .collect();

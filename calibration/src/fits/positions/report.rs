@@ -3,14 +3,14 @@
 use isotherm_pages::Table;
 use isotherm_protocol::document::{Document, Sample};
 
-use super::charts::{across, axes_chart, bend, by_level, left_chart, shown};
+use super::charts::{axes_chart, bend, by_level, left_chart, shown};
 use super::doubts::LARGEST_LEFT_SHARE;
 use super::fit::{Analysis, Settings};
 use super::hysteresis::Return;
 use super::judged::{Judgement, curves, lengths};
 use super::model::SMALL;
 use super::solve::Fit;
-use crate::axes::AXES;
+use crate::axes::{AXES, across};
 use crate::document::accel_name;
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Curve, Report, Verdict, counted, fixed, or_dash, output_unit, per_deg_c, short, six};
@@ -149,25 +149,20 @@ fn coefficients(
     let fit = &analysis.fit;
     let output = output_unit(document);
     let by_power = |power: usize| analysis.half_deg_c.powi(-i32::try_from(power).unwrap_or(0));
-    let of_sensor = fit.degrees.of_sensor();
-    let s = fit.degrees.sensor + 1;
     for (index, (name, sensor)) in names.iter().zip(&fit.sensors).enumerate() {
-        let sigma = |offset: usize, scale: f64| {
-            fit.solution.sigma(index * of_sensor + offset) * SMALL * scale * analysis.widened
-        };
         let guess = fit.guess[index].scale;
-        for (power, k) in sensor.scale.iter().enumerate() {
-            let factor = by_power(power);
-            let value = k * factor / gravity;
-            let unit = per_deg_c(&format!("{output}/(m/s²)"), power);
-            let sigma = sigma(power, guess / gravity * factor);
-            report.coefficient(format!("accelerometer {name} K{power}"), unit, value, sigma);
-        }
-        for (power, bias) in sensor.bias.iter().enumerate() {
-            let factor = by_power(power);
-            let unit = per_deg_c(output, power);
-            let sigma = sigma(s + power, guess * factor);
-            report.coefficient(format!("accelerometer {name} S{power}"), unit, bias * factor, sigma);
+        let mut place = index * fit.degrees.of_sensor();
+        let per_input = format!("{output}/(m/s²)");
+        for (letter, values, unit, per) in
+            [("K", &sensor.scale, per_input.as_str(), gravity), ("S", &sensor.bias, output, 1.0)]
+        {
+            for (power, value) in values.iter().enumerate() {
+                let factor = by_power(power);
+                let sigma = fit.solution.sigma(place) * SMALL * (guess / per * factor) * analysis.widened;
+                let name = format!("accelerometer {name} {letter}{power}");
+                report.coefficient(name, per_deg_c(unit, power), value * factor / per, sigma);
+                place += 1;
+            }
         }
     }
     let mut axes = |fit: &Fit, from: usize, what: &str| {
@@ -175,7 +170,7 @@ fn coefficients(
             for (power, row) in sensor.axis.iter().enumerate().skip(from) {
                 let factor = by_power(power) * ARCSEC_PER_RAD;
                 let sigma = fit.axis_sigma(index, power);
-                for i in across(sensor.axis[0]) {
+                for i in across(&sensor.axis[0]) {
                     let name = format!("accelerometer {name} C{power}{what} along {}", AXES[i]);
                     let sigma = sigma[i] * factor * analysis.widened;
                     report.coefficient(name, per_deg_c("″", power), row[i] * factor, sigma);

@@ -11,10 +11,10 @@
 //! The stand's errors δ1…δ3 are parameters with a prior as wide as the stand may be out of level, so that few positions, which do
 //! not tell them from the axes, give what they can with uncertainties that say so.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::model::{Degrees, Guess, Model, SMALL, Sensor, Taken, across};
-use super::plan::{Attitude, Plan};
+use super::model::{Degrees, Guess, SMALL, Sensor, Taken, across};
+use super::plan::{Attitude, Plan, StandErrors};
 use crate::lsq::linear;
 use crate::lsq::nonlinear::{NoSolution, Solution, known, solve};
 
@@ -38,7 +38,7 @@ pub struct Fit {
     pub sensors: Vec<Sensor>,
     /// δ1, δ2, δ3 (rad) with standard errors.
     pub stand: [(f64, f64); 3],
-    /// Parameters with their covariance, as [`Model`] counts them.
+    /// Parameters with their covariance, as [`Positions`] counts them.
     pub solution: Solution,
     /// First guesses, which the parameters are relative to.
     pub guess: Vec<Guess>,
@@ -70,13 +70,7 @@ impl Fit {
 /// # Errors
 /// Numbers of the accelerometers that the positions do not determine.
 pub fn guesses(plan: &Plan, taken: &[Taken], sensors: usize) -> Result<Vec<Guess>, Vec<usize>> {
-    let ups: Vec<[f64; 3]> = taken
-        .iter()
-        .map(|taken| {
-            let position = plan.positions.get(taken.position);
-            position.map_or([f64::NAN; 3], |position| plan.up(&position.attitude, [0.0; 3]))
-        })
-        .collect();
+    let ups: Vec<[f64; 3]> = taken.iter().map(|taken| plan.up(taken.position, [0.0; 3])).collect();
     let of = |sensor: usize| {
         let outputs: Vec<f64> =
             taken.iter().map(|taken| taken.outputs.get(sensor).copied().unwrap_or(f64::NAN)).collect();
@@ -98,15 +92,18 @@ pub struct Positions<'a> {
     pub guess: &'a [Guess],
     /// What is known of the errors.
     pub weights: &'a Weights,
+    /// Degrees of the polynomials.
+    pub degrees: Degrees,
 }
 
+/// Parameters: accelerometer by accelerometer K, S, a, b, each by powers; then δ1, δ2, δ3 (in thousandths).
 impl Positions<'_> {
     /// Finds everything from them.
     ///
     /// # Errors
     /// Where they do not determine it.
-    pub fn fit(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
-        self.found(degrees, false)
+    pub fn fit(&self) -> Result<Fit, NoSolution> {
+        Ok(self.found(solve(&self.start(), self.residuals())?))
     }
 
     /// What [`Positions::fit`] will find of positions that are only planned, so that the first guess is the truth: nothing is
@@ -114,64 +111,85 @@ impl Positions<'_> {
     ///
     /// # Errors
     /// Where they do not determine it.
-    pub fn planned(&self, degrees: Degrees) -> Result<Fit, NoSolution> {
-        self.found(degrees, true)
+    pub fn planned(&self) -> Result<Fit, NoSolution> {
+        Ok(self.found(known(&self.start(), self.residuals())?))
     }
 
     /// What some of them say by themselves, at one temperature; `None` where they do not determine it.
     pub(super) fn alone(&self, taken: &[Taken]) -> Option<Fit> {
-        Positions { taken, ..*self }.fit(Degrees { sensor: 0, axes: 0 }).ok()
+        Positions { taken, degrees: Degrees::NONE, ..*self }.fit().ok()
     }
 
-    fn found(&self, degrees: Degrees, is_planned: bool) -> Result<Fit, NoSolution> {
-        let Self { plan, taken, guess, weights } = *self;
-        let model = Model { plan, guess, degrees };
-        let start = vec![0.0; model.count()];
-        let whitening: Vec<DMatrix<f64>> =
-            taken.iter().map(|taken| whitening(model, &start, taken, weights)).collect();
-        let prior = weights.levelling_rad / SMALL;
-        let residuals = |p: &[f64]| -> Vec<f64> {
-            let mut all = Vec::with_capacity(taken.len() * guess.len() + 3);
-            for (taken, whitening) in taken.iter().zip(&whitening) {
-                let predicted = model.outputs(p, taken);
-                let away = DVector::from_iterator(
-                    guess.len(),
-                    taken.outputs.iter().zip(&predicted).map(|(measured, predicted)| measured - predicted),
-                );
+    fn start(&self) -> Vec<f64> {
+        vec![0.0; self.guess.len() * self.degrees.of_sensor() + 3]
+    }
+
+    /// Each accelerometer with its parameters.
+    fn sensors<'a>(&'a self, p: &'a [f64]) -> impl Iterator<Item = (&'a Guess, (Degrees, &'a [f64]))> {
+        let degrees = self.degrees;
+        let own = p.chunks_exact(degrees.of_sensor());
+        self.guess.iter().zip(own).map(move |(guess, own)| (guess, (degrees, own)))
+    }
+
+    /// Outputs of all accelerometers in a position under a direction of "up".
+    fn outputs(&self, p: &[f64], taken: &Taken, up: [f64; 3]) -> DVector<f64> {
+        let output = |(index, (guess, own)): (usize, (&Guess, (Degrees, &[f64])))| {
+            guess.output(own, [taken.sensor_t[index], taken.axes_t], taken.ratio[index], up)
+        };
+        DVector::from_iterator(self.guess.len(), self.sensors(p).enumerate().map(output))
+    }
+
+    /// Residuals of all outputs, white, and of the stand's errors.
+    fn residuals(&self) -> impl Fn(&[f64]) -> Vec<f64> {
+        let whitening: Vec<DMatrix<f64>> = self.taken.iter().map(|taken| self.whitening(taken)).collect();
+        let prior = self.weights.levelling_rad / SMALL;
+        move |p: &[f64]| {
+            let mut all = Vec::with_capacity(self.taken.len() * self.guess.len() + 3);
+            for (taken, whitening) in self.taken.iter().zip(&whitening) {
+                let up = self.plan.up(taken.position, errors(p));
+                let away = DVector::from_column_slice(&taken.outputs) - self.outputs(p, taken, up);
                 all.extend((whitening * away).iter());
             }
             all.extend(p[p.len() - 3..].iter().map(|error| error / prior));
             all
+        }
+    }
+
+    /// L⁻¹ of V = L·Lᵀ for one position.
+    fn whitening(&self, taken: &Taken) -> DMatrix<f64> {
+        let (count, weights, start) = (self.guess.len(), self.weights, self.start());
+        // A position without a stand behind it does not know which way the level is out.
+        let sigma = match self.plan.positions[taken.position].attitude {
+            Attitude::Up(_) => (weights.positioning_rad.powi(2) + weights.levelling_rad.powi(2)).sqrt(),
+            Attitude::Stand(_) => weights.positioning_rad,
         };
-        let solution = if is_planned { known(&start, residuals)? } else { solve(&start, residuals)? };
-        let errors = model.errors(&solution.parameters);
-        let from = model.count() - 3;
-        let stand = [0, 1, 2].map(|i| (errors[i], solution.sigma(from + i) * SMALL));
-        let sensors = model.state(&solution.parameters);
-        Ok(Fit { degrees, sensors, stand, solution, guess: guess.to_vec() })
+        let noise = |i: usize, _| weights.intensity[i] / taken.duration_s;
+        let mut covariance = DMatrix::from_diagonal(&DVector::from_fn(count, noise));
+        let at_rest = self.outputs(&start, taken, [0.0; 3]);
+        let up = self.plan.up(taken.position, [0.0; 3]);
+        let first = Vector3::from(across(up)[0]);
+        for direction in [first, Vector3::from(up).cross(&first)] {
+            let change = self.outputs(&start, taken, direction.into()) - &at_rest;
+            covariance += &change * change.transpose() * (sigma * sigma);
+        }
+        linear::whitening(&covariance).unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
+    }
+
+    fn found(&self, solution: Solution) -> Fit {
+        let p = &solution.parameters;
+        let errors = errors(p);
+        Fit {
+            degrees: self.degrees,
+            sensors: self.sensors(p).map(|(guess, own)| guess.found(own)).collect(),
+            stand: [0, 1, 2].map(|i| (errors[i], solution.sigma(p.len() - 3 + i) * SMALL)),
+            guess: self.guess.to_vec(),
+            solution,
+        }
     }
 }
 
-/// L⁻¹ of V = L·Lᵀ for one position.
-fn whitening(model: Model<'_>, start: &[f64], taken: &Taken, weights: &Weights) -> DMatrix<f64> {
-    let count = model.guess.len();
-    let position = model.plan.positions.get(taken.position);
-    let up = position.map_or([0.0; 3], |position| model.plan.up(&position.attitude, [0.0; 3]));
-    // A position without a stand behind it does not know which way the level is out.
-    let loose = position.is_some_and(|position| matches!(position.attitude, Attitude::Up(_)));
-    let sigma = if loose {
-        (weights.positioning_rad.powi(2) + weights.levelling_rad.powi(2)).sqrt()
-    } else {
-        weights.positioning_rad
-    };
-    let noise = |i: usize| weights.intensity.get(i).copied().unwrap_or(f64::NAN) / taken.duration_s;
-    let mut covariance = DMatrix::from_diagonal(&DVector::from_fn(count, |i, _| noise(i)));
-    let at_rest = DVector::from_vec(model.outputs_under(start, taken, [0.0; 3]));
-    let up = nalgebra::Vector3::from(up);
-    let first = nalgebra::Vector3::from(across(up.into())[0]);
-    for direction in [first, up.cross(&first)] {
-        let change = DVector::from_vec(model.outputs_under(start, taken, direction.into())) - &at_rest;
-        covariance += &change * change.transpose() * (sigma * sigma);
-    }
-    linear::whitening(&covariance).unwrap_or_else(|| DMatrix::from_element(count, count, f64::NAN))
+/// The stand's errors among the parameters (rad).
+fn errors(p: &[f64]) -> StandErrors {
+    let from = p.len() - 3;
+    [0, 1, 2].map(|i| p[from + i] * SMALL)
 }

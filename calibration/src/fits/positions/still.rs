@@ -4,6 +4,8 @@
 //! 2014), and the rates are near those of the still ticks: accelerometers do not feel a turn about the vertical. The window
 //! keeps half its length away from every motion.
 
+use std::ops::Range;
+
 use clap::Args;
 
 use super::track::{Track, quantile};
@@ -30,15 +32,6 @@ pub struct StillLimits {
     pub least_s: f64,
 }
 
-/// An interval of ticks, `first..end`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interval {
-    /// First tick.
-    pub first: usize,
-    /// Tick behind the last.
-    pub end: usize,
-}
-
 /// Fewest ticks of a window.
 const FEWEST_TICKS: usize = 8;
 /// Standard deviations of noise that a still rate may be away.
@@ -46,8 +39,8 @@ const RATE_SIGMAS: f64 = 6.0;
 /// Share of the run that is taken to be still where nothing is known.
 const QUIET_SHARE: f64 = 0.2;
 
-/// The still intervals of a run. `rest` is a stretch from its beginning (s) that is known to be still.
-pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Interval> {
+/// The still intervals of a run, in ticks. `rest` is a stretch from its beginning (s) that is known to be still.
+pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Range<usize>> {
     let tick_s = track.tick_s();
     let half = half_window(limits.window_s, tick_s);
     let mut variance = vec![0.0; track.len()];
@@ -68,33 +61,21 @@ pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Inte
     // False for no number too.
     let calm: Vec<bool> = variance.iter().map(|value| *value <= limit).collect();
     let turning = turning(track, limits, half, &calm);
-    let gap = |tick: usize| {
-        tick > 0 && (track.start_s(tick) - track.start_s(tick - 1)) > 1.5 * track.duration_s[tick - 1] + 1e-6
-    };
-    let mut found: Vec<Interval> = Vec::new();
-    let mut first = None;
-    for tick in 0..=track.len() {
-        let still = calm.get(tick).is_some_and(|calm| *calm) && !turning.get(tick).is_none_or(|turns| *turns);
-        if let Some(begin) = first.filter(|_| !still || gap(tick)) {
-            found.push(Interval { first: begin, end: tick });
-            first = None;
-        }
-        if still && first.is_none() {
-            first = Some(tick);
-        }
-    }
-    found.into_iter().filter_map(|interval| settled(track, interval, limits)).collect()
+    let gap =
+        |tick: usize| track.start_s(tick) - track.start_s(tick - 1) > 1.5 * track.duration_s[tick - 1] + 1e-6;
+    let still: Vec<usize> = (0..track.len()).filter(|tick| calm[*tick] && !turning[*tick]).collect();
+    let together = still.chunk_by(|last, tick| *tick == last + 1 && !gap(*tick));
+    let intervals = together.map(|ticks| ticks[0]..ticks[0] + ticks.len());
+    intervals.filter_map(|ticks| settled(track, ticks, limits)).collect()
 }
 
 /// The interval without the time that the unit takes to settle; `None` where what is left is too short.
-fn settled(track: &Track, interval: Interval, limits: &StillLimits) -> Option<Interval> {
-    let begin = track.start_s(interval.first);
-    let settling = (interval.first..interval.end)
-        .take_while(|tick| track.start_s(*tick) < begin + limits.settle_s - 1e-9)
-        .count();
-    let first = interval.first + settling;
-    let length = track.duration_s[first..interval.end].iter().sum::<f64>();
-    (length >= limits.least_s - 1e-9).then_some(Interval { first, end: interval.end })
+fn settled(track: &Track, ticks: Range<usize>, limits: &StillLimits) -> Option<Range<usize>> {
+    let begin = track.start_s(ticks.start);
+    let is_settling = |tick: &usize| track.start_s(*tick) < begin + limits.settle_s - 1e-9;
+    let settled = ticks.start + ticks.clone().take_while(is_settling).count()..ticks.end;
+    let length = track.duration_s[settled.clone()].iter().sum::<f64>();
+    (length >= limits.least_s - 1e-9).then_some(settled)
 }
 
 /// Ticks to either side of a window's middle.
@@ -126,28 +107,24 @@ fn turning(track: &Track, limits: &StillLimits, half: usize, calm: &[bool]) -> V
 fn spread(column: &[f64], half: usize) -> (Vec<f64>, Vec<f64>) {
     // Sums of squares would lose the variance beside a large mean.
     let about = quantile(column, 0.5);
-    let mut sums = Vec::with_capacity(column.len() + 1);
-    let (mut first, mut second) = (0.0, 0.0);
-    sums.push((0.0, 0.0));
-    let mut broken_until = 0;
-    let mut broken = vec![false; column.len()];
-    for (tick, value) in column.iter().enumerate() {
+    // Up to each tick: sums of both powers, and how many readings are not numbers.
+    let (mut first, mut second, mut broken) = (0.0, 0.0, 0_usize);
+    let mut sums = vec![(first, second, broken)];
+    for value in column {
         let away = value - about;
         if away.is_finite() {
             first += away;
             second += away * away;
         } else {
-            let low = tick.saturating_sub(half).max(broken_until);
-            broken_until = (tick + half + 1).min(column.len());
-            broken[low..broken_until].fill(true);
+            broken += 1;
         }
-        sums.push((first, second));
+        sums.push((first, second, broken));
     }
     let of = |tick: usize| {
-        if broken[tick] {
+        let (low, high) = (tick.saturating_sub(half), (tick + half + 1).min(column.len()));
+        if sums[high].2 > sums[low].2 {
             return (f64::NAN, f64::NAN);
         }
-        let (low, high) = (tick.saturating_sub(half), (tick + half + 1).min(column.len()));
         let count = real(high - low);
         let mean = (sums[high].0 - sums[low].0) / count;
         let square = (sums[high].1 - sums[low].1) / count;

@@ -6,7 +6,7 @@ use isotherm_protocol::document::Document;
 
 use super::fit::Settings;
 use super::pose::Pose;
-use crate::axes::several;
+use crate::axes::{each, several};
 use crate::document::accelerometers;
 use crate::numbers::{ends, mean, once_each};
 use crate::report::fixed;
@@ -26,22 +26,6 @@ fn channels(document: &Document, settings: &Settings) -> Vec<String> {
 /// The accelerometers' own channels.
 fn of_accelerometers(document: &Document) -> Vec<String> {
     once_each(accelerometers(document).iter().filter_map(|sensor| sensor.channel.clone()))
-}
-
-/// Temperatures that something was taken at (°C).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Temperatures {
-    /// Their mean.
-    pub mean: f64,
-    /// Lowest and highest.
-    pub range: [f64; 2],
-}
-
-impl Temperatures {
-    /// Of some temperatures.
-    pub(super) fn of(deg_c: &[f64]) -> Self {
-        Self { mean: mean(deg_c), range: ends(deg_c.iter().copied()) }
-    }
 }
 
 /// The temperature of each accelerometer in each pose (°C), as the service has it: that of its own channel, that of the axes
@@ -71,45 +55,25 @@ pub(super) fn blind(document: &Document, own: &[Vec<f64>], levels: usize) -> Vec
     if levels < 2 {
         return Vec::new();
     }
-    let mut blind: Vec<(String, Vec<usize>, [f64; 2])> = Vec::new();
-    for (sensor, deg_c) in own.iter().enumerate() {
-        let range = Temperatures::of(deg_c).range;
-        if range[1] - range[0] > LEVEL_GAP_DEG_C {
-            continue;
-        }
+    let narrow = own.iter().enumerate().filter_map(|(sensor, deg_c)| {
+        let [low, high] = ends(deg_c.iter().copied()).map(|deg_c| fixed(deg_c, 1));
         let channel = accelerometers(document).get(sensor).and_then(|sensor| sensor.channel.as_ref());
         let channel = channel.map_or("no channel".to_owned(), |channel| format!("channel {channel:?}"));
-        match blind.iter_mut().find(|(of, ..)| *of == channel) {
-            Some((_, sensors, [low, high])) => {
-                sensors.push(sensor);
-                (*low, *high) = (low.min(range[0]), high.max(range[1]));
-            }
-            None => blind.push((channel, vec![sensor], range)),
-        }
-    }
-    let words = |(channel, sensors, [low, high]): (String, Vec<usize>, [f64; 2])| {
-        format!(
-            "{}: K and S follow {channel}, which goes from {} to {} °C over {levels} temperatures of the axes, more \
-             than {LEVEL_GAP_DEG_C} °C are needed: name its own channel in the document, or give the logs of one \
-             temperature",
-            several("accelerometer", &sensors, own.len()),
-            fixed(low, 1),
-            fixed(high, 1)
-        )
-    };
-    blind.into_iter().map(words).collect()
+        let words = format!(
+            "K and S follow {channel}, which goes from {low} to {high} °C over {levels} temperatures of the axes, more than \
+             {LEVEL_GAP_DEG_C} °C are needed: name its own channel in the document, or give the logs of one temperature"
+        );
+        (spread(deg_c) <= LEVEL_GAP_DEG_C).then_some((sensor, words))
+    });
+    each("accelerometer", narrow, own.len())
 }
 
 /// Words where the channels that C follows see one temperature, and those of the accelerometers several.
 pub(super) fn stuck(channels: &[String], axes: &[f64], own: &[Vec<f64>]) -> Option<String> {
-    let [low, high] = Temperatures::of(axes).range;
-    let wide = |(sensor, deg_c): (usize, &Vec<f64>)| {
-        let [low, high] = Temperatures::of(deg_c).range;
-        (high - low > LEVEL_GAP_DEG_C).then_some((sensor, low, high))
-    };
-    let wide: Vec<(usize, f64, f64)> = own.iter().enumerate().filter_map(wide).collect();
-    let ((_, from, to), sensors) =
-        (wide.first()?, wide.iter().map(|(sensor, ..)| *sensor).collect::<Vec<_>>());
+    let [low, high] = ends(axes.iter().copied());
+    let wide = |sensor: &usize| spread(&own[*sensor]) > LEVEL_GAP_DEG_C;
+    let sensors: Vec<usize> = (0..own.len()).filter(wide).collect();
+    let [from, to] = ends(own[*sensors.first()?].iter().copied());
     (high - low <= LEVEL_GAP_DEG_C).then(|| {
         format!(
             "C follows {}, which goes from {} to {} °C only, but the channel of {} goes from {} to {} °C: is it \
@@ -118,10 +82,15 @@ pub(super) fn stuck(channels: &[String], axes: &[f64], own: &[Vec<f64>]) -> Opti
             fixed(low, 1),
             fixed(high, 1),
             several("accelerometer", &sensors, own.len()),
-            fixed(*from, 1),
-            fixed(*to, 1)
+            fixed(from, 1),
+            fixed(to, 1)
         )
     })
+}
+
+fn spread(deg_c: &[f64]) -> f64 {
+    let [low, high] = ends(deg_c.iter().copied());
+    high - low
 }
 
 /// Channels by their names.
@@ -187,7 +156,7 @@ pub(super) fn followed(
 pub(super) fn slopes_deg_c(document: &Document, poses: &[Pose]) -> Option<f64> {
     let thermal = document.accel.as_ref()?.orientation.thermal.as_ref()?;
     let of: Vec<f64> = poses.iter().filter_map(|pose| pose.mean_temperature(&thermal.channels)).collect();
-    (!of.is_empty()).then(|| Temperatures::of(&of).mean)
+    (!of.is_empty()).then(|| mean(&of))
 }
 
 /// r of the board of an accelerometer in a pose, by the document.

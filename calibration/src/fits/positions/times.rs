@@ -6,7 +6,6 @@ use isotherm_log::file::read_small_text;
 
 use super::plan::Plan;
 use super::pose::Pose;
-use super::still::Interval;
 use super::track::Track;
 use crate::csv;
 use crate::error::Error;
@@ -82,8 +81,7 @@ impl Times {
                 ));
                 continue;
             };
-            let interval = Interval { first: *first, end: last + 1 };
-            found.push((Pose::over(track, run, interval), position));
+            found.push((Pose::over(track, run, *first..last + 1), position));
         }
         if reasons.is_empty() { Ok(found) } else { Err(reasons) }
     }

@@ -5,7 +5,7 @@
 
 use isotherm_correction::earth::Place;
 
-use super::earth::carried_along;
+use super::earth::carried;
 use super::measure::in_case;
 use super::plateaus::Plateau;
 use super::read::Turned;
@@ -61,7 +61,7 @@ fn of_run(place: &Place, run: &Turned, (axes, gains): (&[[f64; 3]], &[f64])) -> 
         .map(|sensor| median(&run.rests.iter().map(|rest| rest.rate[sensor]).collect::<Vec<f64>>()))
         .collect();
     let in_case = in_case(axes);
-    let gravity = carried_along(bins, start, |bin| {
+    let gravity = carried(bins, start, |bin, _| {
         in_case(&|sensor| (bin.rate[sensor] - at_rest[sensor]) / gains[sensor])
     });
     run.rests.iter().find_map(|rest: &Plateau| {

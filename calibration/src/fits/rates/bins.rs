@@ -29,6 +29,8 @@ pub struct Bin {
     pub broken: bool,
     /// Whether a gyro was at its input limit.
     pub overrange: bool,
+    /// Mean of the Earth's rate along the case axes (°/h); zero where it is not known.
+    pub earth: [f64; 3],
 }
 
 /// A run.
@@ -83,6 +85,7 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3]) -> Result<Binned,
         force: (force_s[row] > 0.0).then(|| at(&table.force_m_per_s2, row)),
         broken: table.gap_before[row] || table.missed_s[row] > 0.0,
         overrange: table.overrange[row],
+        earth: [0.0; 3],
     };
     let bins: Vec<Bin> = (0..table.len()).map(bin).collect();
     let of_axes = |thermal: &OrientationThermal| {

@@ -83,7 +83,7 @@ pub(super) fn turned_as_stated(
 pub(super) fn steady(matched: &[Matched], bins: &[Bin]) -> Result<(), Kind> {
     let sigma = scatter(bins);
     for one in matched {
-        let own = bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
+        let own = one.plateau.own(bins);
         let sensor = largest(sigma.len(), |sensor| one.plateau.rate[sensor].abs());
         let rates: Vec<f64> = own.iter().filter(|bin| bin.good_s > 0.0).map(|bin| bin.rate[sensor]).collect();
         if rates.is_empty() {
@@ -185,7 +185,7 @@ mod tests {
 
     fn step(bins: &[Bin], window_s: [f64; 2], rate_deg_per_s: f64) -> Matched {
         let step = Step { run: 0, axis: [1.0, 0.0, 0.0], rate_deg_per_s, window_s: Some(window_s) };
-        Matched { step, plateau: within(bins, window_s).unwrap() }
+        Matched::new(step, within(bins, window_s).unwrap())
     }
 
     #[test]

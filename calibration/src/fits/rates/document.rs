@@ -39,17 +39,13 @@ pub fn fitted(
             }
         }
         if let (Some(axis), Some(row)) = (found.axis, document.gyro.orientation.rows.get_mut(sensor)) {
-            let slopes = thermal.as_ref().and_then(|thermal| {
+            let turned = thermal.as_ref().and_then(|thermal| {
                 let away = deg_c? - thermal.reference_deg_c;
-                Some(
-                    thermal
-                        .slopes_arcsec_per_deg_c
-                        .get(sensor)?
-                        .map(|slope| Angle::from_arcsec(slope).as_rad() * away),
-                )
+                let slopes = thermal.slopes_arcsec_per_deg_c.get(sensor)?;
+                Some(slopes.map(|slope| Angle::from_arcsec(slope).as_rad() * away))
             });
-            let slopes = slopes.unwrap_or_default();
-            let at_reference = [0, 1, 2].map(|element| axis[element] - slopes[element]);
+            let turned = turned.unwrap_or_default();
+            let at_reference = [0, 1, 2].map(|element| axis[element] - turned[element]);
             *row = unit(at_reference).map(tidy);
         }
     }
@@ -82,7 +78,7 @@ pub fn details(made: &Made) -> Value {
     };
     let left = |found: &GyroRates| found.left.iter().map(|left| tidy(*left)).collect();
     let mut details = json!({
-        "rate_deg_per_s": made.steps.iter().map(|step| step.matched.step.rate_deg_per_s).collect::<Vec<_>>(),
+        "rate_deg_per_s": made.steps.iter().map(|one| one.step.rate_deg_per_s).collect::<Vec<_>>(),
         "nonlinearity_deg_per_h": by_name(gyros().map(|(name, found)| (name, left(found)))),
         "covariance": by_name(gyros().map(|(name, found)| (name, rows(&found.covariance)))),
     });

@@ -11,24 +11,9 @@ use crate::numbers::{dot, norm};
 /// Angle below which a turn is none (rad).
 const NONE_RAD: f64 = 1e-12;
 
-/// Mean of the Earth's rate in case axes over each bin (°/h), from that at the beginning of the run. `turning` gives a
-/// bin's rate in case axes (°/h), relative to the stars.
-pub fn carried(bins: &[Bin], start_deg_per_h: [f64; 3], turning: impl Fn(&Bin) -> [f64; 3]) -> Vec<[f64; 3]> {
-    // What the gyros show is relative to the stars: the Earth's own turning is in it.
-    let relative = |bin: &Bin, earth: [f64; 3]| {
-        let rate = turning(bin);
-        [0, 1, 2].map(|axis| rate[axis] - earth[axis])
-    };
-    means_of(bins, start_deg_per_h, relative)
-}
-
-/// Mean over each bin of any vector that is fixed to the Earth, in its own unit of measure. `turning` gives a bin's rate in case axes
-/// (°/h), relative to the Earth.
-pub fn carried_along(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin) -> [f64; 3]) -> Vec<[f64; 3]> {
-    means_of(bins, start, |bin, _| turning(bin))
-}
-
-fn means_of(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin, [f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
+/// Mean in case axes over each bin of any vector that is fixed to the Earth, in its own unit of measure, from that at the beginning of
+/// the run. `turning` gives a bin's rate in case axes (°/h), relative to the Earth, from the vector at its beginning.
+pub fn carried(bins: &[Bin], start: [f64; 3], turning: impl Fn(&Bin, [f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
     let mut fixed = start;
     let mut now_s = bins.first().map_or(0.0, |bin| bin.begin_s);
     let mut last = [0.0; 3];

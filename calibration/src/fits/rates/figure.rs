@@ -3,103 +3,93 @@
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use isotherm_protocol::document::Document;
 
-use super::over_temperature::{Level, OverTemperature};
-use crate::axes::{AXES, main_axis};
-use crate::document::{accel_name, gyro_name};
+use super::over_temperature::{Level, Line, OverTemperature};
+use crate::axes::{AXES, across, main_axis};
+use crate::document::gyro_name;
 use crate::numbers::ARCSEC_PER_RAD;
 use crate::report::{Sigmas, bars, fixed};
 
 /// Height of a panel (CSS pixels).
 const HEIGHT: u32 = 150;
 
-/// An element of C over temperature, of a gyro and of the accelerometer along the same case axis.
-struct Element<'a> {
-    over: &'a OverTemperature,
-    gyro: usize,
-    /// Case axis that the element is along.
-    along: usize,
+/// An element of C of a gyro, and that of the accelerometer along the same case axis (″).
+struct Element {
+    title: String,
+    /// Value and standard error at each temperature by itself.
+    measured: Vec<[f64; 2]>,
+    /// The line through them at each temperature.
+    line: Vec<f64>,
     accel: Option<Accel>,
 }
 
-/// An element of an accelerometer's axis (″, ″/°C, °C), and its standard error (″).
-#[derive(Clone, Copy)]
+/// An element of C of an accelerometer, from the document.
 struct Accel {
-    index: usize,
-    value: f64,
-    slope: f64,
-    reference_deg_c: f64,
+    name: String,
+    /// At each temperature.
+    line: Vec<f64>,
+    /// Standard error, where the document states it.
     sigma: Option<f64>,
 }
 
-impl Accel {
-    fn at(&self, deg_c: f64) -> f64 {
-        self.value + self.slope * (deg_c - self.reference_deg_c)
-    }
-}
-
-/// The elements of all gyros that say where they point.
-fn elements<'a>(over: &'a OverTemperature, document: &Document) -> Vec<Element<'a>> {
+/// Two elements per gyro.
+fn elements(over: &OverTemperature, document: &Document) -> Vec<Element> {
     let sigmas = Sigmas::of(document);
+    let line = |reference_deg_c: f64, at: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        over.levels.iter().map(|level| at(level.deg_c - reference_deg_c)).collect()
+    };
     let of_accel = |main: usize, along: usize| {
         let accel = document.accel.as_ref()?;
         let index = accel.orientation.rows.iter().position(|row| main_axis(row) == main)?;
+        let value = accel.orientation.rows[index][along] * ARCSEC_PER_RAD;
         let thermal = accel.orientation.thermal.as_ref();
         let slope = thermal.and_then(|thermal| thermal.slopes_arcsec_per_deg_c.get(index));
-        let name = &accel.sensor.get(index)?.name;
+        let slope = slope.map_or(0.0, |slope| slope[along]);
+        let name = accel.sensor.get(index)?.name.clone();
+        let sigma = sigmas.get("accel", &name, "axis_arcsec");
         Some(Accel {
-            index,
-            value: accel.orientation.rows[index][along] * ARCSEC_PER_RAD,
-            slope: slope.map_or(0.0, |slope| slope[along]),
-            reference_deg_c: thermal.map_or(0.0, |thermal| thermal.reference_deg_c),
-            sigma: sigmas.get("accel", name, "axis_arcsec").and_then(|sigma| sigma.get(along).copied()),
+            sigma: sigma.and_then(|sigma| sigma.get(along).copied()),
+            line: line(thermal.map_or(0.0, |thermal| thermal.reference_deg_c), &|away| value + slope * away),
+            name,
         })
     };
-    let gyros = over.lines.iter().enumerate();
-    gyros
-        .flat_map(|(gyro, line)| {
-            let main = main_axis(&line.axis);
-            (0..3).filter(move |along| *along != main).map(move |along| (gyro, main, along))
-        })
-        .map(|(gyro, main, along)| Element { over, gyro, along, accel: of_accel(main, along) })
-        .collect()
+    let element = |gyro: usize, along: usize| {
+        let own = &over.lines[gyro];
+        let measured = |level: &Level| {
+            let found = &level.gyros[gyro];
+            let value = found.axis.map_or(f64::NAN, |axis| axis[along]);
+            [value, found.axis_sigma[along]].map(|rad| rad * ARCSEC_PER_RAD)
+        };
+        let at = |away: f64| (own.axis[along] + own.slope[along] * away) * ARCSEC_PER_RAD;
+        Element {
+            title: format!("gyro {} along {}", gyro_name(document, gyro), AXES[along]),
+            measured: over.levels.iter().map(measured).collect(),
+            line: line(over.reference_deg_c, &at),
+            accel: of_accel(main_axis(&own.axis), along),
+        }
+    };
+    let both = |(gyro, own): (usize, &Line)| across(&own.axis).map(|along| element(gyro, along));
+    over.lines.iter().enumerate().flat_map(both).collect()
 }
 
-impl Element<'_> {
-    /// The gyro's element at a temperature with its standard error (″).
-    fn measured(&self, level: &Level) -> [f64; 2] {
-        let found = &level.gyros[self.gyro];
-        let value = found.axis.map_or(f64::NAN, |axis| axis[self.along]);
-        [value * ARCSEC_PER_RAD, found.axis_sigma[self.along] * ARCSEC_PER_RAD]
-    }
-
-    fn line_at(&self, deg_c: f64) -> f64 {
-        let line = &self.over.lines[self.gyro];
-        let away = deg_c - self.over.reference_deg_c;
-        (line.axis[self.along] + line.slope[self.along] * away) * ARCSEC_PER_RAD
-    }
-}
-
-/// The figure.
+/// Each element over temperature.
 pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
-    let panel = |element: Element<'_>| {
-        let all: Vec<(f64, [f64; 2])> =
-            over.levels.iter().map(|level| (level.deg_c, element.measured(level))).collect();
-        let ends = || all.iter().map(|(deg_c, _)| *deg_c);
-        let dots = all.iter().map(|(deg_c, [value, _])| (*deg_c, *value));
+    let panel = |Element { title, measured, line, accel }: Element| {
+        let ends = || over.levels.iter().map(|level| level.deg_c);
+        let dots = ends().zip(measured.iter().map(|[value, _]| *value));
         let mut content = vec![
             Series::dots("gyro, each temperature", Ink::Raw, dots),
-            bars("95 %", Ink::Faint, all.iter().copied()),
-            Series::line("gyro", Ink::First, ends().map(|t| (t, element.line_at(t)))),
+            bars("95 %", Ink::Faint, ends().zip(measured.iter().copied())),
+            Series::line("gyro", Ink::First, ends().zip(line.iter().copied())),
         ];
-        if let Some(accel) = element.accel {
-            content.push(Series::line("accelerometer", Ink::Second, ends().map(|t| (t, accel.at(t)))));
+        if let Some(accel) = accel {
+            let own = || accel.line.iter().copied();
+            content.push(Series::line("accelerometer", Ink::Second, ends().zip(own())));
             if let Some(sigma) = accel.sigma {
-                content.push(bars("95 % of it", Ink::Faint, ends().map(|t| (t, [accel.at(t), sigma]))));
+                content.push(bars("95 % of it", Ink::Faint, ends().zip(own().map(|at| [at, sigma]))));
             }
-            let apart = ends().map(|t| (t, element.line_at(t) - accel.at(t)));
-            content.push(Series::line("gyro less accelerometer", Ink::Third, apart));
+            let apart = line.iter().zip(own()).map(|(line, accel)| line - accel);
+            content.push(Series::line("gyro less accelerometer", Ink::Third, ends().zip(apart)));
         }
-        let title = format!("gyro {} along {}", gyro_name(document, element.gyro), AXES[element.along]);
         Panel::of(title, "″", HEIGHT, content)
     };
     let caption = "Elements of C over temperature: gyros, the document's accelerometers, and the difference.";
@@ -107,23 +97,21 @@ pub(super) fn chart(over: &OverTemperature, document: &Document) -> Chart {
     Chart::of(caption, Axis::of("temperature", "°C"), panels)
 }
 
-/// The figure's numbers.
+/// The elements at each temperature by itself.
 pub(super) fn table(over: &OverTemperature, document: &Document) -> Table {
     let elements = elements(over, document);
-    let heads = elements.iter().map(|element| {
-        let less = element.accel.map_or_else(String::new, |own| {
-            format!(" (less accelerometer {})", accel_name(document, own.index))
-        });
-        format!("gyro {} along {}{less}", gyro_name(document, element.gyro), AXES[element.along])
+    let heads = elements.iter().map(|Element { title, accel, .. }| match accel {
+        Some(accel) => format!("{title} (less accelerometer {})", accel.name),
+        None => title.clone(),
     });
     let head = std::iter::once("°C".to_owned()).chain(heads);
-    let row = |level: &Level| {
-        let cell = |element: &Element<'_>| {
-            let [value, sigma] = element.measured(level);
-            let apart = element.accel.map(|own| format!(" ({})", fixed(value - own.at(level.deg_c), 1)));
+    let row = |(at, level): (usize, &Level)| {
+        let cell = |element: &Element| {
+            let [value, sigma] = element.measured[at];
+            let apart = element.accel.as_ref().map(|own| format!(" ({})", fixed(value - own.line[at], 1)));
             format!("{} ± {sigma:.1}{}", fixed(value, 1), apart.unwrap_or_default())
         };
         std::iter::once(fixed(level.deg_c, 1)).chain(elements.iter().map(cell)).collect()
     };
-    Table::of(head, over.levels.iter().map(row))
+    Table::of(head, over.levels.iter().enumerate().map(row))
 }

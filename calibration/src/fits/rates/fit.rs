@@ -7,7 +7,7 @@ use super::attitude;
 use super::checks::{no_result, one_way};
 use super::document;
 use super::matching::Matched;
-use super::measure::{earth_in_bins, first_gains, points, true_rates, white};
+use super::measure::{carry_earth, first_gains, points, white};
 use super::model::{GyroRates, solve};
 use super::over_temperature::OverTemperature;
 use super::read::{Turned, read, whole_turns};
@@ -46,17 +46,6 @@ pub struct Wanted<'a> {
     pub with_bias: bool,
 }
 
-/// A step with what was measured in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
-    /// The step and its plateau.
-    pub matched: Matched,
-    /// True rate of the case (°/h).
-    pub rate: [f64; 3],
-    /// Error of the corrected rate in case axes (°/h), before and after.
-    pub error: [[f64; 3]; 2],
-}
-
 /// What came of it.
 #[derive(Debug, Clone)]
 pub struct Made {
@@ -65,15 +54,13 @@ pub struct Made {
     /// What was found of each gyro, or why nothing was.
     pub gyros: Vec<Result<GyroRates, Kind>>,
     /// The steps.
-    pub steps: Vec<Measured>,
+    pub steps: Vec<Matched>,
     /// The steps of the judging runs.
-    pub judged: Vec<Measured>,
+    pub judged: Vec<Matched>,
     /// Whether the Earth's rate was taken off in a stated attitude.
     pub earth_known: bool,
     /// Whether the weights of the base are near those of the unit.
     pub scale_known: bool,
-    /// White noise of each gyro (°/√h).
-    pub walk: Vec<f64>,
     /// Verdicts, by case axis.
     pub verdicts: Vec<Verdict>,
     /// Mean temperature of each run (°C).
@@ -91,26 +78,21 @@ pub struct Made {
 pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     let mut warnings: Vec<Finding> = one_way(wanted.steps).map(Finding::from).into_iter().collect();
     let mut runs = read_all(wanted, &mut warnings)?;
-    let judging = runs.split_off(wanted.runs.len());
+    let mut judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
     let mut walk = vec![0.0; sensors];
     let mut axes: Vec<[f64; 3]> = (0..sensors).map(|sensor| row(wanted.base, sensor, f64::NAN)).collect();
     let mut gains = first_gains(&runs, &axes);
     let mut biases = vec![0.0; sensors];
     let mut gyros = Vec::new();
-    let mut rates = Vec::new();
     for _ in 0..ROUNDS {
-        let earth = earth_in_bins(&runs, &axes, &gains, &biases);
-        rates = true_rates(&runs, &earth);
+        carry_earth(&mut runs, &axes, &gains, &biases);
         for (sensor, walk) in walk.iter_mut().enumerate() {
-            *walk = white(wanted.base, &runs, &earth, sensor, axes[sensor].map(|x| x * gains[sensor]));
+            *walk = white(wanted.base, &runs, sensor, axes[sensor].map(|x| x * gains[sensor]));
         }
         gyros = (0..sensors)
             .map(|sensor| {
-                solve(
-                    &points(wanted, &runs, &rates, sensor, walk[sensor]),
-                    row(wanted.base, sensor, f64::NAN),
-                )
+                solve(&points(wanted, &runs, sensor, walk[sensor]), row(wanted.base, sensor, f64::NAN))
             })
             .collect();
         for (sensor, found) in gyros.iter().enumerate() {
@@ -123,7 +105,7 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
             }
         }
     }
-    let over_temperature = match OverTemperature::of(wanted, &runs, &rates, &walk) {
+    let over_temperature = match OverTemperature::of(wanted, &runs, &walk) {
         Ok(found) => found,
         Err(deg_c) => {
             warnings.push(Kind::NotEachTemperature { deg_c }.into());
@@ -132,15 +114,16 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     };
     if let Some(over) = &over_temperature {
         for (sensor, found) in gyros.iter_mut().enumerate() {
-            let points = over.at_reference(wanted, (&runs, &rates), sensor, &walk);
+            let points = over.at_reference(wanted, &runs, sensor, &walk);
             *found = solve(&points, row(wanted.base, sensor, f64::NAN));
         }
     }
-    let flat: Vec<[f64; 3]> = rates.iter().flatten().copied().collect();
+    let steps = steps_of(&runs);
+    let rates: Vec<[f64; 3]> = steps.iter().map(|one| one.rate).collect();
     let mut doubted = Vec::new();
     for (sensor, found) in gyros.iter_mut().enumerate() {
         let what =
-            found.as_ref().ok().and_then(|found| no_result(found, &flat, axes[sensor], wanted.scale_known));
+            found.as_ref().ok().and_then(|found| no_result(found, &rates, axes[sensor], wanted.scale_known));
         if let Some(what) = what {
             *found = Err(what.clone());
             doubted.push((sensor, what));
@@ -154,9 +137,8 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     }
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
     let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
-    let earth = earth_in_bins(&judging, &axes, &gains, &biases);
-    let steps = measured(&runs, &rates);
-    let judged = measured(&judging, &true_rates(&judging, &earth));
+    carry_earth(&mut judging, &axes, &gains, &biases);
+    let judged = steps_of(&judging);
     runs.extend(judging);
     warnings.extend(attitude::doubts(wanted.place, &runs, (&axes, &gains)));
     let mut made = Made {
@@ -166,7 +148,6 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
         judged,
         earth_known: !wanted.place.is_empty(),
         scale_known: wanted.scale_known,
-        walk,
         verdicts: Vec::new(),
         temperatures_deg_c: temperatures,
         over_temperature,
@@ -204,13 +185,8 @@ fn read_all(wanted: &Wanted<'_>, warnings: &mut Vec<Finding>) -> Result<Vec<Turn
     Ok(runs)
 }
 
-/// The steps of runs with their true rates, not judged yet.
-fn measured(runs: &[Turned], rates: &[Vec<[f64; 3]>]) -> Vec<Measured> {
-    runs.iter()
-        .zip(rates)
-        .flat_map(|(run, rates)| run.matched.iter().cloned().zip(rates.iter().copied()))
-        .map(|(matched, rate)| Measured { matched, rate, error: [[0.0; 3]; 2] })
-        .collect()
+fn steps_of(runs: &[Turned]) -> Vec<Matched> {
+    runs.iter().flat_map(|run| run.matched.iter().cloned()).collect()
 }
 
 impl Made {
@@ -269,9 +245,9 @@ impl Made {
         for (number, run) in wanted.runs.iter().chain(wanted.judge).enumerate() {
             let steps = if number < wanted.runs.len() { &mut self.steps } else { &mut self.judged };
             let ticks = Table::of_rows(run, &self.written.loaded, Rows::TICKS)?;
-            for step in steps.iter_mut().filter(|step| step.matched.step.run == number) {
-                let mean = ticks.mean_rate_within(step.matched.plateau.window_s);
-                step.error[sample] = [0, 1, 2].map(|axis| mean[axis] - step.rate[axis]);
+            for one in steps.iter_mut().filter(|one| one.step.run == number) {
+                let mean = ticks.mean_rate_within(one.plateau.window_s);
+                one.error[sample] = [0, 1, 2].map(|axis| mean[axis] - one.rate[axis]);
             }
         }
         Ok(())
@@ -291,9 +267,9 @@ impl Made {
 
 /// Before and after by case axis, of the steps that were fitted and of those that were not, which decide where there are any; the
 /// bias is not what rates are about, so means are taken off.
-fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
-    let of = |steps: &[Measured], axis: usize, sample: usize| -> Vec<f64> {
-        let errors: Vec<f64> = steps.iter().map(|step| step.error[sample][axis]).collect();
+fn verdicts(steps: &[Matched], judged: &[Matched]) -> Vec<Verdict> {
+    let of = |steps: &[Matched], axis: usize, sample: usize| -> Vec<f64> {
+        let errors: Vec<f64> = steps.iter().map(|one| one.error[sample][axis]).collect();
         let mean = Size::of(&errors).mean;
         errors.iter().map(|error| error - mean).collect()
     };
@@ -301,7 +277,7 @@ fn verdicts(steps: &[Measured], judged: &[Measured]) -> Vec<Verdict> {
         .iter()
         .enumerate()
         .map(|(axis, name)| {
-            let both = |steps: &[Measured]| [of(steps, axis, 0), of(steps, axis, 1)];
+            let both = |steps: &[Matched]| [of(steps, axis, 0), of(steps, axis, 1)];
             let outside = (!judged.is_empty()).then(|| both(judged));
             let verdict = Verdict::of_values(format!("gyro {name}"), "°/h", both(steps), outside);
             if verdict.accepted {

@@ -24,6 +24,16 @@ pub struct Matched {
     pub step: Step,
     /// Its plateau.
     pub plateau: Plateau,
+    /// Rate relative to the stars along the case axes (°/h): the table's, with the Earth's where that is known.
+    pub rate: [f64; 3],
+    /// Mean corrected rate less that, along the case axes, before and after (°/h).
+    pub error: [[f64; 3]; 2],
+}
+
+impl Matched {
+    pub(super) fn new(step: Step, plateau: Plateau) -> Self {
+        Self { rate: step.rate_deg_per_h(), error: [[0.0; 3]; 2], step, plateau }
+    }
 }
 
 /// Finds the steps of one run: those with a window by it, the others in the order of the plateaus. Rests between them are
@@ -37,7 +47,7 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
         let of = |step: &Step| {
             let window = step.window_s.unwrap_or_default();
             let plateau = within(bins, window).ok_or(Kind::NoTicks { window_s: window })?;
-            Ok(Matched { step: *step, plateau })
+            Ok(Matched::new(*step, plateau))
         };
         if let Some(windows_s) = overlapping(steps) {
             return Err(Kind::StepsOverlap { windows_s });
@@ -59,7 +69,7 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
     let mut all: Vec<Matched> = turning
         .into_iter()
         .zip(&moving)
-        .map(|(step, plateau)| Matched { step: *step, plateau: (*plateau).clone() })
+        .map(|(step, plateau)| Matched::new(*step, (*plateau).clone()))
         .collect();
     check(&all, plateaus)?;
     let rests: Vec<&Plateau> = plateaus.iter().filter(|plateau| plateau.size() <= limit).collect();
@@ -76,10 +86,9 @@ pub fn matched(steps: &[Step], bins: &[Bin], plateaus: &[Plateau]) -> Result<Vec
         });
     }
     all.extend(
-        rests.into_iter().map(|plateau| Matched {
-            step: Step { rate_deg_per_s: 0.0, ..*first },
-            plateau: plateau.clone(),
-        }),
+        rests
+            .into_iter()
+            .map(|plateau| Matched::new(Step { rate_deg_per_s: 0.0, ..*first }, plateau.clone())),
     );
     all.sort_by_key(|one| one.plateau.bins[0]);
     Ok(all)

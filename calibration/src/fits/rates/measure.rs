@@ -15,31 +15,20 @@ use crate::numbers::dot;
 
 /// White noise of a gyro from second differences of its bins within steps (°/√h), less what the Earth's turning shows along
 /// its `gain`.
-pub(super) fn white(
-    base: &Document,
-    runs: &[Turned],
-    earth: &[Vec<[f64; 3]>],
-    sensor: usize,
-    gain: [f64; 3],
-) -> f64 {
+pub(super) fn white(base: &Document, runs: &[Turned], sensor: usize, gain: [f64; 3]) -> f64 {
     let count = count_arcsec(base, sensor);
     let (mut sum, mut number) = (0.0, 0.0);
-    for (run, earth) in runs.iter().zip(earth) {
-        for one in &run.matched {
-            let own = |index: usize| {
-                let earth = earth.get(index).copied().unwrap_or_default();
-                run.binned.bins[index].rate[sensor] - dot(gain, earth)
-            };
-            for index in (one.plateau.bins[0] + 1)..one.plateau.bins[1].saturating_sub(1) {
-                let second = own(index - 1) - 2.0 * own(index) + own(index + 1);
-                let length = run.binned.bins[index].good_s;
-                if second.is_finite() && length > 0.0 {
-                    // White: 6·N²/L. Whole counts, differenced three times: 20·(1/12)·q²/L².
-                    let counted = 20.0 / 12.0 * count * count / (length * length);
-                    sum += (second * second - counted) * length / 6.0;
-                    number += 1.0;
-                }
-            }
+    let own = |bin: &Bin| bin.rate[sensor] - dot(gain, bin.earth);
+    let steps =
+        runs.iter().flat_map(|run| run.matched.iter().map(move |one| one.plateau.own(&run.binned.bins)));
+    for three in steps.flat_map(|bins| bins.windows(3)) {
+        let second = own(&three[0]) - 2.0 * own(&three[1]) + own(&three[2]);
+        let length = three[1].good_s;
+        if second.is_finite() && length > 0.0 {
+            // White: 6·N²/L. Whole counts, differenced three times: 20·(1/12)·q²/L².
+            let counted = 20.0 / 12.0 * count * count / (length * length);
+            sum += (second * second - counted) * length / 6.0;
+            number += 1.0;
         }
     }
     let white = if number > 0.0 { (sum / number).max(0.0) } else { 0.0 };
@@ -79,67 +68,50 @@ pub(super) fn in_case(axes: &[[f64; 3]]) -> impl Fn(&dyn Fn(usize) -> f64) -> [f
     }
 }
 
-/// Mean of the Earth's rate in case axes over each bin of each run (°/h); none where it is not known.
-pub(super) fn earth_in_bins(
-    runs: &[Turned],
-    axes: &[[f64; 3]],
-    gains: &[f64],
-    biases: &[f64],
-) -> Vec<Vec<[f64; 3]>> {
+/// Carries the Earth's rate through the bins of runs whose attitude is known, and adds it to the rates of their steps.
+pub(super) fn carry_earth(runs: &mut [Turned], axes: &[[f64; 3]], gains: &[f64], biases: &[f64]) {
     let in_case = in_case(axes);
-    let turning = |bin: &Bin| in_case(&|sensor| (bin.rate[sensor] - biases[sensor]) / gains[sensor]);
-    let of_run = |run: &Turned| {
-        run.earth_start.map(|start| carried(&run.binned.bins, start, turning)).unwrap_or_default()
+    // What the gyros show is relative to the stars: the Earth's own turning is in it.
+    let turning = |bin: &Bin, earth: [f64; 3]| {
+        let rate = in_case(&|sensor| (bin.rate[sensor] - biases[sensor]) / gains[sensor]);
+        [0, 1, 2].map(|axis| rate[axis] - earth[axis])
     };
-    runs.iter().map(of_run).collect()
-}
-
-/// True rates of all steps in case axes (°/h): the table's and the Earth's.
-pub(super) fn true_rates(runs: &[Turned], earth: &[Vec<[f64; 3]>]) -> Vec<Vec<[f64; 3]>> {
-    let of_run = |(run, earth): (&Turned, &Vec<[f64; 3]>)| {
-        let of_step = |one: &Matched| {
-            let table = one.step.axis.map(|axis| axis * 3600.0 * one.step.rate_deg_per_s);
-            let [begin, end] = one.plateau.bins;
+    for run in runs {
+        let Some(start) = run.earth_start else { continue };
+        let bins = &mut run.binned.bins;
+        let earth = carried(bins, start, turning);
+        bins.iter_mut().zip(earth).for_each(|(bin, earth)| bin.earth = earth);
+        for one in &mut run.matched {
             let (mut sum, mut good) = ([0.0; 3], 0.0);
-            let bins = run.binned.bins.get(begin..end).unwrap_or_default();
-            for (bin, earth) in bins.iter().zip(earth.get(begin..end).unwrap_or_default()) {
+            for bin in one.plateau.own(bins) {
                 good += bin.good_s;
-                sum.iter_mut().zip(earth).for_each(|(sum, earth)| *sum += earth * bin.good_s);
+                sum.iter_mut().zip(bin.earth).for_each(|(sum, earth)| *sum += earth * bin.good_s);
             }
-            if good > 0.0 { [0, 1, 2].map(|axis| table[axis] + sum[axis] / good) } else { table }
-        };
-        run.matched.iter().map(of_step).collect()
-    };
-    runs.iter().zip(earth).map(of_run).collect()
+            let table = one.step.rate_deg_per_h();
+            one.rate = if good > 0.0 { [0, 1, 2].map(|axis| table[axis] + sum[axis] / good) } else { table };
+        }
+    }
 }
 
 /// What a gyro showed in all steps, with the noise of the means.
-pub(super) fn points(
+pub(super) fn points<'a>(
     wanted: &Wanted<'_>,
-    runs: &[Turned],
-    rates: &[Vec<[f64; 3]>],
+    runs: impl IntoIterator<Item = &'a Turned>,
     sensor: usize,
     walk: f64,
 ) -> Vec<Point> {
     let count =
         if wanted.base.gyro.output == GyroOutput::Counts { count_arcsec(wanted.base, sensor) } else { 0.0 };
-    let mut points = Vec::new();
-    for (run, rates) in runs.iter().zip(rates) {
-        for (one, rate) in run.matched.iter().zip(rates) {
-            let bins = run.binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
-            let good: f64 = bins.iter().map(|bin| bin.good_s).sum();
-            let white = 3600.0 * walk * walk / good;
-            let counted = count * count / 6.0 / (good * good);
-            let table = wanted.table_ppm * 1e-6 * 3600.0 * one.step.rate_deg_per_s;
-            let variance = white + counted + table * table;
-            // Readings without any noise are as good as their digits.
-            let floor = 1e-9 * (1.0 + one.plateau.rate[sensor].abs());
-            points.push(Point {
-                rate: *rate,
-                shown: one.plateau.rate[sensor],
-                sigma: variance.sqrt().max(floor),
-            });
-        }
-    }
-    points
+    let point = |run: &Turned, one: &Matched| {
+        let good: f64 = one.plateau.own(&run.binned.bins).iter().map(|bin| bin.good_s).sum();
+        let white = 3600.0 * walk * walk / good;
+        let counted = count * count / 6.0 / (good * good);
+        let table = wanted.table_ppm * 1e-6 * 3600.0 * one.step.rate_deg_per_s;
+        let variance = white + counted + table * table;
+        let shown = one.plateau.rate[sensor];
+        // Readings without any noise are as good as their digits.
+        let floor = 1e-9 * (1.0 + shown.abs());
+        Point { rate: one.rate, shown, sigma: variance.sqrt().max(floor) }
+    };
+    runs.into_iter().flat_map(|run| run.matched.iter().map(move |one| point(run, one))).collect()
 }

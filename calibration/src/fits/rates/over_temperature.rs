@@ -83,12 +83,7 @@ impl OverTemperature {
     ///
     /// # Errors
     /// The first temperature (°C) that does not tell weights and axes of all gyros by itself.
-    pub(super) fn of(
-        wanted: &Wanted<'_>,
-        runs: &[Turned],
-        rates: &[Vec<[f64; 3]>],
-        walk: &[f64],
-    ) -> Result<Option<Self>, f64> {
+    pub(super) fn of(wanted: &Wanted<'_>, runs: &[Turned], walk: &[f64]) -> Result<Option<Self>, f64> {
         let channels = channels(wanted.base);
         let of_run = |run: &Turned| -> Option<f64> {
             let of = |name: &String| run.binned.channels_deg_c.get(name).copied();
@@ -104,8 +99,7 @@ impl OverTemperature {
         for (number, deg_c) in levels_deg_c.iter().enumerate() {
             let own: Vec<usize> = (0..runs.len()).filter(|run| level_of[*run] == number).collect();
             let gyro = |sensor: usize| {
-                let all: Vec<Point> =
-                    own.iter().flat_map(|run| of_one(wanted, (runs, rates), *run, sensor, walk)).collect();
+                let all = points(wanted, own.iter().map(|run| &runs[*run]), sensor, walk[sensor]);
                 solve(&all, row(wanted.base, sensor, f64::NAN)).ok().filter(|found| found.axis.is_some())
             };
             let gyros: Option<Vec<GyroRates>> = (0..walk.len()).map(gyro).collect();
@@ -135,7 +129,7 @@ impl OverTemperature {
     pub(super) fn at_reference(
         &self,
         wanted: &Wanted<'_>,
-        runs: (&[Turned], &[Vec<[f64; 3]>]),
+        runs: &[Turned],
         sensor: usize,
         walk: &[f64],
     ) -> Vec<Point> {
@@ -145,13 +139,13 @@ impl OverTemperature {
             let scale = 1.0 + 1e-6 * line.scale_at(level.own_deg_c[sensor] - self.reference_deg_c);
             let away = level.deg_c - self.reference_deg_c;
             let turned = line.slope.map(|slope| slope * away);
-            of_one(wanted, runs, run, sensor, walk).into_iter().map(move |point| {
+            points(wanted, [&runs[run]], sensor, walk[sensor]).into_iter().map(move |point| {
                 // A larger scale factor shows as a smaller gain.
                 let by_axis = dot(turned, point.rate);
                 Point { shown: point.shown * scale - line.gain * by_axis, ..point }
             })
         };
-        (0..runs.0.len()).flat_map(of_run).collect()
+        (0..runs.len()).flat_map(of_run).collect()
     }
 
     /// Puts slopes of axes and scale factors into a document that has what holds at the reference. Gyros that were refused keep theirs.
@@ -185,17 +179,6 @@ impl OverTemperature {
             sensor.set(Feature::Reading, put(old, (self.reference_deg_c, range), &s, Holds::Error));
         }
     }
-}
-
-/// The points of one run.
-fn of_one(
-    wanted: &Wanted<'_>,
-    (runs, rates): (&[Turned], &[Vec<[f64; 3]>]),
-    run: usize,
-    sensor: usize,
-    walk: &[f64],
-) -> Vec<Point> {
-    points(wanted, &runs[run..=run], &rates[run..=run], sensor, walk[sensor])
 }
 
 impl Line {

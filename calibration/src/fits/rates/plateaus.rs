@@ -29,6 +29,11 @@ impl Plateau {
     pub fn size(&self) -> f64 {
         norm(self.rate.iter().copied())
     }
+
+    /// Its bins.
+    pub fn own<'a>(&self, bins: &'a [Bin]) -> &'a [Bin] {
+        bins.get(self.bins[0]..self.bins[1]).unwrap_or_default()
+    }
 }
 
 /// Standard deviation of a bin's rate by gyro (°/h), from the differences of neighbours; most of a run is steady.
@@ -48,27 +53,19 @@ pub fn find(bins: &[Bin], count_deg_per_h: &[f64]) -> Vec<Plateau> {
         let slack = share * size(a).max(size(b));
         a.iter().zip(b).zip(&sigma).all(|((a, b), sigma)| (a - b).abs() <= slack + SIGMAS * sigma)
     };
-    let mut plateaus = Vec::new();
-    let mut begin = 0;
-    for index in 1..=bins.len() {
-        let goes_on = bins.get(index).zip(bins.get(index - 1)).is_some_and(|(now, last)| {
-            !now.broken && now.good_s > 0.0 && last.good_s > 0.0 && near(&last.rate, &now.rate, SHARE)
-        });
-        if goes_on {
-            continue;
-        }
-        let third = (index - begin) / 3;
-        let ends = third > 0 && {
-            let first = mean(&bins[begin..begin + third]);
-            let last = mean(&bins[index - third..index]);
-            near(&first, &last, SLOPE)
-        };
-        if let Some(plateau) = ends.then(|| cut(bins, begin, index)).flatten() {
-            plateaus.push(plateau);
-        }
-        begin = index;
-    }
-    plateaus
+    let goes_on = |last: &Bin, now: &Bin| {
+        !now.broken && now.good_s > 0.0 && last.good_s > 0.0 && near(&last.rate, &now.rate, SHARE)
+    };
+    let mut end = 0;
+    let plateau = |steady: &[Bin]| {
+        let begin = end;
+        end += steady.len();
+        let third = steady.len() / 3;
+        let [first, last] = [&steady[..third], &steady[steady.len() - third..]].map(mean);
+        let is_level = third > 0 && near(&first, &last, SLOPE);
+        is_level.then(|| cut(bins, begin, end)).flatten()
+    };
+    bins.chunk_by(goes_on).filter_map(plateau).collect()
 }
 
 /// A stretch of bins less its edges.

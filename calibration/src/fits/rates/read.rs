@@ -55,7 +55,7 @@ fn turned(wanted: &Wanted<'_>, number: usize, own: &[Step], binned: Binned) -> R
     turned_as_stated(&matched, wanted.base, wanted.scale_known)?;
     steady(&matched, &binned.bins)?;
     for one in &matched {
-        let bins = binned.bins.get(one.plateau.bins[0]..one.plateau.bins[1]).unwrap_or_default();
+        let bins = one.plateau.own(&binned.bins);
         let [good, all] =
             bins.iter().fold([0.0, 0.0], |[good, all], bin| [good + bin.good_s, all + bin.length_s]);
         let window_s = one.plateau.window_s;
@@ -89,8 +89,7 @@ fn gaps(bins: &[Bin]) -> Option<f64> {
 pub(super) fn whole_turns(run: &mut Turned) -> Vec<f64> {
     let mut short = Vec::new();
     for one in &mut run.matched {
-        let [begin, end] = one.plateau.bins;
-        let bins = run.binned.bins.get(begin..end).unwrap_or_default();
+        let bins = one.plateau.own(&run.binned.bins);
         let length_s: f64 = bins.iter().map(|bin| bin.length_s).sum();
         let rate = one.step.rate_deg_per_s;
         let turns = libm::floor(rate.abs() * length_s / TURN_DEG);
@@ -105,7 +104,7 @@ pub(super) fn whole_turns(run: &mut Turned) -> Vec<f64> {
             taken <= wanted_s + 0.5 * bin.length_s
         };
         let count = bins.iter().take_while(is_within).count().max(1);
-        one.plateau.bins = [begin, begin + count];
+        one.plateau.bins[1] = one.plateau.bins[0] + count;
         if let Some(last) = bins.get(count - 1) {
             one.plateau.window_s[1] = last.begin_s + last.length_s;
         }

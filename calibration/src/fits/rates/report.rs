@@ -4,10 +4,11 @@ use isotherm_correction::units::Angle;
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 
 use super::figure;
-use super::fit::{Made, Measured};
+use super::fit::Made;
+use super::matching::Matched;
 use super::model::GyroRates;
 use super::over_temperature::OverTemperature;
-use crate::axes::{AXES, main_axis};
+use crate::axes::{AXES, across};
 use crate::finding::Kind;
 use crate::numbers::dot;
 use crate::report::{Report, counted, fixed, gyros, per_deg_c, short, together};
@@ -26,7 +27,7 @@ impl Made {
         let mut report = Report { counted: Some("steps"), ..Report::new(title, &document.unit) };
         report.verdicts.clone_from(&made.verdicts);
         report.warnings.extend(made.warnings.iter().map(ToString::to_string));
-        let turning = made.steps.iter().filter(|step| step.matched.step.rate_deg_per_s != 0.0).count();
+        let turning = made.steps.iter().filter(|one| one.step.rate_deg_per_s != 0.0).count();
         let temperature = made
             .temperature_deg_c()
             .map_or_else(String::new, |deg_c| format!(", mean temperature {deg_c:.1} °C"));
@@ -97,8 +98,7 @@ fn over_temperature(made: &Made, over: &OverTemperature, report: &mut Report) {
                 *sigma,
             );
         }
-        let main = main_axis(&line.axis);
-        for along in (0..3).filter(|along| *along != main) {
+        for along in across(&line.axis) {
             let arcsec = |rad: f64| Angle::from_rad(rad).as_arcsec();
             let name = format!("C1 along {}", AXES[along]);
             add(name, per_deg_c("″", 1), arcsec(line.slope[along]), arcsec(line.slope_sigma[along]));
@@ -121,14 +121,14 @@ fn judged(made: &Made) -> Table {
         "y, °/h",
         "z, °/h",
     ];
-    let row = |step: &Measured| {
-        let [from, to] = step.matched.plateau.window_s;
+    let row = |one: &Matched| {
+        let [from, to] = one.plateau.window_s;
         let mut row = vec![
-            (step.matched.step.run + 1).to_string(),
+            (one.step.run + 1).to_string(),
             format!("{from:.1}…{to:.1}"),
-            short(step.matched.step.rate_deg_per_s),
+            short(one.step.rate_deg_per_s),
         ];
-        row.extend(step.error.iter().flatten().map(|error| short(*error)));
+        row.extend(one.error.iter().flatten().map(|error| short(*error)));
         row
     };
     Table::of(head, made.judged.iter().map(row))
@@ -203,16 +203,16 @@ fn linearity(made: &Made, index: usize, name: &str, found: &GyroRates, report: &
     let mut rows = Vec::new();
     let mut worst = 0.0_f64;
     for (step, left) in found.left.iter().enumerate() {
-        let Some(measured) = made.steps.get(step) else { continue };
-        let [from, to] = measured.matched.plateau.window_s;
+        let Some(one) = made.steps.get(step) else { continue };
+        let [from, to] = one.plateau.window_s;
         let own = input(step);
         worst = worst.max(left.abs());
         let of_input =
             if own.abs() > 0.01 * full { fixed(1e6 * left / own.abs(), 2) } else { "–".to_owned() };
         rows.push(vec![
-            (measured.matched.step.run + 1).to_string(),
+            (one.step.run + 1).to_string(),
             format!("{from:.1}…{to:.1}"),
-            short(measured.matched.step.rate_deg_per_s),
+            short(one.step.rate_deg_per_s),
             short(own / 3600.0),
             short(*left),
             of_input,

@@ -28,6 +28,13 @@ pub struct Step {
     pub window_s: Option<[f64; 2]>,
 }
 
+impl Step {
+    /// Rate of the table along the case axes (°/h).
+    pub fn rate_deg_per_h(&self) -> [f64; 3] {
+        self.axis.map(|axis| axis * 3600.0 * self.rate_deg_per_s)
+    }
+}
+
 /// A row of a file.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]

@@ -16,6 +16,8 @@ use crate::numbers::{ends, norm, real, unit};
 
 /// Accelerometers of a unit without a stand.
 pub const SENSORS: usize = 3;
+/// Sensor and case axis of each angle between input axes; the others are zero by definition.
+pub const ANGLES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
 /// What was found of the accelerometers.
 #[derive(Debug, Clone, PartialEq)]

@@ -83,7 +83,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     let mut reasons = Vec::new();
     for factor in factors {
         let limits = StillLimits { factor: *factor, ..settings.limits };
-        let poses = Pose::of(track, 0, &still(track, &limits, Some(settings.start_s)));
+        let poses = Pose::of(track, 0, still(track, &limits, Some(settings.start_s)));
         let fit = || accel::fit(&outputs(&poses), settings.gravity);
         let fitted = found(track, &poses, settings)
             .and_then(|()| fit().map_err(|why| vec![doubts::no_accelerometers(&why)]));
@@ -257,7 +257,7 @@ pub fn transitions(poses: &[Pose], force: impl Fn(&Pose) -> [f64; 3]) -> Vec<Tra
         let [before, after] = pair else { return None };
         let directions = [direction(before), direction(after)];
         let cosine = dot(directions[0], directions[1]);
-        let ticks = [before.interval.end, after.interval.first];
+        let ticks = [before.ticks.end, after.ticks.start];
         let length = after.span_s[0] - before.span_s[1];
         let turned = cosine < libm::cos(SHORTEST_TURN_RAD);
         (turned && length < LONGEST_TRANSITION_S).then_some(Transition { ticks, directions })

@@ -5,6 +5,7 @@ mod search;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::axes::{across, others};
 use crate::fits::positions::matching::seen;
 use crate::fits::positions::track::Track;
 use crate::lsq::nonlinear::{NoSolution, solve};
@@ -34,8 +35,7 @@ pub struct GyroFit {
 impl GyroFit {
     /// The two case axes that a gyro's input axis lies across, whichever way round it is: those that its angles are along.
     pub fn across(&self, gyro: usize) -> [usize; 2] {
-        let along = Vector3::from(self.rows.get(gyro).copied().unwrap_or_default()).iamax();
-        others(along)
+        across(&self.rows[gyro])
     }
 
     /// Angle that is left after a turn (°, rms).
@@ -51,14 +51,6 @@ impl GyroFit {
 }
 
 /// The two axes that are not this one.
-fn others(axis: usize) -> [usize; 2] {
-    match axis {
-        0 => [1, 2],
-        1 => [0, 2],
-        _ => [0, 1],
-    }
-}
-
 /// A transition: ticks between two poses, and the directions of specific force before and after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {

@@ -6,6 +6,7 @@ use isotherm_protocol::document::{Document, Sample};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
+use super::accel::ANGLES;
 use super::acceleration::GyroDrift;
 use super::fit::{Settings, Tumble, transitions};
 use super::gyro::{GyroFit, angle_of};
@@ -36,7 +37,8 @@ pub struct Left {
 impl Left {
     /// Of the same ticks as the poses.
     pub fn of(track: &Track, poses: &[Pose], gravity: f64) -> Self {
-        let own: Vec<Pose> = poses.iter().map(|pose| Pose::over(track, pose.run, pose.interval)).collect();
+        let own: Vec<Pose> =
+            poses.iter().map(|pose| Pose::over(track, pose.run, pose.ticks.clone())).collect();
         let force: Vec<[f64; 3]> = own.iter().map(|pose| pose.force_m_per_s2).collect();
         let turns = transitions(&own, |pose| pose.force_m_per_s2);
         Self {
@@ -199,7 +201,7 @@ fn coefficients(document: &Document, tumble: &Tumble, report: &mut Report) {
     let mut arcsec = |name: String, value: f64, sigma: f64| {
         report.coefficient(name, "″", value * ARCSEC_PER_RAD, sigma * ARCSEC_PER_RAD);
     };
-    for (index, (row, column)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+    for (index, [row, column]) in ANGLES.into_iter().enumerate() {
         let name = format!("accelerometer {} along {}", AXES[row], AXES[column]);
         arcsec(name, accel.rows[row][column], accel.sigma[6 + index]);
     }
@@ -244,20 +246,16 @@ pub fn details(tumble: &Tumble, settings: &Settings) -> Value {
 pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
     let mut sigmas = Sigmas::default();
     let accel = &tumble.accel;
-    // Row and column of each angle; the others are zero by definition.
-    let angle = |row: usize, column: usize| match (row, column) {
-        (0, 1) => accel.sigma[6],
-        (0, 2) => accel.sigma[7],
-        (1, 2) => accel.sigma[8],
-        _ => 0.0,
-    };
     let arcsec = |rad: f64| tidy(rad * ARCSEC_PER_RAD);
+    let mut rows = [[0.0; 3]; 3];
+    for ([row, column], sigma) in ANGLES.into_iter().zip(&accel.sigma[6..]) {
+        rows[row][column] = arcsec(*sigma);
+    }
     for (axis, sensor) in accelerometers(document).iter().enumerate().take(AXES.len()) {
         let scale = tidy(accel.scale[axis].abs() * accel.sigma[axis]);
         sigmas.put("accel", &sensor.name, "scale_factor", vec![scale]);
         sigmas.put("accel", &sensor.name, "bias", vec![tidy(accel.sigma[3 + axis])]);
-        let row = [0, 1, 2].map(|column| arcsec(angle(axis, column)));
-        sigmas.put("accel", &sensor.name, "axis_arcsec", row.to_vec());
+        sigmas.put("accel", &sensor.name, "axis_arcsec", rows[axis].to_vec());
     }
     let Ok(gyro) = &tumble.gyro else { return sigmas };
     for (axis, sensor) in document.gyro.sensor.iter().enumerate().take(AXES.len()) {

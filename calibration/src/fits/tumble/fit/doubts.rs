@@ -7,6 +7,7 @@ use super::{AccelFit, GyroFit};
 use crate::axes::AXES;
 use crate::fits::positions::pose::{Pose, intensities};
 use crate::fits::positions::track::Track;
+use crate::fits::tumble::accel::ANGLES;
 use crate::fits::tumble::gyro::LARGEST_LEFT_DEG;
 use crate::lsq::linear::{self, SINGULAR, Weak};
 use crate::lsq::nonlinear::NoSolution;
@@ -78,7 +79,7 @@ pub(super) fn sound(poses: &[Pose], fit: &AccelFit) -> Result<(), Vec<String>> {
             ));
         }
     }
-    for (index, (one, other)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+    for (index, [one, other]) in ANGLES.into_iter().enumerate() {
         let sigma = fit.sigma[6 + index].to_degrees();
         if sigma.is_nan() || sigma > LARGEST_ANGLE_SIGMA_DEG {
             reasons.push(format!(

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Matrix3;
 
-use super::{Track, Transition, others, turned};
+use super::{Track, Transition, turned};
+use crate::axes::others;
 use crate::numbers::unit;
 use crate::runs::swapped::{AS_LOGGED, ORDERS};
 
