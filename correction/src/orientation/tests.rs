@@ -158,6 +158,16 @@ fn every_error_is_reported_at_once() {
 }
 
 #[test]
+fn a_weight_or_parity_limit_may_be_as_small_or_large_as_a_number_can_be() {
+    for size in [1e-320, 1e300] {
+        let stated =
+            OrientationParts { weights: vec![size; 3], parity_limit: Some(size), ..parts(identity()) };
+        let stated = OrientationParts { parity_confirm_ticks: 1, ..stated };
+        assert!(Orientation::new(&stated).is_ok(), "{size}");
+    }
+}
+
+#[test]
 fn axes_that_come_too_close_to_a_plane_are_refused() {
     let tilt = 0.005;
     let flat = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [libm::cos(tilt), 0.0, libm::sin(tilt)]];
