@@ -129,7 +129,7 @@ impl Pipeline {
         let sensors = tick.readings.len();
         // Which gyro tick it will go with is not known yet.
         let due = self.pending.as_ref().is_some_and(|change| match change.at {
-            At::Time(time) => tick.end_time >= time,
+            At::TimeNs(time_ns) => tick.end_time.as_ns() >= time_ns,
             At::Sequence(_) => {
                 let waiting = &change.calibration;
                 (waiting.accel_output(), waiting.accel_count()) == (output, sensors)
