@@ -99,12 +99,6 @@ pub struct StepSum {
 }
 
 impl StepSum {
-    /// A sum of nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Takes one tick and emits each step that it closes.
     ///
     /// A step ends early, shorter than stated, before a tick that announces missing ticks or a restart, and

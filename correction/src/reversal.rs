@@ -93,12 +93,6 @@ pub struct Substitution {
 }
 
 impl Substitution {
-    /// A memory that has seen nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Whether the coming tick carries nothing: it falls into a transition that is running or begins with it.
     ///
     /// For terms that need to know before [`tick`](Self::tick) is called (the perimeter servo).

@@ -29,7 +29,7 @@ fn tick(sequence: u64) -> CorrectedTick {
 
 fn summed(step: NavigationStep, ticks: &[CorrectedTick]) -> Vec<CorrectedTick> {
     let mut steps = Vec::new();
-    let mut sum = StepSum::new();
+    let mut sum = StepSum::default();
     for tick in ticks {
         sum.push(&step, tick, &mut |step| steps.push(step.clone()));
     }

@@ -72,7 +72,7 @@ impl Pipeline {
             pending: None,
             operating: Operating::new(settings.in_standby),
             waiting: Waiting::default(),
-            steps: StepSum::new(),
+            steps: StepSum::default(),
             counters: Counters::default(),
             unannounced: Break::default(),
             unseen: Break::default(),
