@@ -27,7 +27,7 @@ pub enum PreLaunchView<'a> {
 }
 
 /// State of one unit and what belongs to it.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Operating {
     pub(super) state: State,
     /// Whether somebody chose it; until then it follows the calibration.
@@ -42,15 +42,8 @@ pub(super) struct Operating {
 impl Operating {
     /// Begins in standby, or running.
     pub(super) fn new(in_standby: bool) -> Self {
-        Self {
-            state: if in_standby { State::Standby } else { State::RunningWithoutReversal },
-            chosen: in_standby,
-            self_test: None,
-            report: None,
-            pre_launch: None,
-            aborted: false,
-            rest: None,
-        }
+        let state = if in_standby { State::Standby } else { State::RunningWithoutReversal };
+        Self { state, chosen: in_standby, ..Self::default() }
     }
 
     /// The last self-test that ended.
