@@ -361,11 +361,11 @@ fn reach_s(reversal: Reversal, duration: Span) -> f64 {
 fn fit_points(
     history: &History,
     reversal: Reversal,
-    lost: &[LostTick],
+    bridged: &[LostTick],
     after: usize,
     sensor: usize,
 ) -> Option<Points> {
-    let (first, last, newest) = (lost.first()?, lost.last()?, history.newest()?);
+    let (first, last, newest) = (bridged.first()?, bridged.last()?, history.newest()?);
     let (parts, origin) = (&reversal.parts, first.end_time);
     let reach = reach_s(reversal, newest.duration);
     let side = |skip: usize, take: usize, tick: &LostTick| -> Side {
@@ -382,7 +382,7 @@ fn fit_points(
         return None;
     }
     if parts.fit_window == FitWindow::Adaptive {
-        shorten(&mut old, &mut new, lost, origin, parts.fit_degree.into());
+        shorten(&mut old, &mut new, bridged, origin, parts.fit_degree.into());
     }
     Some(new.into_iter().chain(old).collect())
 }
