@@ -155,7 +155,7 @@ pub enum Verdict {
 }
 
 /// Memory of one channel.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct ChannelMemory {
     /// Last readings within the sensor's range, spikes included, so that a lasting step is believed after three.
     recent: VecDeque<f64>,
@@ -178,14 +178,10 @@ impl ChannelMemory {
         let reach = 2 * filter.derivative_points + 1;
         Self {
             recent: VecDeque::with_capacity(MEDIAN_READINGS + 1),
-            last: None,
-            seen: false,
-            rejected: false,
-            points_since_restart: 0,
             grid: VecDeque::with_capacity(filter.smoothing_points + 1),
             smoothed: VecDeque::with_capacity(reach + 1),
             rates: VecDeque::with_capacity(reach + 1),
-            state: ThermalState::default(),
+            ..Self::default()
         }
     }
 

@@ -214,6 +214,11 @@ impl Checker {
         self.within(field, value, f64::MIN_POSITIVE, HUGE);
     }
 
+    /// A number above zero, however small or large.
+    pub(crate) fn above_zero(&mut self, field: &str, value: f64) {
+        self.within(field, value, f64::from_bits(1), f64::MAX);
+    }
+
     /// A number, whatever it is.
     pub(crate) fn finite(&mut self, field: &str, value: f64) {
         self.within(field, value, f64::MIN, f64::MAX);

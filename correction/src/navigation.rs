@@ -32,18 +32,12 @@ pub const MAX_STEP_TICKS: u16 = 1000;
 /// less than 10⁻¹⁵ there, where the closed forms would lose digits.
 const SERIES_LIMIT: f64 = 0.01;
 
-/// What is wrong with a stated step.
+/// A step without ticks, or of too many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NavigationError {
-    /// No ticks, or too many.
-    #[error("a step of {got} ticks; from 1 to {max} are allowed")]
-    Ticks {
-        /// Ticks stated.
-        got: u16,
-        /// Most allowed.
-        max: u16,
-    },
+#[error("a step of {got} ticks; from 1 to {MAX_STEP_TICKS} are allowed")]
+pub struct NavigationError {
+    /// Ticks stated.
+    pub got: u16,
 }
 
 /// How ticks are summed.
@@ -65,10 +59,10 @@ impl NavigationStep {
     ///
     /// # Errors
     ///
-    /// [`NavigationError::Ticks`] outside that range.
+    /// [`NavigationError`] outside that range.
     pub const fn new(ticks: u16, coning_sculling: bool) -> Result<Self, NavigationError> {
         if ticks == 0 || ticks > MAX_STEP_TICKS {
-            return Err(NavigationError::Ticks { got: ticks, max: MAX_STEP_TICKS });
+            return Err(NavigationError { got: ticks });
         }
         Ok(Self { ticks, coning_sculling })
     }
@@ -105,12 +99,6 @@ pub struct StepSum {
 }
 
 impl StepSum {
-    /// A sum of nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Takes one tick and emits each step that it closes.
     ///
     /// A step ends early, shorter than stated, before a tick that announces missing ticks or a restart, and

@@ -93,12 +93,6 @@ pub struct Substitution {
 }
 
 impl Substitution {
-    /// A memory that has seen nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Whether the coming tick carries nothing: it falls into a transition that is running or begins with it.
     ///
     /// For terms that need to know before [`tick`](Self::tick) is called (the perimeter servo).
@@ -311,45 +305,18 @@ impl Substitution {
         if after == 0 {
             return false;
         }
-        let parts = &reversal.parts;
         let origin = first.end_time;
         let reach = reach_s(reversal, newest.duration);
-        let near = |tick: &LostTick| {
-            let edge = mid_time_s(tick.end_time, tick.duration, origin);
-            move |(at, _): &(f64, &Reading)| (at - edge).abs() <= reach
-        };
-        let timed = |reading| (Reading::mid_time_s(reading, origin), reading);
-        // The first readings after the switch and the last ones before it.
-        let spare = after.saturating_sub(parts.fit_readings_after.into());
-        let after_side: Window<'_> =
-            self.history.newest_first().take(after).skip(spare).map(timed).filter(near(last)).collect();
-        let before_side: Window<'_> = self
-            .history
-            .newest_first()
-            .skip(after)
-            .take(parts.fit_readings_before.into())
-            .map(timed)
-            .filter(near(first))
-            .collect();
-
         let mut resolved = true;
         let mut any_restored = false;
         let mut restored = [0.0; MAX_SENSORS];
         for (sensor, restored) in restored.iter_mut().enumerate().take(last.sensors) {
-            let of_sensor = |side: &Window<'_>| -> Side {
-                side.iter().filter_map(|(at, reading)| reading.point(*at, sensor)).collect()
-            };
-            let (mut new, mut old) = (of_sensor(&after_side), of_sensor(&before_side));
-            if new.is_empty() {
+            let Some(points) = fit_points(&self.history, reversal, &waiting, after, sensor) else {
                 // Nothing new is known of this sensor: the prediction stands.
                 resolved = false;
                 continue;
-            }
-            if parts.fit_window == FitWindow::Adaptive {
-                shorten(&mut old, &mut new, &waiting, origin, parts.fit_degree.into());
-            }
-            let points: Points = new.into_iter().chain(old).collect();
-            let Some(fit) = Fit::new(&points, parts.fit_degree.into()) else {
+            };
+            let Some(fit) = Fit::new(&points, reversal.parts.fit_degree.into()) else {
                 continue;
             };
             for (tick, predicted) in
@@ -387,6 +354,37 @@ fn rates(increments: &[f64], duration: Span) -> Lanes {
 /// How far a reading may be from a lost tick to say something about it (s), at ticks of a duration.
 fn reach_s(reversal: Reversal, duration: Span) -> f64 {
     f64::from(reversal.reach_ticks(duration)) * duration.as_s()
+}
+
+/// Readings of one sensor for the fit over lost ticks: the first of the newest `after`, which came behind the switch, and the last ones
+/// before them; `None` where none came behind it.
+fn fit_points(
+    history: &History,
+    reversal: Reversal,
+    bridged: &[LostTick],
+    after: usize,
+    sensor: usize,
+) -> Option<Points> {
+    let (first, last, newest) = (bridged.first()?, bridged.last()?, history.newest()?);
+    let (parts, origin) = (&reversal.parts, first.end_time);
+    let reach = reach_s(reversal, newest.duration);
+    let side = |skip: usize, take: usize, tick: &LostTick| -> Side {
+        let edge = mid_time_s(tick.end_time, tick.duration, origin);
+        let readings = history.newest_first().skip(skip).take(take);
+        let timed = readings.map(|reading| (reading.mid_time_s(origin), reading));
+        let near = timed.filter(|(at, _)| (at - edge).abs() <= reach);
+        near.filter_map(|(at, reading)| reading.point(at, sensor)).collect()
+    };
+    let taken = after.min(parts.fit_readings_after.into());
+    let mut new = side(after - taken, taken, last);
+    let mut old = side(after, parts.fit_readings_before.into(), first);
+    if new.is_empty() {
+        return None;
+    }
+    if parts.fit_window == FitWindow::Adaptive {
+        shorten(&mut old, &mut new, bridged, origin, parts.fit_degree.into());
+    }
+    Some(new.into_iter().chain(old).collect())
 }
 
 /// Leaves the readings of one sensor, newest first on either side, that make the best fit over the lost ticks.

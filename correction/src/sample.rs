@@ -138,6 +138,7 @@ pub struct TemperatureReading {
 bitflags! {
     /// What is to be known of one sensor in one corrected tick.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+    #[serde(into = "u8", from = "u8")]
     pub struct SensorFlags: u8 {
         /// The sensor's reading took part in this tick's increments as it stands.
         const VALID = 1;
@@ -159,6 +160,7 @@ bitflags! {
 bitflags! {
     /// What is to be known of one corrected tick as a whole.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+    #[serde(into = "u16", from = "u16")]
     pub struct TickFlags: u16 {
         /// The increments are predicted over a mode switch (models §5, step 2).
         const INTERPOLATED = 1;
@@ -206,7 +208,7 @@ pub struct CorrectedTick {
     #[serde(rename = "end_time_ns")]
     pub end_time: Timestamp,
     /// Measured duration; the sum where several ticks are summed.
-    #[serde(rename = "duration_ns", with = "written::duration")]
+    #[serde(rename = "duration_ns", with = "unsigned")]
     pub duration: Span,
     /// Raw ticks in this output: 1, or the length of a navigation step.
     pub ticks: u16,
@@ -221,13 +223,10 @@ pub struct CorrectedTick {
     /// Lasing mode of the tick.
     pub mode: Option<LasingMode>,
     /// Flags of the tick.
-    #[serde(with = "written::flags")]
     pub flags: TickFlags,
     /// Flags of each gyro.
-    #[serde(with = "written::sensor_flags")]
     pub gyro_flags: Sensors<SensorFlags>,
     /// Flags of each accelerometer.
-    #[serde(with = "written::sensor_flags")]
     pub accel_flags: Sensors<SensorFlags>,
     /// Parity residuals of the gyros (rad/s), N − 3 of them.
     #[serde(rename = "gyro_parity_rad_per_s")]
@@ -246,64 +245,44 @@ pub struct CorrectedTick {
     pub sigma: Option<Box<Sigma>>,
 }
 
-/// Fields of a corrected tick as the plain numbers that they are on the wire.
-mod written {
-    /// A duration as a number that has no sign; what is beyond the longest span becomes that.
-    pub(super) mod duration {
-        use serde::{Deserialize, Deserializer, Serializer};
+/// Bits, known or not: the flags' own form in JSON is text.
+impl From<SensorFlags> for u8 {
+    fn from(flags: SensorFlags) -> Self {
+        flags.bits()
+    }
+}
 
-        use crate::units::Span;
+impl From<u8> for SensorFlags {
+    fn from(bits: u8) -> Self {
+        Self::from_bits_retain(bits)
+    }
+}
 
-        #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde hands it over")]
-        pub(in super::super) fn serialize<S: Serializer>(span: &Span, to: S) -> Result<S::Ok, S::Error> {
-            to.serialize_u64(span.as_ns().unsigned_abs())
-        }
+impl From<TickFlags> for u16 {
+    fn from(flags: TickFlags) -> Self {
+        flags.bits()
+    }
+}
 
-        pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Span, D::Error> {
-            let ns = u64::deserialize(from)?;
-            Ok(Span::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)))
-        }
+impl From<u16> for TickFlags {
+    fn from(bits: u16) -> Self {
+        Self::from_bits_retain(bits)
+    }
+}
+
+/// A duration as a number that has no sign; what is beyond the longest span becomes that.
+mod unsigned {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    use crate::units::Span;
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde hands it over")]
+    pub(super) fn serialize<S: Serializer>(span: &Span, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u64(span.as_ns().unsigned_abs())
     }
 
-    /// Bits, known or not: the flags' own form in JSON is text.
-    pub(super) mod flags {
-        use serde::{Deserialize, Deserializer, Serializer};
-
-        use crate::sample::TickFlags;
-
-        #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde hands it over")]
-        pub(in super::super) fn serialize<S: Serializer>(
-            flags: &TickFlags,
-            to: S,
-        ) -> Result<S::Ok, S::Error> {
-            to.serialize_u16(flags.bits())
-        }
-
-        pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
-            from: D,
-        ) -> Result<TickFlags, D::Error> {
-            u16::deserialize(from).map(TickFlags::from_bits_retain)
-        }
-    }
-
-    /// Bits, one byte per sensor.
-    pub(super) mod sensor_flags {
-        use serde::{Deserialize, Deserializer, Serializer};
-
-        use crate::sample::{SensorFlags, Sensors};
-
-        pub(in super::super) fn serialize<S: Serializer>(
-            flags: &Sensors<SensorFlags>,
-            to: S,
-        ) -> Result<S::Ok, S::Error> {
-            to.collect_seq(flags.iter().map(SensorFlags::bits))
-        }
-
-        pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
-            from: D,
-        ) -> Result<Sensors<SensorFlags>, D::Error> {
-            let bits = Sensors::<u8>::deserialize(from)?;
-            Ok(bits.into_iter().map(SensorFlags::from_bits_retain).collect())
-        }
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Span, D::Error> {
+        let ns = u64::deserialize(from)?;
+        Ok(Span::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)))
     }
 }

@@ -118,12 +118,6 @@ impl Default for ServoMemory {
 }
 
 impl ServoMemory {
-    /// A memory that has seen no switch.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Follows the transitions: call it once per tick, before the gyros are asked for.
     ///
     /// `lost` says that the tick falls into a transition (see

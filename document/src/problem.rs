@@ -59,7 +59,7 @@ pub fn few<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
 }
 
 /// Byte offset → line and column.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Lines<'t> {
     pub(crate) text: &'t str,
     /// Offset of the first byte of each line.

@@ -27,7 +27,7 @@ const LONGEST_KEY: usize = 64;
 pub(crate) type Value<'d> = Spanned<DeValue<'d>>;
 
 /// Collects problems while a document is walked.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Reader<'t> {
     file: Option<&'t str>,
     lines: Lines<'t>,
@@ -42,15 +42,7 @@ impl<'t> Reader<'t> {
     /// A reader of a text; `file` is the name that problems are to carry.
     #[must_use]
     pub fn new(text: &'t str, file: Option<&'t str>) -> Self {
-        Self {
-            file,
-            lines: Lines::new(text),
-            problems: Vec::new(),
-            unlisted: 0,
-            damaged: BTreeSet::new(),
-            places: BTreeMap::new(),
-            free: BTreeMap::new(),
-        }
+        Self { file, lines: Lines::new(text), ..Self::default() }
     }
 
     /// Reads the text. What is wrong is reported and replaced; `None` where the text as a whole makes no sense.

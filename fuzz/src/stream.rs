@@ -277,7 +277,7 @@ fn swap(stream: &mut UnitStream, producer: &Producer, from: &mut Cursor<'_>) {
     let ahead = from.some();
     let at = match shape / 8 % 4 {
         0 => At::Sequence(producer.sequence.saturating_add(ahead.into())),
-        1 => At::Time(Timestamp::from_ns(producer.time_ns.saturating_add(i64::from(ahead) * STEP_NS))),
+        1 => At::TimeNs(producer.time_ns.saturating_add(i64::from(ahead) * STEP_NS)),
         _ => At::NextTick,
     };
     let slew = Span::from_ms(u32::from(from.some() & 15));

@@ -46,7 +46,7 @@ pub use correction_change::{Side, correction_change, turn_rad};
 pub use curve::{Curve, Shape};
 pub use difference::{difference, lost_sections};
 pub use measure::{Argument, BaseUnit, Unit};
-pub use terms::{Accels, Coefficient, Gyros, Regressor, SensorKind, StatedTerm, Terms};
+pub use terms::{Accels, Gyros, Regressor, SensorKind, StatedTerm, Terms};
 pub use types::{
     Accel, AccelBiasSigma, AccelOrientation, AccelOutput, AccelParity, AccelSensor, AccelSigma, Auxiliary,
     AxesHysteresis, Channel, Created, Document, Drift, Filter, FitWindow, Gyro, GyroBiasSigma,

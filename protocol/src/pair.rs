@@ -64,11 +64,8 @@ impl Member {
         let mut parts = key.strip_prefix("isotherm/")?.split('/');
         let instance = parts.next()?.to_owned();
         (parts.next()? == "member").then_some(())?;
-        let mode = match parts.next()? {
-            "standby" => Mode::Standby,
-            "active" => Mode::Active,
-            _ => return None,
-        };
+        let mode = parts.next()?;
+        let mode = [Mode::Standby, Mode::Active].into_iter().find(|known| known.name() == mode)?;
         let (priority, started_unix_ms) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
         let (name, group) = (parts.next()?.to_owned(), parts.next()?.to_owned());
         Some(Self { instance, name, mode, priority, started_unix_ms, group })

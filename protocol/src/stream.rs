@@ -365,8 +365,7 @@ impl UnitStream {
     /// tick. `text` finds a document by its digest.
     pub fn given(&self, text: impl Fn(&Digest) -> Option<String>) -> impl Iterator<Item = JournalEvent> {
         let in_force = self.unit.calibration().map(|(_, counter)| (counter, Schedule::NextTick));
-        let pending = self.unit.pending().map(|(counter, at)| (counter, at.into()));
-        in_force.into_iter().chain(pending).filter_map(move |(counter, at)| {
+        in_force.into_iter().chain(self.unit.pending()).filter_map(move |(counter, at)| {
             let Given { revision, label, slew, .. } = self.revisions.find(counter)?;
             Some(JournalEvent::Changed {
                 revision: *revision,

@@ -9,7 +9,7 @@ use isotherm_correction::calibration::Calibration;
 use isotherm_correction::operation::Command;
 use isotherm_correction::sample::{ChannelName, LasingMode};
 use isotherm_correction::unit::{At, Change, UnitSettings};
-use isotherm_correction::units::{Span, Timestamp};
+use isotherm_correction::units::Span;
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
@@ -206,7 +206,7 @@ impl Script {
             At::Sequence(self.next + ticks)
         } else {
             let span_ns = self.tick.as_ns() * whole(ticks);
-            At::Time(Timestamp::from_ns(self.now_ns + span_ns))
+            At::TimeNs(self.now_ns + span_ns)
         };
         self.give(Arc::clone(calibration), at, slew);
     }

@@ -35,10 +35,6 @@ pub(crate) struct Outcome {
     pub(crate) sent: u64,
     /// Ticks that did not come to the sink.
     pub(crate) lost: u64,
-    /// Ticks that came more than once.
-    pub(crate) duplicates: u64,
-    /// Ticks out of order.
-    pub(crate) disordered: u64,
     /// Messages per second at the sink.
     pub(crate) messages_per_s: f64,
     /// Ticks per second at the sink.
@@ -175,8 +171,6 @@ fn outcome(plan: &Plan, (sent, received): (&Sent, &Received), used: Usage) -> Re
         latency_max_us: us(latencies.max()),
         sent: total,
         lost: total - received.ticks.min(total),
-        duplicates: received.duplicates,
-        disordered: received.disordered,
         messages_per_s: received.messages as f64 / seconds,
         ticks_per_s: received.ticks as f64 / seconds,
         cpu_us_per_tick: used.cpu_s * 1e6 / total as f64,

@@ -62,8 +62,6 @@ impl Row {
                 // These are no matter of medians.
                 sent: sum(|outcome| outcome.sent),
                 lost: sum(|outcome| outcome.lost),
-                duplicates: sum(|outcome| outcome.duplicates),
-                disordered: sum(|outcome| outcome.disordered),
                 messages_per_s: over(&|outcome| outcome.messages_per_s),
                 ticks_per_s: over(&|outcome| outcome.ticks_per_s),
                 cpu_us_per_tick: over(&|outcome| outcome.cpu_us_per_tick),

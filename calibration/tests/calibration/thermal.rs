@@ -25,7 +25,7 @@ use isotherm_calibration::runs::Run;
 use isotherm_correction::earth::Place;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Argument, Coefficient, Document, GyroSensor, StatedTerm};
+use isotherm_protocol::document::{Argument, Document, GyroSensor, StatedTerm};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, paper_profile, training_profile};
 
@@ -130,10 +130,9 @@ fn the_sequential_fit_reaches_on_the_programme_of_000_what_the_paper_states() {
 
 /// Number of a gyro's curves over Ṫ or T̈.
 fn over_derivatives(gyro: &GyroSensor) -> usize {
-    let curves = |stated: &StatedTerm| match &stated.coefficient {
-        Coefficient::Branched { run_up, braking } => vec![run_up.argument(), braking.argument()],
-        Coefficient::Curve(_) => Vec::new(),
+    let curves = |stated: &StatedTerm| {
+        stated.braking.as_ref().map(|braking| [stated.coefficient.argument(), braking.argument()])
     };
-    let arguments = gyro.terms.iter().flat_map(curves).flatten();
+    let arguments = gyro.terms.iter().filter_map(curves).flatten().flatten();
     arguments.filter(|argument| *argument != Argument::DegC).count()
 }

@@ -78,7 +78,7 @@ impl DriftEstimator {
         let mut gyros = core::mem::take(&mut self.gyros);
         for (index, (new, old)) in gyros.iter_mut().zip(old).enumerate() {
             if let (Some(new), Some(old)) = (new, old)
-                && new.filter.model() == old.filter.model()
+                && new.filter.model == old.filter.model
                 && same_bias(index)
             {
                 *new = old;

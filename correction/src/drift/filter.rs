@@ -48,7 +48,7 @@ pub(super) struct Measured {
 /// The filter of one gyro.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Filter {
-    model: DriftModel,
+    pub(super) model: DriftModel,
     /// Time of state and covariance; `None` before the first tick.
     time: Option<Timestamp>,
     /// ε0 (rad/s), ε1 (rad/s), χ (rad/s²).
@@ -130,10 +130,6 @@ impl Filter {
             normalised_innovation: self.last_innovation,
             mean_nis: (kept > 0.0).then(|| squares / kept),
         }
-    }
-
-    pub(super) const fn model(&self) -> &DriftModel {
-        &self.model
     }
 
     /// State and covariance this long after the last update (s).

@@ -24,12 +24,6 @@ pub struct RestFeeder {
 }
 
 impl RestFeeder {
-    /// A feeder that has seen nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Takes one tick (its end and its duration) and whether the unit stands still in it; gives a reference over a minute
     /// that was spent at rest and that another minute of rest has confirmed.
     ///

@@ -29,7 +29,7 @@ fn tick(sequence: u64) -> CorrectedTick {
 
 fn summed(step: NavigationStep, ticks: &[CorrectedTick]) -> Vec<CorrectedTick> {
     let mut steps = Vec::new();
-    let mut sum = StepSum::new();
+    let mut sum = StepSum::default();
     for tick in ticks {
         sum.push(&step, tick, &mut |step| steps.push(step.clone()));
     }
@@ -114,7 +114,7 @@ fn a_sensor_that_is_not_there_in_every_tick_is_not_valid() {
 #[test]
 fn steps_out_of_range_are_refused() {
     for ticks in [0, 1001] {
-        let error = NavigationError::Ticks { got: ticks, max: 1000 };
+        let error = NavigationError { got: ticks };
         assert_eq!(NavigationStep::new(ticks, true), Err(error));
     }
 }

@@ -162,7 +162,7 @@ impl Reported {
 }
 
 /// A self-test that is running.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct SelfTest {
     start: Option<Timestamp>,
     end: Timestamp,
@@ -189,13 +189,10 @@ impl SelfTest {
         let counters =
             counters.iter().map(|it| reported(CheckItem::Counter(it.name), it.name, [0.0, it.max_increase]));
         Self {
-            start: None,
-            end: Timestamp::default(),
-            ticks: 0,
-            accel_ticks: 0,
             gyros: fresh(calibration.gyro_count()),
             accels: fresh(calibration.accel_count()),
             reported: voltages.chain(counters).collect(),
+            ..Self::default()
         }
     }
 

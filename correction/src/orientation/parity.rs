@@ -45,12 +45,6 @@ struct Compiled {
 }
 
 impl ParityCheck {
-    /// A check that has seen nothing.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Judges one tick.
     ///
     /// `readings` are the sensors' mean rates or forces over the tick (rad/s or m/s²), one per sensor; those

@@ -82,11 +82,11 @@ impl OrientationParts {
             checker.push("thermal.range", DefectKind::InvertedRange { low, high });
         }
         if let Some(limit) = self.parity_limit {
-            checker.positive("parity.limit", limit);
+            checker.above_zero("parity.limit", limit);
             checker.within("parity.confirm_ticks", self.parity_confirm_ticks.into(), 1.0, u32::MAX.into());
         }
         for (index, weight) in self.weights.iter().enumerate() {
-            checker.positive(&format!("weights[{index}]"), *weight);
+            checker.above_zero(&format!("weights[{index}]"), *weight);
         }
         let smallest = self.weights.iter().copied().fold(f64::INFINITY, f64::min);
         let largest = self.weights.iter().copied().fold(0.0, f64::max);

@@ -158,6 +158,16 @@ fn every_error_is_reported_at_once() {
 }
 
 #[test]
+fn a_weight_or_parity_limit_may_be_as_small_or_large_as_a_number_can_be() {
+    for size in [1e-320, 1e300] {
+        let stated =
+            OrientationParts { weights: vec![size; 3], parity_limit: Some(size), ..parts(identity()) };
+        let stated = OrientationParts { parity_confirm_ticks: 1, ..stated };
+        assert!(Orientation::new(&stated).is_ok(), "{size}");
+    }
+}
+
+#[test]
 fn axes_that_come_too_close_to_a_plane_are_refused() {
     let tilt = 0.005;
     let flat = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [libm::cos(tilt), 0.0, libm::sin(tilt)]];
@@ -179,7 +189,7 @@ fn a_consistent_reading_leaves_no_parity() {
     for n in 4..=8 {
         let orientation = guarded(n, 1);
         let readings = orientation.forward(33.0, [1.0, -2.0, 3.0]);
-        let verdict = ParityCheck::new().check(&orientation, 33.0, SensorMask::all(n.into()), &readings);
+        let verdict = ParityCheck::default().check(&orientation, 33.0, SensorMask::all(n.into()), &readings);
         assert_eq!(verdict.residuals.len(), usize::from(n) - 3);
         assert!(verdict.residuals.iter().all(|p| p.abs() < 1e-14));
         assert!(!verdict.exceeded);
@@ -190,7 +200,7 @@ fn a_consistent_reading_leaves_no_parity() {
 fn three_sensors_have_no_parity_and_are_never_excluded() {
     let orientation = guarded(6, 1);
     let mask = SensorMask::all(3);
-    let verdict = ParityCheck::new().check(&orientation, 20.0, mask, &[9.0; 6]);
+    let verdict = ParityCheck::default().check(&orientation, 20.0, mask, &[9.0; 6]);
     assert_eq!(verdict, ParityVerdict::default());
 }
 
@@ -199,7 +209,7 @@ fn four_sensors_detect_but_do_not_isolate() {
     let orientation = guarded(4, 1);
     let mut readings = orientation.forward(20.0, [0.1, 0.2, 0.3]);
     readings[2] += 1.0;
-    let verdict = ParityCheck::new().check(&orientation, 20.0, SensorMask::all(4), &readings);
+    let verdict = ParityCheck::default().check(&orientation, 20.0, SensorMask::all(4), &readings);
     assert!(verdict.exceeded);
     assert_eq!(verdict.exclude, None);
 }
@@ -209,7 +219,7 @@ fn five_or_more_isolate_the_sensor_at_fault() {
     for n in 5..=8_u8 {
         for failed in 0..usize::from(n) {
             let orientation = guarded(n, 3);
-            let mut check = ParityCheck::new();
+            let mut check = ParityCheck::default();
             let mask = SensorMask::all(n.into());
             let mut readings = orientation.forward(20.0, [0.1, 0.2, 0.3]);
             readings[failed] -= 0.5;
@@ -228,7 +238,7 @@ fn five_or_more_isolate_the_sensor_at_fault() {
 #[test]
 fn the_confirming_ticks_must_be_in_a_row_and_agree() {
     let orientation = guarded(6, 3);
-    let mut check = ParityCheck::new();
+    let mut check = ParityCheck::default();
     let good = orientation.forward(20.0, [0.1, 0.2, 0.3]);
     let bad = |failed: usize| {
         let mut readings = good.clone();
@@ -248,7 +258,7 @@ fn two_faults_at_once_are_detected_but_not_blamed_on_one() {
     let mut readings = orientation.forward(20.0, [0.0; 3]);
     readings[0] += 0.5;
     readings[1] += 0.4;
-    let verdict = ParityCheck::new().check(&orientation, 20.0, MASK_6, &readings);
+    let verdict = ParityCheck::default().check(&orientation, 20.0, MASK_6, &readings);
     assert!(verdict.exceeded);
     assert_eq!(verdict.exclude, None);
 }
@@ -258,7 +268,7 @@ fn a_reading_that_is_no_number_exceeds_and_blames_nobody() {
     let orientation = guarded(6, 1);
     let mut readings = [0.0; 6];
     readings[3] = f64::NAN;
-    let verdict = ParityCheck::new().check(&orientation, 20.0, MASK_6, &readings);
+    let verdict = ParityCheck::default().check(&orientation, 20.0, MASK_6, &readings);
     assert!(verdict.exceeded);
     assert_eq!(verdict.exclude, None);
 }
@@ -353,7 +363,7 @@ proptest! {
         };
         let _ = Orientation::new(&stated);
         let orientation = guarded(8, 1);
-        let mut check = ParityCheck::new();
+        let mut check = ParityCheck::default();
         for mask in [SensorMask::all(8), SensorMask::all(5).without(1), SensorMask::NONE] {
             let _ = check.check(&orientation, t, mask, &readings);
             if let Some(inverse) = orientation.inverse(t, mask) {

@@ -40,7 +40,7 @@ impl Gathered {
 }
 
 /// One gyro.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct GyroRun {
     /// What one count is worth (rad); zero for a mean output.
     count_rad: f64,
@@ -53,13 +53,7 @@ pub(super) struct GyroRun {
 
 impl GyroRun {
     pub(super) fn new(count_rad: f64) -> Self {
-        Self {
-            count_rad,
-            modes: ByMode::default(),
-            scatter: Scatter::default(),
-            last: (false, None),
-            bad_ticks: 0,
-        }
+        Self { count_rad, ..Self::default() }
     }
 
     /// Takes a good tick: its rate beyond the modelled bias and its temperature.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fit::{Fit, Points};
 use super::history::{Reading, mid_time_s};
-use super::{LostTick, MAX_LOST_TICKS, Reversal, Side, Substitution, Window, reach_s, shorten};
+use super::{LostTick, MAX_LOST_TICKS, Reversal, Substitution, fit_points, reach_s};
 use crate::later::Later;
 use crate::sample::{MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
@@ -83,37 +83,18 @@ impl Restoration {
 
     /// What `Σ_j (P_fit(j) − P_pred(j))` of one sensor has, right after the last of `after` readings.
     fn fitted(&self, substitution: &Substitution, reversal: Reversal, sensor: usize, after: usize) -> Gain {
-        let (Some(first), Some(last)) = (self.lost.first(), self.lost.last()) else { return Gain::UNKNOWN };
-        let Some(newest) = substitution.history.newest() else { return Gain::UNKNOWN };
-        let (parts, reach) = (&reversal.parts, reach_s(reversal, newest.duration));
+        let points = fit_points(&substitution.history, reversal, &self.lost, after, sensor);
+        let (Some(first), Some(points)) = (self.lost.first(), points) else { return Gain::UNKNOWN };
         let origin = first.end_time;
-        let timed = |reading: &Reading| reading.mid_time_s(origin);
-        let near =
-            |tick: &LostTick, at: f64| (at - mid_time_s(tick.end_time, tick.duration, origin)).abs() <= reach;
-        let side = |skip: usize, take: usize, tick: &LostTick| -> Window<'_> {
-            let readings = substitution.history.newest_first().skip(skip).take(take);
-            readings.map(|reading| (timed(reading), reading)).filter(|(at, _)| near(tick, *at)).collect()
-        };
-        let points = |window: &Window<'_>| -> Side {
-            window.iter().filter_map(|(at, reading)| reading.point(*at, sensor)).collect()
-        };
-        let mut new = points(&side(0, after, last));
-        let mut old = points(&side(after, parts.fit_readings_before.into(), first));
-        if new.is_empty() {
-            return Gain::UNKNOWN;
-        }
-        if parts.fit_window == super::FitWindow::Adaptive {
-            shorten(&mut old, &mut new, &self.lost, origin, parts.fit_degree.into());
-        }
-        let points: Points = new.into_iter().chain(old).collect();
         let mut weights = Weights::default();
         for (place, [at, _]) in points.iter().enumerate() {
-            let fit = Fit::new(&unit(&points, place), parts.fit_degree.into());
+            let fit = Fit::new(&unit(&points, place), reversal.parts.fit_degree.into());
             let over_lost = self.lost.iter().map(|tick| {
                 let x = mid_time_s(tick.end_time, tick.duration, origin);
                 fit.map_or(0.0, |fit| fit.at(x) * tick.duration.as_s())
             });
-            weights.add(substitution, |reading| timed(reading).to_bits() == at.to_bits(), over_lost.sum());
+            let is_it = |reading: &Reading| reading.mid_time_s(origin).to_bits() == at.to_bits();
+            weights.add(substitution, is_it, over_lost.sum());
         }
         for tick in &*self.lost {
             weights.predict(substitution, reversal, (sensor, after), tick, -1.0);

@@ -38,7 +38,7 @@ impl<A: Fn(f64) -> f64> Bench<A> {
         Self {
             angle,
             reversal,
-            substitution: Substitution::new(),
+            substitution: Substitution::default(),
             mode: LasingMode::Plus,
             missed: 0,
             published: 0.0,
@@ -372,7 +372,7 @@ fn commands_without_end_are_bounded_and_reported() {
 #[test]
 fn a_producer_that_reports_the_mode_as_it_is_switches_once() {
     let reversal = paper(3, 1);
-    let mut substitution = Substitution::new();
+    let mut substitution = Substitution::default();
     let mut interpolated = 0;
     for k in -5..=12_i32 {
         let input = TickInput {
@@ -392,7 +392,7 @@ fn a_producer_that_reports_the_mode_as_it_is_switches_once() {
 #[test]
 fn a_sensor_without_a_number_after_the_switch_keeps_its_prediction_and_says_so() {
     let reversal = paper(1, 1);
-    let mut substitution = Substitution::new();
+    let mut substitution = Substitution::default();
     for k in -5..=4_i32 {
         let input = TickInput {
             end_time: Timestamp::from_ns(i64::from(k) * TICK_NS),
@@ -519,7 +519,7 @@ proptest! {
     ) {
         // A window that adapts looks at the readings.
         let reversal = reversal(ReversalParts { fit_window: FitWindow::Fixed, ..parts });
-        let mut substitution = Substitution::new();
+        let mut substitution = Substitution::default();
         for (k, (a, b)) in a.iter().zip(&b).enumerate() {
             let input = TickInput {
                 end_time: Timestamp::from_ns(i64::try_from(k).unwrap() * TICK_NS),
@@ -544,7 +544,7 @@ proptest! {
         values in prop::collection::vec(prop::num::f64::ANY, 40),
     ) {
         let reversal = reversal(parts);
-        let mut substitution = Substitution::new();
+        let mut substitution = Substitution::default();
         for ((end, duration, mode, [command, missed, restart]), value) in ticks.iter().zip(values) {
             let plus = |plus| if plus { LasingMode::Plus } else { LasingMode::Minus };
             let input = TickInput {
@@ -586,7 +586,7 @@ fn a_transition_stated_as_a_time_is_that_many_ticks_at_any_tick() {
 fn a_transition_that_is_cut_is_flagged_at_its_last_bridged_tick() {
     for (time_s, cut) in [(0.032, false), (0.0335, true)] {
         let parts = ReversalParts { transition: Transition::Time(time_s), ..ReversalParts::default() };
-        let (reversal, mut substitution) = (reversal(parts), Substitution::new());
+        let (reversal, mut substitution) = (reversal(parts), Substitution::default());
         let unresolved: Vec<i64> = (-20..60)
             .filter(|k| {
                 let input = TickInput {
@@ -614,7 +614,7 @@ fn fast_ticks(transition: Transition, angle: impl Fn(f64) -> f64) -> (f64, usize
         ..ReversalParts::default()
     };
     let reversal = reversal(parts);
-    let (mut substitution, mut error, mut lost) = (Substitution::new(), 0.0, 0);
+    let (mut substitution, mut error, mut lost) = (Substitution::default(), 0.0, 0);
     for k in -20..=60_i32 {
         let (end, begin) = (f64::from(k) * 1e-3, f64::from(k - 1) * 1e-3);
         let input = TickInput {
@@ -680,7 +680,7 @@ fn a_window_that_adapts_follows_noise_at_rest_and_motion_when_there_is_any() {
         for phase in 0..300 {
             let phase = TAU * 0.618 * f64::from(phase);
             let angle = |t: f64| PI / 180.0 * libm::sin(TAU * frequency_hz * t + phase);
-            let (mut substitution, mut error) = (Substitution::new(), 0.0);
+            let (mut substitution, mut error) = (Substitution::default(), 0.0);
             for k in -9..=14_i32 {
                 let truth = angle(f64::from(k) * TICK_S) - angle(f64::from(k - 1) * TICK_S);
                 let (noise, lost) = (noise(), (1..=3).contains(&k));

@@ -61,7 +61,7 @@ fn tick(end_ns: i64, half_periods: Option<HalfPeriodCounts>) -> ServoTick {
 /// correction and the transient itself (rad/s).
 fn run(form: ServoForm, sign: f64, input: f64, ticks: i32) -> Vec<(f64, Transient)> {
     let servo = servo(form);
-    let mut memory = ServoMemory::new();
+    let mut memory = ServoMemory::default();
     for j in 1..=3_i64 {
         memory.advance(true, Timestamp::from_ns((j - 3) * TICK.as_ns()), TICK);
     }
@@ -112,7 +112,7 @@ fn the_half_that_comes_first_gives_the_transient_its_sign() {
 fn a_frequency_farther_than_half_of_its_rest_value_is_not_the_dithers() {
     for form in FORMS {
         let transient = |share: f64| {
-            let mut memory = ServoMemory::new();
+            let mut memory = ServoMemory::default();
             memory.advance(true, Timestamp::from_ns(0), TICK);
             let half = whole(share * REST_HZ * TICK.as_s() / 2.0);
             let tick = tick(TICK.as_ns(), Some(HalfPeriodCounts { positive: half, negative: -half }));
@@ -140,7 +140,7 @@ fn left_behind(form: ServoForm) -> f64 {
         settle_time_constants: DEFAULT_SETTLE_TIME_CONSTANTS,
     };
     let servo = Servo::new(&parts).unwrap();
-    let mut memory = ServoMemory::new();
+    let mut memory = ServoMemory::default();
     let mut left = Vec::new();
     for switch in 0..100 {
         memory.reset();
@@ -209,7 +209,7 @@ fn a_dither_that_is_still_rising_shows_as_a_negative_rate() {
 #[test]
 fn the_correction_begins_with_the_first_good_tick_and_ends_when_settled() {
     let servo = servo(ServoForm::Measured);
-    let mut memory = ServoMemory::new();
+    let mut memory = ServoMemory::default();
     let counts = Some(HalfPeriodCounts { positive: 100_000, negative: -100_000 });
     let at = |k: i64| tick(k * TICK.as_ns(), counts);
     memory.advance(false, at(0).end_time, TICK);
@@ -226,7 +226,7 @@ fn the_correction_begins_with_the_first_good_tick_and_ends_when_settled() {
 
 #[test]
 fn without_half_periods_nothing_is_subtracted_and_it_says_so() {
-    let mut memory = ServoMemory::new();
+    let mut memory = ServoMemory::default();
     memory.advance(true, Timestamp::from_ns(0), TICK);
     let none = tick(TICK.as_ns(), None);
     memory.advance(false, none.end_time, TICK);
@@ -269,7 +269,7 @@ proptest! {
     ) {
         for form in FORMS {
             let servo = servo(form);
-            let mut memory = ServoMemory::new();
+            let mut memory = ServoMemory::default();
             for (lost, end, duration, [positive, negative]) in &ticks {
                 let tick = ServoTick {
                     end_time: Timestamp::from_ns(*end),
@@ -297,7 +297,7 @@ fn an_input_that_accelerates_is_not_taken_for_dither() {
     };
     for (form, sign) in FORMS.into_iter().flat_map(|form| [(form, 1.0), (form, -1.0)]) {
         let servo = servo(form);
-        let mut memory = ServoMemory::new();
+        let mut memory = ServoMemory::default();
         let take = |memory: &mut ServoMemory, start_s: f64, start_ns: i64, [positive, negative]: [f64; 2]| {
             let halves = HalfPeriodCounts { positive: whole(positive), negative: whole(negative) };
             let tick = tick(start_ns + TICK.as_ns(), Some(halves));

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use arrayvec::ArrayVec;
+use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::{AccelParts, GyroParts};
@@ -82,24 +83,9 @@ impl BiasSigma {
         if !symmetric || !unit {
             return false;
         }
-        // Cholesky, with room for correlations of one.
-        let mut lower = [[0.0; MAX_BIAS_TERMS]; MAX_BIAS_TERMS];
-        for i in 0..terms {
-            for j in 0..=i {
-                let left = rows[i][j] - (0..j).map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
-                if i == j {
-                    if left.is_nan() || left < -1e-9 {
-                        return false;
-                    }
-                    lower[i][i] = libm::sqrt(left.max(0.0));
-                } else if lower[j][j] > 0.0 {
-                    lower[i][j] = left / lower[j][j];
-                } else if left.abs() > 1e-9 {
-                    return false;
-                }
-            }
-        }
-        true
+        // With room for correlations of one.
+        let matrix = Matrix4::from_fn(|i, j| rows.get(i).filter(|_| j < terms).map_or(0.0, |row| row[j]));
+        matrix.iter().all(|share| share.abs() < 2.0) && matrix.symmetric_eigenvalues().min() >= -4e-9
     }
 }
 

@@ -26,7 +26,7 @@ impl AtRest {
         Self {
             place: *place,
             monitor: RestMonitor::new(&RestLimits::default(), calibration),
-            feeder: RestFeeder::new(),
+            feeder: RestFeeder::default(),
             rest: Rest::Learning,
             force: [0.0; 3],
             forces: 0.0,

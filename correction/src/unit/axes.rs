@@ -56,7 +56,7 @@ impl Axes {
             whole: inverse.is_some(),
             stands: true,
             included: mask,
-            parity: ParityCheck::new(),
+            parity: ParityCheck::default(),
         }
     }
 

@@ -6,18 +6,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::calibration::Calibration;
 use crate::sample::GyroTick;
-use crate::units::{Span, Timestamp};
+use crate::units::Span;
 
 /// When a change takes effect; always before a tick, and at the latest when the producer restarts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum At {
     /// The next tick that is corrected.
     #[default]
     NextTick,
     /// The first tick with this sequence number or a later one.
     Sequence(u64),
-    /// The first tick that ends at this time or later.
-    Time(Timestamp),
+    /// The first tick that ends at this time or later (ns on the producer's clock).
+    TimeNs(i64),
 }
 
 impl At {
@@ -26,7 +27,7 @@ impl At {
         match self {
             Self::NextTick => true,
             Self::Sequence(sequence) => tick.sequence >= sequence,
-            Self::Time(time) => tick.end_time >= time,
+            Self::TimeNs(time_ns) => tick.end_time.as_ns() >= time_ns,
         }
     }
 }

@@ -27,35 +27,25 @@ pub enum PreLaunchView<'a> {
 }
 
 /// State of one unit and what belongs to it.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Operating {
     pub(super) state: State,
     /// Whether somebody chose it; until then it follows the calibration.
     chosen: bool,
     self_test: Option<Box<SelfTest>>,
-    report: Option<SelfTestReport>,
+    /// The last self-test that ended.
+    pub(super) report: Option<SelfTestReport>,
     pre_launch: Option<Box<PreLaunch>>,
     aborted: bool,
-    rest: Option<Box<AtRest>>,
+    /// Whether the unit is taken to be at rest, and whether it is.
+    pub(super) rest: Option<Box<AtRest>>,
 }
 
 impl Operating {
     /// Begins in standby, or running.
     pub(super) fn new(in_standby: bool) -> Self {
-        Self {
-            state: if in_standby { State::Standby } else { State::RunningWithoutReversal },
-            chosen: in_standby,
-            self_test: None,
-            report: None,
-            pre_launch: None,
-            aborted: false,
-            rest: None,
-        }
-    }
-
-    /// The last self-test that ended.
-    pub(super) fn report(&self) -> Option<&SelfTestReport> {
-        self.report.as_ref()
+        let state = if in_standby { State::Standby } else { State::RunningWithoutReversal };
+        Self { state, chosen: in_standby, ..Self::default() }
     }
 
     /// The pre-launch calibration that is at work, or the last one.
@@ -66,11 +56,6 @@ impl Operating {
             None if self.aborted => PreLaunchView::Aborted,
             None => PreLaunchView::Running(Box::new(pre_launch.progress())),
         })
-    }
-
-    /// Whether the unit is taken to be at rest, and whether it is.
-    pub(super) fn rest(&self) -> Option<&AtRest> {
-        self.rest.as_deref()
     }
 
     /// Carries a command out, or says why not.

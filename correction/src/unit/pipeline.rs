@@ -43,7 +43,7 @@ pub(super) struct Run<'a> {
 }
 
 /// Everything that a tick passes between the intake and the owner of the unit.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Pipeline {
     pub(super) settings: UnitSettings,
     pub(super) active: Option<Active>,
@@ -66,20 +66,7 @@ pub(super) struct Pipeline {
 
 impl Pipeline {
     pub(super) fn new(settings: UnitSettings) -> Self {
-        Self {
-            settings,
-            active: None,
-            pending: None,
-            operating: Operating::new(settings.in_standby),
-            waiting: Waiting::default(),
-            steps: StepSum::new(),
-            counters: Counters::default(),
-            unannounced: Break::default(),
-            unseen: Break::default(),
-            turn_on: None,
-            last_end: Timestamp::default(),
-            corrected: CorrectedTick::default(),
-        }
+        Self { settings, operating: Operating::new(settings.in_standby), ..Self::default() }
     }
 
     /// Puts a change in force, before the next tick.
@@ -129,7 +116,7 @@ impl Pipeline {
         let sensors = tick.readings.len();
         // Which gyro tick it will go with is not known yet.
         let due = self.pending.as_ref().is_some_and(|change| match change.at {
-            At::Time(time) => tick.end_time >= time,
+            At::TimeNs(time_ns) => tick.end_time.as_ns() >= time_ns,
             At::Sequence(_) => {
                 let waiting = &change.calibration;
                 (waiting.accel_output(), waiting.accel_count()) == (output, sensors)

@@ -129,7 +129,7 @@ impl Unit {
     /// Result of the last self-test that ended.
     #[must_use]
     pub fn self_test(&self) -> Option<&SelfTestReport> {
-        self.pipeline.operating.report()
+        self.pipeline.operating.report.as_ref()
     }
 
     /// The pre-launch calibration that is at work, or the last one.
@@ -141,7 +141,7 @@ impl Unit {
     /// The rest that the operator has declared.
     #[must_use]
     pub fn at_rest(&self) -> Option<&AtRest> {
-        self.pipeline.operating.rest()
+        self.pipeline.operating.rest.as_deref()
     }
 
     /// Estimated drift of each gyro at the last tick; `None` for one whose calibration has no parameters for it.

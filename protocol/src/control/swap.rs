@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+pub use isotherm_correction::unit::At as Schedule;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -13,19 +14,6 @@ use crate::escape::clipped;
 const LONGEST_SHOWN: usize = 80;
 /// Longest slew of a swap (s).
 const MAX_SLEW_S: f64 = 3600.0;
-
-/// When a swap takes effect; always at a tick boundary.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Schedule {
-    /// From the next tick that is corrected.
-    #[default]
-    NextTick,
-    /// From the first tick with this sequence number or a later one.
-    Sequence(u64),
-    /// From the first tick that ends at this time or later (ns on the producer's clock).
-    TimeNs(i64),
-}
 
 /// What is asked for beside the document: the parameters of the query's selector.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -5,7 +5,7 @@ mod output;
 use std::collections::BTreeMap;
 
 use super::curve::Curve;
-use super::terms::{Coefficient, KeyedTerm, Regressor};
+use super::terms::{KeyedTerm, Regressor};
 use super::types::{Document, Sensor};
 use isotherm_document::{Reader, element, join};
 
@@ -122,7 +122,7 @@ fn filter(r: &mut Reader<'_>, document: &Document, sensors: &[Sensor<'_>]) {
         r.refuse("temperature.filter", message);
         return;
     };
-    let branched = |keyed: &KeyedTerm<'_>| matches!(keyed.stated.coefficient, Coefficient::Branched { .. });
+    let branched = |keyed: &KeyedTerm<'_>| keyed.stated.braking.is_some();
     let Some(sensor) = sensors.iter().find(|sensor| sensor.terms.iter().any(branched)) else { return };
     if filter.branch_dead_band_deg_c2_per_s3.is_none() {
         let message =

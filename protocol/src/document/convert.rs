@@ -17,19 +17,18 @@ use super::measure::{ARCSEC, DEG_PER_H, DEG_PER_S, DEG_PER_SQRT_H, HOUR};
 use super::terms::{SensorKind, Terms};
 use super::types::{
     AccelOutput, AccelSensor, Auxiliary, AxesHysteresis, Channel, Document, Drift, Filter, FitWindow,
-    GyroOutput, GyroSensor, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Temperature, Trend,
+    GyroOutput, GyroSensor, ModeReversal, Orientation, SelfTest, Servo, ServoKind, Trend,
 };
 
 /// Half width of the blend where no term is branched (°C²/s³): any positive number.
 const NO_BRANCHES: f64 = 1.0;
 /// Filter of a unit without temperature channels: never run.
-const NO_FILTER: ThermalFilterParts = ThermalFilterParts {
+const NO_FILTER: Filter = Filter {
     grid_step_s: 1.0,
     smoothing_s: 0.0,
     derivative_step_s: 1.0,
     stale_after_s: 1.0,
-    branch_dead_band: NO_BRANCHES,
-    assumed_deg_c: 0.0,
+    branch_dead_band_deg_c2_per_s3: None,
 };
 
 impl Document {
@@ -50,7 +49,7 @@ impl Document {
         });
         let (accel_orientation, accel_orientation_channels) = accel_orientation.unzip();
         CalibrationParts {
-            filter: temperature.to_parts(),
+            filter: temperature.filter.as_ref().unwrap_or(&NO_FILTER).to_parts(temperature.assumed_deg_c),
             channels: temperature.channel.iter().map(Channel::to_parts).collect(),
             auxiliaries: self.auxiliary.iter().map(auxiliary).collect(),
             gyro_output: match self.gyro.output {
@@ -153,14 +152,6 @@ impl Document {
             input_limit: input_limit.unwrap_or(NO_LIMIT),
             sigma: sigma::of_accel(sensor),
         }
-    }
-}
-
-impl Temperature {
-    fn to_parts(&self) -> ThermalFilterParts {
-        let assumed_deg_c = self.assumed_deg_c;
-        let none = || ThermalFilterParts { assumed_deg_c, ..NO_FILTER };
-        self.filter.as_ref().map_or_else(none, |filter| filter.to_parts(assumed_deg_c))
     }
 }
 

@@ -58,22 +58,10 @@ pub struct StatedTerm {
     pub parameter: f64,
     /// What a regressor is.
     pub regressor: Option<Regressor>,
-    /// Its coefficient.
-    pub coefficient: Coefficient,
-}
-
-/// The coefficient of a term.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Coefficient {
-    /// One curve.
-    Curve(Curve),
-    /// One curve per thermal branch, both over the same argument.
-    Branched {
-        /// "+" curve: Ṫ·T̈ > 0.
-        run_up: Curve,
-        /// "−" curve: Ṫ·T̈ < 0.
-        braking: Curve,
-    },
+    /// Its coefficient; of one that is branched, the "+" curve: Ṫ·T̈ > 0.
+    pub coefficient: Curve,
+    /// The "−" curve of a coefficient that is branched, over the same argument: Ṫ·T̈ < 0.
+    pub braking: Option<Curve>,
 }
 
 /// What a regressor is but for its gain.
@@ -95,14 +83,13 @@ impl StatedTerm {
     /// A term with one curve.
     #[must_use]
     pub fn new(feature: Feature, curve: Curve) -> Self {
-        Self { feature, parameter: 0.0, regressor: None, coefficient: Coefficient::Curve(curve) }
+        Self { feature, parameter: 0.0, regressor: None, coefficient: curve, braking: None }
     }
 
     /// A term with a curve for each thermal branch.
     #[must_use]
     pub fn branched(feature: Feature, [run_up, braking]: [Curve; 2]) -> Self {
-        let coefficient = Coefficient::Branched { run_up, braking };
-        Self { feature, parameter: 0.0, regressor: None, coefficient }
+        Self { braking: Some(braking), ..Self::new(feature, run_up) }
     }
 
     /// A lag of a time constant (s) or a play of a half width (°C).
@@ -120,39 +107,29 @@ impl StatedTerm {
     /// Its one curve.
     #[must_use]
     pub fn curve(&self) -> Option<&Curve> {
-        match &self.coefficient {
-            Coefficient::Curve(curve) => Some(curve),
-            Coefficient::Branched { .. } => None,
-        }
+        self.braking.is_none().then_some(&self.coefficient)
     }
 
     /// Its curves, in the order of [`TermForm::curves`].
     fn curves(&self) -> impl Iterator<Item = &Curve> {
-        let curves = match &self.coefficient {
-            Coefficient::Curve(curve) => [Some(curve), None],
-            Coefficient::Branched { run_up, braking } => [Some(run_up), Some(braking)],
-        };
-        curves.into_iter().flatten()
+        std::iter::once(&self.coefficient).chain(&self.braking)
     }
 
     fn curves_mut(&mut self) -> impl Iterator<Item = &mut Curve> {
-        let curves = match &mut self.coefficient {
-            Coefficient::Curve(curve) => [Some(curve), None],
-            Coefficient::Branched { run_up, braking } => [Some(run_up), Some(braking)],
-        };
-        curves.into_iter().flatten()
+        std::iter::once(&mut self.coefficient).chain(&mut self.braking)
     }
 
     /// What the core gets; `source` gives a channel by its name.
     pub(super) fn to_parts(&self, source: impl Fn(&str) -> Source) -> TermParts {
-        let coefficient = match &self.coefficient {
-            Coefficient::Curve(curve) => CoefficientParts::Curve(curve.to_parts(0.0)),
-            Coefficient::Branched { run_up, braking } => CoefficientParts::Branched(BranchedParts {
-                argument: match run_up.argument().or(braking.argument()) {
+        let curve = self.coefficient.to_parts(0.0);
+        let coefficient = match &self.braking {
+            None => CoefficientParts::Curve(curve),
+            Some(braking) => CoefficientParts::Branched(BranchedParts {
+                argument: match self.coefficient.argument().or(braking.argument()) {
                     None | Some(Argument::DegC) => BranchArgument::Temperature,
                     Some(_) => BranchArgument::Derivative,
                 },
-                run_up: run_up.to_parts(0.0),
+                run_up: curve,
                 braking: braking.to_parts(0.0),
             }),
         };

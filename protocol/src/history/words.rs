@@ -6,7 +6,7 @@ use super::{
     Acceptance, AuditEntry, AuditEvent, MAX_CARRIED, MAX_CHANGED, MAX_PROBLEMS, Refusal, Source, Withdrawn,
 };
 use crate::control::{MAX_BY, Schedule};
-use crate::digest::Digest;
+use crate::digest::{Digest, Digits};
 use crate::escape::clipped;
 
 /// Longest line of what has changed, in characters.
@@ -133,14 +133,14 @@ impl fmt::Display for AuditEvent {
                 command.reason.iter().try_for_each(|reason| write!(f, ": {reason}"))
             }
             Self::CarriedUnit(carried) => match carried.sets.last() {
-                Some(set) => write!(f, "carried over: revision {} of {}", set.revision, Short(set.digest)),
+                Some(set) => write!(f, "carried over: revision {} of {}", set.revision, short(&set.digest)),
                 None => {
                     write!(f, "carried over: no calibration, {} revisions so far", carried.highest_revision)
                 }
             },
             Self::CarriedFile(carried) => {
                 let refused = if carried.refused { ", refused" } else { "" };
-                write!(f, "{} was seen as {}{refused}", carried.path, Short(carried.digest))
+                write!(f, "{} was seen as {}{refused}", carried.path, short(&carried.digest))
             }
         }
     }
@@ -148,9 +148,9 @@ impl fmt::Display for AuditEvent {
 
 impl fmt::Display for Acceptance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "revision {} accepted from {}: {}", self.revision, self.source, Short(self.digest))?;
-        if let Some(overlay) = self.overlay {
-            write!(f, " with overlay {}", Short(overlay))?;
+        write!(f, "revision {} accepted from {}: {}", self.revision, self.source, short(&self.digest))?;
+        if let Some(overlay) = &self.overlay {
+            write!(f, " with overlay {}", short(overlay))?;
         }
         match self.schedule {
             Schedule::NextTick => {}
@@ -166,7 +166,7 @@ impl fmt::Display for Acceptance {
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} from {} refused", Short(self.digest), self.source)?;
+        write!(f, "{} from {} refused", short(&self.digest), self.source)?;
         if let Some(first) = self.problems.first() {
             write!(f, ": {first}")?;
         }
@@ -190,10 +190,6 @@ impl fmt::Display for Source {
 }
 
 /// The first eight digits of a digest, as screens show it.
-struct Short(Digest);
-
-impl fmt::Display for Short {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.head().iter().take(4).try_for_each(|byte| write!(f, "{byte:02x}"))
-    }
+fn short(digest: &Digest) -> Digits<'_> {
+    Digits(digest.0.get(..4).unwrap_or_default())
 }

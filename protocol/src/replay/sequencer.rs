@@ -88,7 +88,7 @@ struct Standing {
 }
 
 /// Brings the frames and entries of one unit in order.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Sequencer {
     marks: VecDeque<Mark>,
     /// Entries that have come and whose turn has not.
@@ -121,38 +121,17 @@ impl Sequencer {
     #[must_use]
     pub fn new(outline: Outline) -> Self {
         let Outline { marks, beside, without_beginning } = outline;
-        let mut sequencer = Self::empty(marks.into(), None);
         let lost = (without_beginning > 0).then_some(Notice::WithoutBeginning { entries: without_beginning });
         let beside = beside.into_iter().map(|instance| Notice::Beside { instance });
-        sequencer.out = lost.into_iter().chain(beside).map(Deed::Notice).collect();
-        sequencer
+        let out = lost.into_iter().chain(beside).map(Deed::Notice).collect();
+        Self { marks: marks.into(), out, ..Self::default() }
     }
 
     /// For a unit without one: frames in the order in which they were recorded.
     #[must_use]
     pub fn without_journal() -> Self {
         let heard = [Heard::default(); Input::ALL.len()];
-        Self::empty(VecDeque::new(), Some(Standing { instance: "".into(), number: 0, heard }))
-    }
-
-    fn empty(marks: VecDeque<Mark>, standing: Option<Standing>) -> Self {
-        Self {
-            marks,
-            arrived: BTreeMap::new(),
-            waiting: Default::default(),
-            order: 0,
-            standing,
-            to_go: [None; Input::ALL.len()],
-            given: Default::default(),
-            published: None,
-            before: None,
-            search: Search::default(),
-            copies: Copies::default(),
-            out: VecDeque::new(),
-            now_ns: 0,
-            over: false,
-            unheard: 0,
-        }
+        Self { standing: Some(Standing { instance: "".into(), number: 0, heard }), ..Self::default() }
     }
 
     /// Is told what came before the first frame: a memory that has heard just that goes before every frame.

@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use isotherm_correction::navigation::NavigationStep;
-use isotherm_correction::unit::{At, Change, UnitSettings};
-use isotherm_correction::units::{Span, Timestamp};
+use isotherm_correction::unit::{Change, UnitSettings};
+use isotherm_correction::units::Span;
 use thiserror::Error;
 
 use super::{Label, MemoryError, UnitStream};
-use crate::control::Schedule;
 use crate::corrected::Revision;
 use crate::digest::{Digest, Digits};
 use crate::document::{Document, Problem};
@@ -98,26 +97,6 @@ fn outcome(accepted: bool) -> &'static str {
     if accepted { "accepted" } else { "refused" }
 }
 
-impl From<Schedule> for At {
-    fn from(schedule: Schedule) -> Self {
-        match schedule {
-            Schedule::NextTick => Self::NextTick,
-            Schedule::Sequence(sequence) => Self::Sequence(sequence),
-            Schedule::TimeNs(time_ns) => Self::Time(Timestamp::from_ns(time_ns)),
-        }
-    }
-}
-
-impl From<At> for Schedule {
-    fn from(at: At) -> Self {
-        match at {
-            At::NextTick => Self::NextTick,
-            At::Sequence(sequence) => Self::Sequence(sequence),
-            At::Time(time) => Self::TimeNs(time.as_ns()),
-        }
-    }
-}
-
 impl UnitStream {
     /// Does what the service did, between the same two frames: where [`UnitStream::heard`] is what the entry says.
     ///
@@ -150,7 +129,7 @@ impl UnitStream {
                     return Err(JournalError::OtherDocument { revision: *revision, got });
                 }
                 let label = Label { overlay: *overlay, ..Label::of(&parsed.document, digest, source) };
-                let (at, slew) = ((*at).into(), Span::from_ns(*slew_ns));
+                let (at, slew) = (*at, Span::from_ns(*slew_ns));
                 let calibration = Arc::new(parsed.calibration);
                 self.schedule(Change { calibration, revision: revision.counter, at, slew }, label);
             }

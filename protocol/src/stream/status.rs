@@ -82,7 +82,7 @@ impl UnitStream {
             revision: given.revision,
             digest: given.label.digest,
             source: given.label.source.clone(),
-            schedule: at.into(),
+            schedule: at,
             slew_s: given.slew.as_s(),
         })
     }

@@ -131,8 +131,8 @@ impl UnitActor {
             self.stream.install_as(calibration, revision, label);
             None
         } else {
-            let (at, slew) = ((*at).into(), *slew);
-            self.stream.schedule(unit::Change { calibration, revision: revision.counter, at, slew }, label)
+            let revision = revision.counter;
+            self.stream.schedule(unit::Change { calibration, revision, at: *at, slew: *slew }, label)
         };
         self.journal_order(|_| journal_writer::changed(change));
         replaced

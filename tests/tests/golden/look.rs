@@ -36,7 +36,7 @@ pub(crate) fn at(stream: &UnitStream, step: usize, recording: &mut Recording) {
     let pending = unit.pending().map(|(revision, at)| match at {
         At::NextTick => format!("{revision} next"),
         At::Sequence(sequence) => format!("{revision} at {sequence}"),
-        At::Time(time) => format!("{revision} from {}", time.as_ns()),
+        At::TimeNs(time_ns) => format!("{revision} from {time_ns}"),
     });
     let heard = stream.heard().map(|heard| format!("{} {:x}", heard.frames, heard.crc)).join(" ");
     say("unit", format!("{} {pending:?} {} {heard}", unit.state(), stream.is_waiting()));

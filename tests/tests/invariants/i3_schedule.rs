@@ -47,7 +47,7 @@ fn i3_a_change_at_a_stated_tick_or_time_does_not_depend_on_when_it_was_asked_for
             unit.install(compile(&with_bias(3e-4)), 2);
         }
     });
-    for at in [At::Sequence(1234), At::Time(end_of(1234))] {
+    for at in [At::Sequence(1234), At::TimeNs(end_of(1234).as_ns())] {
         for (batch, asked) in [(1, 0), (1, 1233), (8, 40), (250, 1000)] {
             let scheduled = run(batch, |first, unit| {
                 if first == asked {

@@ -16,7 +16,7 @@ fn observe(feeder: &mut RestFeeder, end: Timestamp, tick: Span, at_rest: bool) -
 
 /// Spans given from `from` on, tick by tick; `at_rest` gives `None` for a tick that is missing.
 fn given(from: Timestamp, ticks: u32, at_rest: impl Fn(f64) -> Option<bool>) -> Vec<(i64, i64)> {
-    let mut feeder = RestFeeder::new();
+    let mut feeder = RestFeeder::default();
     let mut end = from;
     let mut spans = Vec::new();
     for _ in 0..ticks {
@@ -53,7 +53,7 @@ fn a_unit_that_was_not_seen_may_have_moved() {
 
 #[test]
 fn a_clock_that_steps_back_starts_the_rest_anew() {
-    let mut feeder = RestFeeder::new();
+    let mut feeder = RestFeeder::default();
     assert_eq!(observe(&mut feeder, at_s(1000), TICK, true), None);
     for s in 0..120 {
         assert_eq!(observe(&mut feeder, at_s(s), Span::from_ms(1000), true), None);
@@ -63,7 +63,7 @@ fn a_clock_that_steps_back_starts_the_rest_anew() {
 
 #[test]
 fn without_the_rate_of_the_earth_there_is_no_reference() {
-    let mut feeder = RestFeeder::new();
+    let mut feeder = RestFeeder::default();
     let second = Span::from_ms(1000);
     let mut asked = 0;
     let mut made = 0;

@@ -255,7 +255,7 @@ impl Corrector {
             Some((reversal, input)) => self.substitution.tick(reversal, input, increments),
             // A swap took the substitution away in the middle of a transition.
             None if !self.substitution.is_settled() => {
-                self.substitution = Substitution::new();
+                self.substitution = Substitution::default();
                 TickFlags::SWITCH_UNRESOLVED
             }
             None => TickFlags::empty(),

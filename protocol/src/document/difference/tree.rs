@@ -1,5 +1,7 @@
 //! A document as a tree of texts in the order in which it is written.
 
+use std::collections::BTreeSet;
+
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -52,18 +54,11 @@ fn node(text: &str, value: &Spanned<DeValue<'_>>) -> Node {
 
 /// Names of a list's entries, where each is a table with a `name` that no other of them has.
 pub(super) fn names(list: &[Node]) -> Option<Vec<&str>> {
-    let name = |node: &'_ Node| match node {
-        Node::Table(entries) => entries.iter().position(|(key, _)| key == "name"),
-        _ => None,
-    };
-    let mut names = Vec::with_capacity(list.len());
-    for node in list {
-        let (Node::Table(entries), Some(at)) = (node, name(node)) else { return None };
-        let text = entries.get(at)?.1.leaf()?;
-        if names.contains(&text) {
-            return None;
-        }
-        names.push(text);
+    fn name(node: &Node) -> Option<&str> {
+        let Node::Table(entries) = node else { return None };
+        entries.iter().find(|(key, _)| key == "name")?.1.leaf()
     }
-    Some(names)
+    let names: Vec<_> = list.iter().map(name).collect::<Option<_>>()?;
+    let mut seen = BTreeSet::new();
+    names.iter().all(|name| seen.insert(*name)).then_some(names)
 }

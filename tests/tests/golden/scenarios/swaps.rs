@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use isotherm_correction::sample::OutputKind;
 use isotherm_correction::unit::{At, UnitSettings};
-use isotherm_correction::units::{Span, Timestamp};
+use isotherm_correction::units::Span;
 use isotherm_tests::calibrations::{Feature, PutTerms, compile, constant, polynomial};
 use isotherm_tests::lives::{FULL_CHANNELS, full, skewed};
 use isotherm_tests::script::{Scenario, Script};
@@ -20,10 +20,10 @@ pub(crate) fn swaps_at_once_at_a_sequence_and_at_a_time() -> Scenario {
     let (next, now_ns) = (script.next, script.now_ns);
     script.give(rich(0.4), At::Sequence(next + 31), Span::ZERO);
     script.ticks(60);
-    script.give(rich(-0.4), At::Time(Timestamp::from_ns(now_ns + 450_000_000)), Span::ZERO);
+    script.give(rich(-0.4), At::TimeNs(now_ns + 450_000_000), Span::ZERO);
     script.ticks(60);
     // Between two ticks, in a gap, and in the past.
-    script.give(rich(0.1), At::Time(Timestamp::from_ns(script.now_ns + 100_000_001)), Span::ZERO);
+    script.give(rich(0.1), At::TimeNs(script.now_ns + 100_000_001), Span::ZERO);
     script.ticks(60);
     script.give(rich(0.2), At::Sequence(script.next + 5), Span::ZERO);
     script.gap(20);
