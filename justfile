@@ -59,6 +59,13 @@ faults:
     cargo build --release --workspace --locked --bins
     tests/namespaces.sh
 
+# Count the lines of code, without tests, comments and blank lines
+lines:
+    git ls-files '*.rs' | grep -vE '(^|/)(tests|benches|fuzz)/|/(tests|fixture)\.rs' | xargs awk ' \
+        FNR == 1 { test = 0; next_is = 0 } /^#\[cfg\(test\)\]/ { next_is = 1; next } \
+        next_is && /^mod .*\{/ { test = 1 } { next_is = 0 } \
+        !test && !/^[ \t]*(\/\/|$)/ { lines++ } END { print lines }'
+
 # Change the corrector's and the protocol's code, one place at a time, and see whether a test notices (needs cargo-mutants; SHARD=7/100:
 # each hundredth place; minutes to days)
 mutants shard="7/100":
