@@ -128,6 +128,8 @@ pub struct Partial {
     path: PathBuf,
     writing: PathBuf,
     kept: bool,
+    /// Whether it was surely created here.
+    own: bool,
 }
 
 impl Partial {
@@ -139,7 +141,7 @@ impl Partial {
         if !kept {
             self::writing().insert(writing.clone());
         }
-        Self { path: path.to_owned(), writing, kept }
+        Self { path: path.to_owned(), writing, kept, own: false }
     }
 
     /// Where it is written to.
@@ -172,8 +174,9 @@ impl Partial {
 impl Drop for Partial {
     fn drop(&mut self) {
         if !self.kept {
-            // It may never have been created, or be another program's.
-            if !is_being_written(&self.writing) {
+            // It may never have been created, or be another program's. One's own may still look written to: a process that is being
+            // started has all files of this one for a moment.
+            if self.own || !is_being_written(&self.writing) {
                 let _ = std::fs::remove_file(&self.writing);
             }
             writing().remove(&self.writing);
@@ -205,8 +208,9 @@ impl Sink {
     /// # Errors
     /// [`Error::File`].
     pub fn create(path: &Path) -> Result<Self, Error> {
-        let partial = Partial::of(path);
+        let mut partial = Partial::of(path);
         let file = BufWriter::with_capacity(BLOCK, create_alone(partial.writing(), true)?);
+        partial.own = true;
         let stream = if path.extension().is_some_and(|extension| extension == "gz") {
             Stream::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
         } else {
@@ -218,7 +222,8 @@ impl Sink {
     /// Standard output.
     #[must_use]
     pub fn stdout() -> Self {
-        let partial = Partial { path: "standard output".into(), writing: PathBuf::new(), kept: true };
+        let partial =
+            Partial { path: "standard output".into(), writing: PathBuf::new(), kept: true, own: true };
         Self { stream: Stream::Stdout(BufWriter::with_capacity(BLOCK, io::stdout())), partial }
     }
 

@@ -13,7 +13,7 @@
 //!
 //! | module | other ways of asking, and what becomes of it |
 //! |---|---|
-//! | [`watch`], `folder`, `file` | the calibration folder as it changes, and its documents |
+//! | `watch`, `folder`, `file` | the calibration folder as it changes, and its documents |
 //! | `start` | what holds when the service starts |
 //! | `command`, `pre_launch` | commands, rollback among them; the result of a pre-launch calibration |
 //! | `carry` | what another instance has written down, written down here too |
