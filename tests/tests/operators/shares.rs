@@ -38,7 +38,8 @@ fn pair(folder: &std::path::Path, group: &str) -> Pair {
     Pair::start(
         &folder.join(group),
         &documents,
-        &format!("max_units = 250\nunits = [\"{group}-*\"]\n[pair]\n"),
+        // On a busy machine what was sent by an instance that is killed may be this late at a sink that judges four hundred units.
+        &format!("max_units = 250\nunits = [\"{group}-*\"]\n[pair]\ntakeover_ms = 200\n"),
     )
 }
 
