@@ -11,6 +11,7 @@
 //! | [`bar`] | progress |
 //! | [`exit`] | exit codes |
 //! | [`mod@table`] | tables |
+//! | [`window`] | the part of a log's time |
 
 pub mod advanced;
 pub mod bar;
@@ -20,6 +21,7 @@ pub mod program;
 mod queue;
 pub mod stderr;
 pub mod table;
+pub mod window;
 
 pub use advanced::parse;
 pub use bar::Bar;
@@ -28,3 +30,4 @@ pub use print::{coloured, grouped, json, print, print_within, to_stdout};
 pub use program::Common;
 pub use stderr::{failed, failed_lines, say, say_lines, say_warning};
 pub use table::table;
+pub use window::{Window, seconds};

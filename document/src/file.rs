@@ -3,7 +3,7 @@
 use std::fs::{self, File, Permissions};
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, absolute};
 
 use tempfile::{Builder, NamedTempFile};
 
@@ -49,6 +49,19 @@ pub fn text<'b>(bytes: &'b [u8], file: Option<&str>) -> Result<&'b str, Vec<Prob
         let message = format!("is not UTF-8 at byte {valid}: {}", doubt(bytes));
         vec![Problem { line, column, ..unplaced(file, message) }]
     })
+}
+
+/// Whether two names are of one file. Of two files that do not exist yet, one is the other where their names are.
+#[must_use]
+pub fn are_one(one: &Path, other: &Path) -> bool {
+    let resolved = |path: &Path| path.canonicalize().or_else(|_| absolute(path)).ok();
+    resolved(one).is_some_and(|one| resolved(other) == Some(one))
+}
+
+/// Whether a name is taken, by a link that leads nowhere too; a device or a pipe is written to as it is.
+#[must_use]
+pub fn is_taken(path: &Path) -> bool {
+    path.is_file() || path.is_dir() || (path.is_symlink() && !path.exists())
 }
 
 /// What a file that is being written is called until it is whole: hidden, so that no reader of the folder takes it.

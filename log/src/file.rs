@@ -3,14 +3,14 @@
 mod alone;
 
 use std::collections::BTreeSet;
-use std::fs::{File, canonicalize};
+use std::fs::File;
 use std::io::{self, BufWriter, Read, Stdout, Write};
-use std::path::{Path, PathBuf, absolute};
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use isotherm_document::file::{NEW_FILE, create, read_bounded, write_over};
+use isotherm_document::file::{NEW_FILE, are_one, create, is_taken, read_bounded, write_over};
 
 pub(crate) use alone::create_alone;
 pub use alone::is_being_written;
@@ -58,10 +58,8 @@ pub(crate) fn open_log(path: &Path, action: &'static str) -> Result<File, Error>
 /// # Errors
 /// [`Error::Usage`].
 pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
-    // Of two files that do not exist yet, one is the other where their names are. Devices may be given twice.
-    let resolved = |path: &Path| canonicalize(path).or_else(|_| absolute(path)).ok();
-    let same = |other: &&&Path| resolved(out).is_some_and(|out| resolved(other) == Some(out));
-    match others.iter().find(same) {
+    match others.iter().find(|other| are_one(out, other)) {
+        // Devices may be given twice.
         Some(other) if out.is_file() || !out.exists() => Err(Error::Usage(format!(
             "{} would be overwritten: it is also the {} of this command; give another name",
             out.display(),
@@ -76,9 +74,7 @@ pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
 /// # Errors
 /// [`Error::Usage`].
 pub fn refuse_replacing(out: &Path, overwrite: bool) -> Result<(), Error> {
-    // A link that leads nowhere is something, too.
-    let there = out.is_file() || out.is_dir() || (out.is_symlink() && !out.exists());
-    if there && !overwrite {
+    if is_taken(out) && !overwrite {
         return Err(Error::Usage(format!("{} exists: give another name, or --overwrite", out.display())));
     }
     Ok(())

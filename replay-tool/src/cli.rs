@@ -18,7 +18,6 @@ mod step;
 
 use clap::{Parser, Subcommand};
 use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
-use isotherm_correction::units::Span;
 
 use crate::error::Error;
 use crate::stop::without_traces;
@@ -53,14 +52,6 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     #[command(flatten)]
     Common(Common),
-}
-
-/// Reads seconds.
-fn seconds(text: &str) -> Result<Span, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(Span::from_s(seconds)),
-        _ => Err("must be a number of seconds from 0 to 1000000000".into()),
-    }
 }
 
 /// Runs the command that the arguments name.

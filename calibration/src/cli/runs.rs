@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use isotherm_correction::units::Span;
+use isotherm_cli::Window;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part, are_recordings};
@@ -44,15 +44,8 @@ pub(super) struct Reading {
     /// Unit serial, if a recording has several; text log: the serial to assign (default: the document's)
     #[arg(long, short, value_name = "SERIAL")]
     pub(super) unit: Option<String>,
-    /// Start this long after each log's beginning (s); recordings are cut between messages
-    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
-    pub(super) start: Span,
-    /// Length of each log to read (s) (default: all)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub(super) duration: Option<Span>,
-    /// Stop this long after each log's beginning (s)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "duration")]
-    pub(super) end: Option<Span>,
+    #[command(flatten)]
+    pub(super) window: Window,
 }
 
 impl Reading {
@@ -61,23 +54,10 @@ impl Reading {
         Ok(self.unit.as_deref().map(unit_id).transpose()?)
     }
 
-    /// The part of each log that is read (s since its beginning).
-    pub(super) fn part_s(&self) -> [f64; 2] {
-        let start = self.start.as_s();
-        let end = self.end.map(Span::as_s).or(self.duration.map(|length| start + length.as_s()));
-        [start, end.unwrap_or(f64::INFINITY)]
-    }
-
     /// The part of each log's time, and the unit that was given.
     pub(super) fn part(&self) -> Result<Part, Error> {
-        let length = |length: Span| Span::from_ns(self.start.as_ns().saturating_add(length.as_ns()));
-        let end = self.end.or_else(|| self.duration.map(length));
-        if let Some(end) = end.filter(|end| *end < self.start) {
-            let words =
-                format!("--end is {} s, must not be before --start, {} s", end.as_s(), self.start.as_s());
-            return Err(Error::Usage(words));
-        }
-        Ok(Part { units: self.serial()?.into_iter().collect(), start: self.start, end })
+        let (start, end) = self.window.limits().map_err(Error::Usage)?;
+        Ok(Part { units: self.serial()?.into_iter().collect(), start, end })
     }
 
     /// Runs by unit, each log for itself: every recording is a run, and of text logs as many files as the mapping has.
@@ -198,14 +178,6 @@ fn unfolded(logs: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
         all.extend(inside);
     }
     Ok(all)
-}
-
-/// Reads seconds.
-fn seconds(text: &str) -> Result<Span, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(Span::from_s(seconds)),
-        _ => Err("must be a number of seconds from 0 to 1000000000".into()),
-    }
 }
 
 /// Names of files, as a run is called.

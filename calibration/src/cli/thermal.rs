@@ -3,6 +3,7 @@
 mod stands;
 
 use clap::Args;
+use isotherm_cli::Window;
 use isotherm_correction::units::Span;
 
 use super::driver::{Done, Job, Task};
@@ -47,9 +48,11 @@ pub(super) struct ThermalArgs {
 impl ThermalArgs {
     pub(super) fn run(&self) -> Result<(), Error> {
         let judging = Reading {
-            start: self.judge_start.map_or(Span::ZERO, Span::from_s),
-            duration: self.judge_duration.map(Span::from_s),
-            end: None,
+            window: Window {
+                start: self.judge_start.map_or(Span::ZERO, Span::from_s),
+                duration: self.judge_duration.map(Span::from_s),
+                end: None,
+            },
             ..self.common.log.reading.clone()
         };
         let logs = Logs { judging: &judging, ..self.common.logs() };

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use isotherm_log::part::Part;
 use isotherm_protocol::key::UnitId;
 
 use super::runs::{BaseArgs, LogArgs, Reading};
@@ -139,8 +140,9 @@ impl<'a> Logs<'a> {
     fn each_once(&self) -> Result<(), Error> {
         let logs = self.files;
         once_each_log(logs)?;
-        let [fitted, judged] = [self.reading, self.judging].map(Reading::part_s);
-        if fitted[0] >= judged[1] || judged[0] >= fitted[1] {
+        let [fitted, judged] = [self.reading.part()?, self.judging.part()?];
+        let is_before = |one: &Part, other: &Part| one.end.is_some_and(|end| end <= other.start);
+        if is_before(&fitted, &judged) || is_before(&judged, &fitted) {
             return Ok(());
         }
         match self.judge.iter().find(|judge| logs.iter().any(|log| are_one_log(log, judge))) {

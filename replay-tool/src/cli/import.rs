@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use isotherm_cli::Exit;
-use isotherm_correction::units::Span;
+use isotherm_cli::{Exit, Window};
 use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
@@ -120,9 +119,7 @@ impl ImportArgs {
             log: self.log.clone(),
             mapping: Some(mapping.to_owned()),
             unit: Vec::new(),
-            start: Span::ZERO,
-            duration: None,
-            end: None,
+            window: Window::default(),
         }
     }
 }

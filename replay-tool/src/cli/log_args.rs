@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
-use isotherm_correction::units::Span;
+use isotherm_cli::Window;
 use isotherm_log::mapping::Mapping;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Messages, Part, are_recordings};
@@ -12,7 +12,6 @@ use isotherm_log::replica::check_units;
 use isotherm_log::text::LogReader;
 use isotherm_protocol::key::UnitId;
 
-use super::seconds;
 use crate::error::Error;
 
 /// Which log, and which part of it.
@@ -27,15 +26,8 @@ pub(crate) struct LogArgs {
     /// Unit serial, repeatable (default: all). Text log: the serial to assign
     #[arg(long, short, value_name = "SERIAL")]
     pub(crate) unit: Vec<String>,
-    /// Start this long after the log's beginning (s); recordings are cut between messages
-    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = seconds)]
-    pub(crate) start: Span,
-    /// Length to read (s) (default: all)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub(crate) duration: Option<Span>,
-    /// Stop this long after the log's beginning (s)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "duration")]
-    pub(crate) end: Option<Span>,
+    #[command(flatten)]
+    pub(crate) window: Window,
 }
 
 /// What a text log's unit is called where nobody says, and nothing depends on it.
@@ -87,17 +79,8 @@ impl LogArgs {
     /// # Errors
     /// As [`LogArgs::units`], and where the part ends before it begins.
     pub(crate) fn part(&self) -> Result<Part, Error> {
-        let end = match (self.end, self.duration) {
-            (Some(end), _) if end < self.start => {
-                let (end, start) = (end.as_s(), self.start.as_s());
-                return Err(Error::Usage(format!("--end is {end} s, must not be before --start, {start} s")));
-            }
-            (Some(end), _) => Some(end),
-            (None, duration) => {
-                duration.map(|duration| Span::from_ns(self.start.as_ns().saturating_add(duration.as_ns())))
-            }
-        };
-        Ok(Part { units: self.units()?, start: self.start, end })
+        let (start, end) = self.window.limits().map_err(Error::Usage)?;
+        Ok(Part { units: self.units()?, start, end })
     }
 
     /// Which files to open, and how. A text log is of the one unit that is given, else of `unit`; it is put into gyro

@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::ClientOptions;
 use isotherm_bus::outlet::least_in_flight;
-use isotherm_cli::Exit;
+use isotherm_cli::{Exit, seconds};
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::Span;
 use isotherm_document::few;
@@ -22,7 +22,7 @@ use isotherm_protocol::raw::{HealthReading, MAX_HEALTH};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::{LogArgs, print, seconds, show};
+use super::{LogArgs, print, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;

@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use isotherm_bus::ClientOptions;
-use isotherm_cli::Exit;
+use isotherm_cli::{Exit, seconds};
 use isotherm_correction::units::Span;
 use isotherm_log::offline::unit_id;
 use isotherm_log::recording::RecordingOptions;
 
-use super::{print, seconds, show};
+use super::{print, show};
 use crate::error::Error;
 use crate::record::{Bounds, RecordOptions, ServiceWait, TopicFilter, record};
 

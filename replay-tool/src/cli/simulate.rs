@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, seconds};
 use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
 use serde::Serialize;
 
-use super::{print, seconds, show};
+use super::{print, show};
 use crate::error::Error;
 use crate::simulated::{LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{Sink, read_small_text, refuse_overwriting, refuse_replacing, write_whole};

@@ -1,6 +1,5 @@
 //! The `sign` command.
 
-use std::fs::canonicalize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,7 +12,7 @@ use serde::Serialize;
 
 use super::private_key;
 use crate::check::say_problems;
-use isotherm_document::file::{read_bounded, replace, text};
+use isotherm_document::file::{are_one, is_taken, read_bounded, replace, text};
 
 /// Arguments of `sign`.
 #[derive(Debug, Clone, Args)]
@@ -98,12 +97,9 @@ pub fn run(args: &SignArgs) -> Exit {
 
 /// Why the file of --out is not written over; `None` where it may be. The document itself is signed in its place.
 fn kept(args: &SignArgs, output: &Path) -> Option<String> {
-    let is = |other: &PathBuf| {
-        canonicalize(output).is_ok_and(|out| canonicalize(other).is_ok_and(|other| other == out))
-    };
-    let why = if is(&args.key) {
+    let why = if are_one(output, &args.key) {
         "is the private key: give another name"
-    } else if output.is_file() && !args.replace && !args.files.iter().any(is) {
+    } else if is_taken(output) && !args.replace && !args.files.iter().any(|file| are_one(output, file)) {
         "exists: give another name, or --overwrite"
     } else {
         return None;
