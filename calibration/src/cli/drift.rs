@@ -1,5 +1,7 @@
 //! `isotherm-calibrate drift`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use isotherm_log::diff::is_csv;
 use serde_json::json;
@@ -61,23 +63,23 @@ impl DriftArgs {
                     .to_owned(),
             ));
         }
-        self.refuse_mixture()?;
+        let corrected = self.are_corrected()?;
         let logs = Logs { unnamed: Some(unnamed()?), ..Logs::together(&self.log, &self.base) };
         let task = Task::new("Noise and drift of several units", files, logs);
-        task.run_on(|| self.units(&task.logs), |job| self.analyse(job))
+        task.run_on(|| self.units(&task.logs, corrected), |job| self.analyse(job, corrected))
     }
 
     /// The units of the logs; corrected ticks are read where they are analysed.
-    fn units(&self, logs: &Logs<'_>) -> Result<Vec<Unit>, Error> {
-        if !self.is_corrected() {
+    fn units(&self, logs: &Logs<'_>, corrected: bool) -> Result<Vec<Unit>, Error> {
+        if !corrected {
             return logs.units();
         }
         let unit = self.log.reading.serial()?.map_or_else(unnamed, Ok)?;
         Ok(vec![(unit, Ok(Work::new(None, Vec::new(), Vec::new())))])
     }
 
-    fn analyse(&self, job: &Job<'_>) -> Result<Done, Error> {
-        let columns = self.columns(job)?;
+    fn analyse(&self, job: &Job<'_>, corrected: bool) -> Result<Done, Error> {
+        let columns = self.columns(job, corrected)?;
         let (unit, kind, corrected) = (columns.unit.to_string(), columns.kind, columns.corrected);
         let grid = Grid::of(columns)?;
         let working = job.at_work("Allan deviations, drift, spectrum");
@@ -96,34 +98,33 @@ impl DriftArgs {
         Ok(Done { report, document })
     }
 
-    /// Raw ticks beside corrected ones would be left out without a word.
-    fn refuse_mixture(&self) -> Result<(), Error> {
-        let logs = &self.log.log;
-        let corrected = logs.iter().find(|path| is_csv(path)).filter(|_| !self.corrected);
-        let raw = logs.iter().find(|path| !is_csv(path));
-        let words = match (corrected, raw) {
-            (Some(corrected), Some(raw)) => format!(
-                "{} is a CSV of corrected ticks, {} is not: give logs of one kind, or --corrected for the corrected ticks of recordings",
-                corrected.display(),
+    /// Whether the logs have corrected ticks. What is for raw ones, and raw ticks beside them, would be left out without a word.
+    fn are_corrected(&self) -> Result<bool, Error> {
+        if self.corrected {
+            return Ok(true);
+        }
+        let (corrected, raw): (Vec<&PathBuf>, Vec<_>) = self.log.log.iter().partition(|path| is_csv(path));
+        let Some(corrected) = corrected.first() else { return Ok(false) };
+        let why = if let Some(raw) = raw.first() {
+            format!(
+                ", {} is not: give logs of one kind, or --corrected for the corrected ticks of recordings",
                 raw.display()
-            ),
-            (Some(corrected), None) if self.increment_weight.is_some() => format!(
-                "{} is a CSV of corrected ticks: --increment-weight is for raw counts; leave it out",
-                corrected.display()
-            ),
-            _ => return Ok(()),
+            )
+        } else if self.base.document.is_some() {
+            ": --calibration is for raw readings; give the log that it was made from, or leave --calibration out"
+                .to_owned()
+        } else if self.increment_weight.is_some() {
+            ": --increment-weight is for raw counts; leave it out".to_owned()
+        } else {
+            return Ok(true);
         };
-        Err(Error::Usage(words))
+        Err(Error::Usage(format!("{} is a CSV of corrected ticks{why}", corrected.display())))
     }
 
-    fn is_corrected(&self) -> bool {
-        self.corrected || self.log.log.iter().any(|path| is_csv(path))
-    }
-
-    fn columns(&self, job: &Job<'_>) -> Result<Columns, Error> {
+    fn columns(&self, job: &Job<'_>, corrected: bool) -> Result<Columns, Error> {
         let work = job.work;
         let kind = if self.accelerometers { Kind::Force } else { Kind::Rate };
-        if self.is_corrected() {
+        if corrected {
             let part = self.log.reading.part()?;
             return Columns::of_corrected(&self.log.log, &part, kind, &work.cut);
         }

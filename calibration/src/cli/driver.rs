@@ -78,16 +78,16 @@ impl<'a> Task<'a> {
                 document.save(&job.name(out), files.overwrite)?;
             }
             files.page(|html| job.name(html), || done.report.to_html())?;
-            Ok::<_, Error>(done.report)
+            Ok::<_, Error>(done)
         };
         if units.len() == 1
             && let Some((_, work)) = units.pop()
         {
             let mut work = work?;
             work.show();
-            let report = written(&Job { work: &work, among: None })?;
+            let Done { report, document } = written(&Job { work: &work, among: None })?;
             emit(files.json, || report.to_json(), || report.to_text())?;
-            files.say_written(report.verdicts.iter().any(|verdict| verdict.accepted));
+            files.say_written(document.is_some());
             let refused = refusals(&report, self.accept_partial);
             return Error::end(refused.into_iter().collect(), work.cuts());
         }
@@ -95,7 +95,7 @@ impl<'a> Task<'a> {
         let bar = Bar::counting("units done", units.len());
         let came = in_parallel(&units, |(unit, work)| {
             let came = match work {
-                Ok(work) => written(&Job { work, among: Some(unit.as_str()) }),
+                Ok(work) => written(&Job { work, among: Some(unit.as_str()) }).map(|done| done.report),
                 Err(error) => Err(Error::refused(error.to_string())),
             };
             bar.done_one();

@@ -12,7 +12,7 @@ use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter
 use isotherm_protocol::stream::UnitStream;
 use serde_json::Value;
 
-use crate::command::{calibrate, json, shipped};
+use crate::command::{calibrate, json, shipped, told};
 use crate::simulated_logs::{fibre_optic, record, write_text};
 
 /// A recording of the simulated unit, and its ticks corrected as CSV and as a recording.
@@ -77,6 +77,12 @@ fn drift_says_the_same_of_a_log_in_every_form() {
         assert_eq!(by_csv["measure"], if accelerometers.is_empty() { "deg/h" } else { "m/s2" });
         means.push(figures(&by_csv));
     }
+    // A document corrects raw readings only: it is not even read.
+    let out = folder.path().join("new.toml").display().to_string();
+    insta::assert_snapshot!(told(
+        folder.path(),
+        &["drift", &csv, "--calibration", "none.toml", "--out", &out]
+    ));
     let (rates, forces) = (&means[0], &means[1]);
     // Gravity is along z, and Earth rate is about the axes of a unit that looks to 30° at 55.75° north.
     assert!((forces[2][0].abs() - 9.815).abs() < 0.02 && forces[0][0].abs() < 0.05, "{forces:?}");
