@@ -20,17 +20,21 @@ const FRESH_READINGS: f64 = 2.0;
 /// Where the readings of a thermometer without a conversion must lie to be °C.
 pub const DEG_C: [f64; 2] = [-100.0, 200.0];
 
-/// The document without what the fit finds: static and thermal terms of the gyros, bias and lags of the accelerometers.
+/// Terms that hold with the filter that they were fitted with only.
+pub const DYNAMIC: [Feature; 3] = [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
+
+/// The document without what the fit finds of sensors that follow a channel: static and thermal terms.
 /// Scale, axes, mode and magnetic terms stay.
 pub fn bare(document: &Document) -> Document {
     let mut document = document.clone();
-    for sensor in &mut document.gyro.sensor {
-        let fitted = [Feature::One, Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag];
-        sensor.terms.retain(|feature| !fitted.contains(&feature));
+    let stays = |feature: Feature| feature != Feature::One && !DYNAMIC.contains(&feature);
+    for sensor in document.gyro.sensor.iter_mut().filter(|sensor| sensor.channel.is_some()) {
+        sensor.terms.retain(stays);
         sensor.trend = None;
     }
-    for sensor in document.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
-        sensor.terms.retain(|feature| !matches!(feature, Feature::One | Feature::Lag));
+    let accels = document.accel.iter_mut().flat_map(|accel| &mut accel.sensor);
+    for sensor in accels.filter(|sensor| sensor.channel.is_some()) {
+        sensor.terms.retain(stays);
     }
     document
 }

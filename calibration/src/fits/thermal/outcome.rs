@@ -1,8 +1,8 @@
 //! What a thermal fit came to: the document, its verdicts, its report.
 
-use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Document, Filter, Sample};
 
+use super::bare::DYNAMIC;
 use super::branches::{History, Plateau, Ramp};
 use super::checks::{SMALLEST_RANGE_DEG_C, moves_enough};
 use super::columns::{Basis, Term};
@@ -227,7 +227,7 @@ impl Outcome {
         }
         let (gyros, accels) = (&self.base.gyro.sensor, accelerometers(&self.base));
         let follows = |sensor: &Sensor| {
-            [Feature::ThermalRate, Feature::ThermalAcceleration, Feature::Lag].into_iter().any(|feature| {
+            DYNAMIC.into_iter().any(|feature| {
                 if sensor.gyro {
                     gyros.get(sensor.index).is_some_and(|gyro| gyro.terms.has(feature))
                 } else {

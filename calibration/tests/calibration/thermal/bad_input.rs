@@ -10,7 +10,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Curve, Shape, StatedTerm};
+use isotherm_protocol::document::{Curve, Document, GyroSensor, Shape, StatedTerm};
 
 use crate::drift_generator::Normal;
 
@@ -139,6 +139,29 @@ fn what_a_base_document_hides_is_told() {
     base.accel = None;
     let made = fit(Some(&base), (&[run(0..5400, usual)], &[]), &Settings::default()).unwrap();
     insta::assert_snapshot!(made.report.warnings.join("\n"));
+}
+
+#[test]
+fn terms_of_the_base_document_go_where_they_are_fitted_anew_and_stay_without_a_channel() {
+    let again = |base: &Document| {
+        fit(Some(base), (&[run(0..5400, usual)], &[]), &Settings::default()).unwrap().written.document
+    };
+    let base = tried(run(0..5400, usual), Method::Joint).unwrap().written.document;
+    let constant = |value: f64| Curve::new(Shape::Constant { value });
+    let mut with_rate = base.clone();
+    for accel in with_rate.accel.iter_mut().flat_map(|accel| &mut accel.sensor) {
+        accel.put(StatedTerm::new(Feature::ThermalRate, constant(0.5)));
+    }
+    let free = &mut with_rate.gyro.sensor[0];
+    *free = GyroSensor {
+        channel: None,
+        increment_weight_rad_per_rad: free.increment_weight_rad_per_rad,
+        ..GyroSensor::bare(&free.name)
+    }
+    .with(Feature::One, constant(3.0));
+    let (plain, new) = (again(&base), again(&with_rate));
+    assert_eq!(new.accel, plain.accel);
+    assert_eq!(new.gyro.sensor[0], with_rate.gyro.sensor[0]);
 }
 
 #[test]
