@@ -9,13 +9,14 @@ use isotherm_correction::calibration::Steady;
 use isotherm_correction::channel::ThermalState;
 use isotherm_correction::sample::ChannelName;
 use isotherm_correction::units::{AngularRate, SpecificForce};
+use isotherm_protocol::document::Document;
 use serde_json::{Value, json};
 
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
 use crate::numbers::{hull, real};
 use crate::report::{Report, alike, short};
-use terms::{Term, terms, tree};
+use terms::{HOURS, Term, terms, tree};
 
 /// Temperatures of the tables.
 const COLUMNS: usize = 7;
@@ -84,6 +85,7 @@ fn over_temperature(sheet: &mut Report, terms: &[Term], range: [f64; 2]) {
         ("°C", "Over temperature (in brackets: clamped, outside the fitted range)"),
         ("°C/s", "Over the temperature's rate"),
         ("°C/s²", "Over the temperature's acceleration"),
+        (HOURS, "Over the time since turn-on"),
     ];
     for (argument, heading) in headings {
         let over = |term: &&Term| term.argument == argument && (term.range.is_some() || argument == "°C");
@@ -158,12 +160,17 @@ fn sums_table(sheet: &mut Report, written: &Written, range: [f64; 2]) {
     };
     let sums = sums(written, &at);
     let rows = sums.iter().flat_map(|sum| sum.ramps.iter().map(move |ramp| row(sum, ramp)));
-    sheet.table(&format!("Bias in all, lags settled{}", lasing_mode(written)), heads(&at, "°C"), rows);
+    sheet.table(&format!("Bias in all, {}", settled([&written.document])), heads(&at, "°C"), rows);
 }
 
-/// The lasing mode that a sum is in, of a unit that reverses it.
-fn lasing_mode(written: &Written) -> &'static str {
-    if written.document.mode_reversal.is_some() { ", lasing mode +" } else { "" }
+/// What sums of documents are taken at.
+pub(crate) fn settled<const N: usize>(documents: [&Document; N]) -> String {
+    let any = |holds: fn(&Document) -> bool, words: &'static str| {
+        if documents.into_iter().any(holds) { words } else { "" }
+    };
+    let trend = any(|of| of.gyro.sensor.iter().any(|gyro| gyro.trend.is_some()), ", trend at its end");
+    let mode = any(|of| of.mode_reversal.is_some(), ", lasing mode +");
+    format!("lags settled{trend}{mode}")
 }
 
 pub(crate) fn ramp_words(ramp: f64) -> String {

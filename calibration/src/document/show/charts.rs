@@ -2,8 +2,8 @@
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
-use super::terms::Term;
-use super::{Sum, lasing_mode, places, ramp_words, spoken, steady, sums};
+use super::terms::{HOURS, Term};
+use super::{Sum, places, ramp_words, settled, spoken, steady, sums};
 use crate::document::Written;
 use crate::numbers::{ARCSEC_PER_RAD, Size, once_each};
 use crate::report::Report;
@@ -17,11 +17,14 @@ pub(crate) const HEIGHT: u32 = 150;
 pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], range: [f64; 2]) {
     let sums = sum_panels(written, range);
     let caption =
-        format!("All terms together, lags settled{}, all channels at one temperature.", lasing_mode(written));
+        format!("All terms together, {}, all channels at one temperature.", settled([&written.document]));
     add(sheet, "Bias in all", &caption, "°C", sums);
-    for (argument, label) in
-        [("°C", "temperature"), ("°C/s", "rate of temperature"), ("°C/s²", "its acceleration")]
-    {
+    for (argument, label) in [
+        ("°C", "temperature"),
+        ("°C/s", "rate of temperature"),
+        ("°C/s²", "its acceleration"),
+        (HOURS, "time since turn-on"),
+    ] {
         for (kind, sensors) in [("gyro", "Gyros"), ("accel", "Accelerometers")] {
             let mine: Vec<&Term> =
                 terms.iter().filter(|term| term.kind == kind && term.argument == argument).collect();
@@ -55,6 +58,7 @@ fn add(sheet: &mut Report, heading: &str, caption: &str, unit: &str, panels: Vec
     let label = match unit {
         "°C" => "temperature",
         "°C/s" => "rate of temperature",
+        HOURS => "time since turn-on",
         _ => "acceleration of temperature",
     };
     sheet.chart(heading, Chart::of(caption, Axis::of(label, unit), panels));

@@ -5,12 +5,15 @@
 use std::fmt::Write;
 
 use isotherm_correction::curve::Curve;
-use isotherm_protocol::document::{Argument, Curve as StatedCurve, Document, Shape};
+use isotherm_protocol::document::{Argument, Curve as StatedCurve, Document, Shape, Trend};
 use toml::{Table, Value};
 
 use crate::error::Error;
 use crate::numbers::real;
 use crate::report::{six, superscript};
+
+/// What a trend is over.
+pub const HOURS: &str = "h";
 
 /// One curve of one sensor, in the document's units.
 #[derive(Debug, Clone)]
@@ -23,7 +26,7 @@ pub struct Term {
     pub name: String,
     /// Symbol of the unit of its values.
     pub unit: String,
-    /// What it is over: "°C", "°C/s" or "°C/s²".
+    /// What it is over: "°C", "°C/s", "°C/s²", "°/s", or hours since turn-on.
     pub argument: &'static str,
     /// Fitted range; `None` for a constant.
     pub range: Option<[f64; 2]>,
@@ -95,14 +98,22 @@ fn gather(of: (&'static str, &str), path: &str, value: &Value, terms: &mut Vec<T
     }
 }
 
-/// A curve, where the table is one.
+/// A curve or a trend, where the table is one.
 fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Option<Term> {
-    table.get("kind")?;
-    let stated: StatedCurve = Value::Table(table.clone()).try_into().ok()?;
-    let argument = stated.argument().unwrap_or(Argument::DegC);
-    let words = match stated.shape() {
+    let value = Value::Table(table.clone());
+    let (unit, (argument, symbol), range, shape) = if table.contains_key("kind") {
+        let stated: StatedCurve = value.try_into().ok()?;
+        let argument = stated.argument().unwrap_or(Argument::DegC);
+        let of = (argument.symbol(), letter(argument));
+        (stated.unit().symbol(), of, stated.range(), stated.shape().clone())
+    } else {
+        let Trend { coefficients_deg_per_h: coefficients, interval_h: range } = value.try_into().ok()?;
+        let shape = Shape::Polynomial { reference: 0.0, coefficients, range };
+        ("°/h".to_owned(), (HOURS, "t"), Some(range), shape)
+    };
+    let words = match &shape {
         Shape::Constant { value } => six(*value),
-        Shape::Polynomial { reference, coefficients, .. } => polynomial(coefficients, *reference, argument),
+        Shape::Polynomial { reference, coefficients, .. } => polynomial(coefficients, *reference, symbol),
         Shape::PiecewiseLinear { knots } => format!("piecewise-linear, {} knots", knots.len()),
         Shape::Spline { knots } => format!("spline, {} knots", knots.len()),
     };
@@ -110,12 +121,22 @@ fn term((kind, sensor): (&'static str, &str), name: &str, table: &Table) -> Opti
         kind,
         sensor: sensor.to_owned(),
         name: name.to_owned(),
-        unit: stated.unit().symbol(),
-        argument: argument.symbol(),
-        range: stated.range(),
+        unit,
+        argument,
+        range,
         words,
-        curve: Curve::new(stated.shape()).ok()?,
+        curve: Curve::new(&shape).ok()?,
     })
+}
+
+/// The letter of an argument in formulas.
+fn letter(argument: Argument) -> &'static str {
+    match argument {
+        Argument::DegC => "T",
+        Argument::DegCPerS => "Ṫ",
+        Argument::DegCPerS2 => "T̈",
+        Argument::DegPerS => "ω",
+    }
 }
 
 /// Any number of a tree.
@@ -123,13 +144,7 @@ pub(crate) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(real))
 }
 
-fn polynomial(coefficients: &[f64], reference: f64, argument: Argument) -> String {
-    let symbol = match argument {
-        Argument::DegC => "T",
-        Argument::DegCPerS => "Ṫ",
-        Argument::DegCPerS2 => "T̈",
-        Argument::DegPerS => "ω",
-    };
+fn polynomial(coefficients: &[f64], reference: f64, symbol: &str) -> String {
     let of = if reference == 0.0 {
         symbol.to_owned()
     } else if reference < 0.0 {
