@@ -14,7 +14,7 @@ use crate::runs::faults::{self, Fault};
 pub const FEWEST_TICKS: usize = 64;
 /// Missing ticks in a row that are bridged with the mean of their neighbours.
 const LONGEST_BRIDGE: usize = 10;
-/// Most of a log that may be bridged; beyond it every missing tick is a gap.
+/// Most of a log that may be bridged; beyond it every missing tick is a gap. Longer gaps do not count.
 const LARGEST_BRIDGED_SHARE: f64 = 1e-3;
 /// Ticks whose lengths differ by more than this from the middle one are told.
 const UNEVEN: f64 = 0.05;
@@ -44,6 +44,8 @@ pub struct Grid {
     pub tick_s: f64,
     /// Ticks from beginning to end, gaps included.
     pub ticks: usize,
+    /// Those of them that are missing.
+    pub missing: usize,
     /// Sensors that can be analysed.
     pub sensors: Vec<Sensor>,
     /// Why others cannot, with what to do.
@@ -93,9 +95,11 @@ impl Grid {
                 seconds(middle_ns)
             ));
         }
-        let bridge = real(missing) <= LARGEST_BRIDGED_SHARE * real(count);
+        let short = gaps.iter().map(|gap| gap.missing).filter(|missing| *missing <= LONGEST_BRIDGE);
+        let bridge = real(short.sum::<usize>()) <= LARGEST_BRIDGED_SHARE * real(count);
         notes.extend(words(&gaps, bridge, tick_s));
-        let mut grid = Self { tick_s, ticks: places, sensors: Vec::new(), refused: Vec::new(), notes };
+        let mut grid =
+            Self { tick_s, ticks: places, missing, sensors: Vec::new(), refused: Vec::new(), notes };
         for (name, column) in names.into_iter().zip(values) {
             let called = format!("{} {name}", kind.sensor());
             if let Some(fault) = Fault::of(&column) {
@@ -276,9 +280,15 @@ mod tests {
 
         let far: Vec<i64> =
             (0..6000).map(|k| if k < 3000 { k } else { k + 500 }).map(|k| k * 1_000_000).collect();
-        let grid = Grid::of(columns(far, vec![wave])).unwrap();
+        let grid = Grid::of(columns(far.clone(), vec![wave.clone()])).unwrap();
         let pieces = &grid.sensors[0].pieces;
         assert_eq!((pieces.len(), pieces[1].start, grid.ticks), (2, 3500, 6500));
+        // A long gap is no reason to leave a single missing tick open.
+        let both =
+            far.into_iter().map(|end_ns| if end_ns < 1_000_000_000 { end_ns } else { end_ns + 1_000_000 });
+        let with_single = Grid::of(columns(both.collect(), vec![wave])).unwrap();
+        let pieces = &with_single.sensors[0].pieces;
+        assert_eq!((pieces.len(), pieces[1].start, with_single.missing), (2, 3501, 501));
         insta::assert_snapshot!(grid.notes.join("\n"));
     }
 

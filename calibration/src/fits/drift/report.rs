@@ -51,9 +51,10 @@ impl Found {
         });
         report.tell(grid.notes);
         report.notes.push(format!(
-            "{} ticks of {} s, {:.2} h{}.",
+            "{} ticks of {} s{}, {:.2} h{}.",
             grid.ticks,
             short(grid.tick_s),
+            if grid.missing > 0 { format!(", {} of them missing", grid.missing) } else { String::new() },
             self.length_h,
             if corrected { ", corrected and along the case axes" } else { ", raw readings" }
         ));
