@@ -8,7 +8,7 @@
 
 mod check;
 mod origin;
-mod sections;
+pub(crate) mod sections;
 #[cfg(test)]
 mod tests;
 
@@ -150,12 +150,15 @@ impl<'a> Merging<'a> {
             let Some(first) = said.first() else { continue };
             let chosen = self.take.iter().rev().find(|take| covers(&take.key, key));
             let decided = match chosen {
-                Some(take) if take.from == base.name() => continue,
-                Some(take) => said.iter().find(|(part, _)| part.name() == take.from),
+                // One that has not changed it says of it what the base says.
+                Some(take) => match said.iter().find(|(part, _)| part.name() == take.from) {
+                    None => continue,
+                    own => own,
+                },
                 None => Some(first).filter(|(_, value)| said.iter().all(|(_, other)| other == value)),
             };
             match decided {
-                None => self.conflicts.push(conflict(key, &said, chosen)),
+                None => self.conflicts.push(conflict(key, &said)),
                 Some(&(part, Some(_))) => drop(self.from.insert(key, part)),
                 Some(&(part, None)) => {
                     self.from.remove(key);
@@ -253,15 +256,12 @@ fn are_curves(group: &str) -> bool {
 }
 
 /// What is in the way. Of two curves over temperature, made each as a whole, none adds to the other.
-fn conflict(key: &str, said: &[Said<'_>], chosen: Option<&Take>) -> String {
+fn conflict(key: &str, said: &[Said<'_>]) -> String {
     let named = |(part, value): &Said<'_>| {
         let without = if value.is_none() { " (does without it)" } else { "" };
         format!("{}{without}", part.name())
     };
     let parts = said.iter().map(named).collect::<Vec<_>>().join(" and ");
-    if let Some(take) = chosen {
-        return format!("{key}: --take names {}, but only {parts} changed it", take.from);
-    }
     let first = said.first().map_or("", |(part, _)| part.name());
     let again = if are_curves(&group(key)) {
         "repeat the fit over temperature from the other document (--calibration) and leave that one out here, or "

@@ -6,7 +6,7 @@ use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Makes, Term};
 use toml::{Table, Value};
 
 /// Sections by their key; sensors and channels by their name: `gyro.sensor.x.static_bias`.
-pub(super) type Sections = BTreeMap<String, Value>;
+pub(crate) type Sections = BTreeMap<String, Value>;
 
 /// Keys that say nothing about the correction.
 const ABOUT: [&str; 4] = ["schema", "created", "note", "origin"];
@@ -46,7 +46,7 @@ fn path(key: &str) -> Vec<&str> {
 }
 
 /// The sections of a document.
-pub(super) fn sections(tree: Table) -> Sections {
+pub(crate) fn sections(tree: Table) -> Sections {
     let mut sections = Sections::new();
     take(&[], &Value::Table(tree), &mut sections);
     sections.retain(|key, _| !is_about(key));

@@ -99,6 +99,11 @@ fn the_same_key_made_twice_is_a_conflict_until_someone_decides() {
     let merged = merge(&base, &parts, &[take("base.toml")]).unwrap();
     assert_eq!(merged.written.document.gyro, base.document.gyro);
     assert!(matches!(merge(&base, &parts, &[take("c.toml")]), Err(Error::Usage(_))));
+    // Of what the chosen part has not changed it says what the base says.
+    let heavier = |document: &mut Document| document.gyro.sensor[0].increment_weight_rad_per_rad = Some(1.1);
+    let parts = [named("a.toml", bias(7.0)), named("b.toml", heavier)];
+    let merged = merge(&base, &parts, &[take("a.toml")]).unwrap();
+    assert_eq!(merged.written.document.gyro, parts[0].document.gyro);
     // What both made alike is no conflict.
     let alike = [named("a.toml", bias(7.0)), named("b.toml", bias(7.0))];
     assert!(merge(&base, &alike, &[]).is_ok());
