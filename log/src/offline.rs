@@ -124,7 +124,7 @@ pub fn troubles(stream: &UnitStream) -> Vec<String> {
         name if unfit::COUNTERS.contains(&name) => {
             let calibration = stream.unit().calibration();
             let why = calibration.and_then(|(calibration, _)| unfit::words(name, calibration));
-            format!("{value} ticks of gyros and accelerometers refused: {}", why.unwrap_or_default())
+            format!("{value} ticks of {} refused: {}", unfit_kinds(stream), why.unwrap_or_default())
         }
         "not_finite_readings" => format!("{value} sensor readings are not numbers"),
         "overrange_readings" => format!("{value} sensor readings are at or beyond the input range"),
@@ -140,4 +140,16 @@ pub fn troubles(stream: &UnitStream) -> Vec<String> {
         _ => format!("{value} {}", name.replace('_', " ")),
     });
     words.collect()
+}
+
+/// What unfit ticks are of. One counter has them all; those in and out tell where only one kind can be meant.
+fn unfit_kinds(stream: &UnitStream) -> &'static str {
+    let counters = stream.unit().counters();
+    if counters.accel_ticks_in == 0 {
+        "gyros"
+    } else if counters.ticks_out == counters.gyro_ticks_in {
+        "accelerometers"
+    } else {
+        "gyros and accelerometers"
+    }
 }

@@ -263,8 +263,12 @@ fn ticks_that_the_calibration_refuses_are_a_loss() {
     let folder = simulated();
     let laser = fs::canonicalize(root().join("config/calibration/ZLG-0001.toml")).unwrap();
     let correct = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", laser.to_str().unwrap()];
-    let told = told(folder.path(), &correct);
-    insta::assert_snapshot!(told.replace(laser.to_str().unwrap(), "ZLG-0001.toml"));
+    let all = told(folder.path(), &correct).replace(laser.to_str().unwrap(), "ZLG-0001.toml");
+    // All gyro ticks are corrected by a document without accelerometers.
+    let document = fs::read_to_string(calibration()).unwrap();
+    fs::write(folder.path().join("gyros.toml"), document.split("\n[accel]").next().unwrap()).unwrap();
+    let accels = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", "gyros.toml", "--out", "out.csv"];
+    insta::assert_snapshot!(all + &told(folder.path(), &accels));
 }
 
 #[test]
