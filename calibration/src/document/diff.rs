@@ -9,15 +9,19 @@ mod sheet;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use isotherm_correction::calibration::Steady;
 use isotherm_correction::thermal::Feature;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 use isotherm_protocol::control::DocumentChange;
 use isotherm_protocol::document::{Document, OrientationThermal, difference, turn_rad};
 use serde::Serialize;
+use toml::Table;
 
+use crate::document::merge::sections::sections;
 use crate::document::show::terms::{terms, tree};
-use crate::document::show::{places, range_of, steady};
+use crate::document::show::{places, range_of, settled, steady};
 use crate::document::{Written, about, accelerometers};
 use crate::error::Error;
 use crate::numbers::norm;
@@ -79,8 +83,13 @@ pub struct Changes {
     pub axes: Vec<AxisChange>,
     /// Biases, increment weights, scale factors; only those that differ somewhere.
     pub values: Vec<ValueChange>,
+    /// Sections that differ, by "gyro x", "accelerometer x" and so on; all that is of no sensor by "document".
+    pub sections: BTreeMap<String, Vec<String>>,
     /// Entries that differ.
     pub entries: Vec<DocumentChange>,
+    /// What biases are taken at.
+    #[serde(skip)]
+    pub settled: String,
 }
 
 /// Compares two documents; `axis_sigma` is the standard error of a direction cosine (″) where a document states none.
@@ -88,9 +97,8 @@ pub struct Changes {
 /// # Errors
 /// [`Error::Document`] where a document cannot be written as a tree.
 pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Result<Changes, Error> {
-    let ranges = [before, after].map(|written| Ok::<_, Error>(range_of(&terms(&tree(&written.document)?))));
-    let [first, second] = ranges;
-    let ([a, b], [c, d]) = (first?, second?);
+    let (before_tree, after_tree) = (tree(&before.document)?, tree(&after.document)?);
+    let [[a, b], [c, d]] = [&before_tree, &after_tree].map(|tree| range_of(&terms(tree)));
     let range = if a.max(c) < b.min(d) { [a.max(c), b.min(d)] } else { [a.min(c), b.max(d)] };
     let reference = own_reference(&after.document).clamp(range[0], range[1]);
     let at = places(range, POINTS);
@@ -116,10 +124,36 @@ pub fn changes([before, after]: [&Written; 2], axis_sigma: Option<f64>) -> Resul
         compared.accel(name, places, &mut values);
     }
     values.retain(|value| value.change.iter().chain([&value.at_reference]).any(|change| *change != 0.0));
-    let entries = difference(&before.document, &after.document);
-    let names = [before, after].map(|written| written.name.clone());
-    let units = [before, after].map(|written| written.document.unit.clone());
-    Ok(Changes { names, units, reference_deg_c: reference, temperature_deg_c: at, axes, values, entries })
+    Ok(Changes {
+        names: [before, after].map(|written| written.name.clone()),
+        units: [before, after].map(|written| written.document.unit.clone()),
+        reference_deg_c: reference,
+        temperature_deg_c: at,
+        axes,
+        values,
+        sections: differing([before_tree, after_tree]),
+        entries: difference(&before.document, &after.document),
+        settled: settled(compared.documents),
+    })
+}
+
+/// Sections that differ, by what they are of.
+fn differing(trees: [Table; 2]) -> BTreeMap<String, Vec<String>> {
+    let [before, after] = trees.map(sections);
+    let mut differing: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for key in before.keys().chain(after.keys().filter(|key| !before.contains_key(*key))) {
+        if before.get(key) == after.get(key) {
+            continue;
+        }
+        let of_sensor = [("gyro.sensor.", "gyro"), ("accel.sensor.", "accelerometer")];
+        let of_sensor = of_sensor.into_iter().find_map(|(list, kind)| {
+            let (name, section) = key.strip_prefix(list)?.rsplit_once('.')?;
+            Some((format!("{kind} {name}"), section))
+        });
+        let (of, section) = of_sensor.unwrap_or_else(|| ("document".to_owned(), key));
+        differing.entry(of).or_default().push(section.to_owned());
+    }
+    differing
 }
 
 /// Names that both have, with their places in either.

@@ -50,8 +50,9 @@ impl Series {
             sheet.warnings.push(format!("the documents are for units {}", units.join(", ")));
         }
         sheet.notes.push(format!(
-            "Each column is the later document less the earlier one, at {} °C; the last is the total.",
-            short(self.whole.reference_deg_c)
+            "Each column is the later document less the earlier one, at {} °C, {}; the last is the total.",
+            short(self.whole.reference_deg_c),
+            self.whole.settled
         ));
         let columns: Vec<String> =
             self.columns().map(|step| format!("{} → {}", step.names[0], step.names[1])).collect();

@@ -1,5 +1,7 @@
 //! Changes in words, tables and charts.
 
+use std::collections::BTreeSet;
+
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series, Table};
 use serde_json::json;
 
@@ -7,6 +9,22 @@ use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
 use crate::report::{Report, counted, or_dash, short};
 
+/// Sections that axes, biases and scale factors are made of.
+const SHOWN: [&str; 13] = [
+    "accel.orientation.rows",
+    "accel.orientation.thermal",
+    "bias",
+    "board_ratio_error",
+    "gyro.orientation.rows",
+    "gyro.orientation.thermal",
+    "increment_weight_arcsec_per_count",
+    "increment_weight_error",
+    "increment_weight_rad_per_rad",
+    "magnetic_bias",
+    "scale_factor",
+    "slow_meander",
+    "static_bias",
+];
 /// Entries of an origin that are shown one by one.
 const MOST_ABOUT: usize = 12;
 
@@ -55,6 +73,11 @@ impl Changes {
                 parts.push(format!("{what} changes by up to {} {kind} ({of})", short(most)));
             }
         }
+        let others: BTreeSet<&str> =
+            self.sections.values().flatten().map(String::as_str).filter(|key| !SHOWN.contains(key)).collect();
+        if !others.is_empty() {
+            parts.push(format!("also different: {}", others.into_iter().collect::<Vec<_>>().join(", ")));
+        }
         parts.join("; ")
     }
 
@@ -69,10 +92,11 @@ impl Changes {
         let range = self.temperature_deg_c.first().zip(self.temperature_deg_c.last());
         if let Some((low, high)) = range {
             sheet.notes.push(format!(
-                "Changes are {after} less {before}, at {} °C and over {}…{} °C, all channels at one temperature, lags settled.",
+                "Changes are {after} less {before}, at {} °C and over {}…{} °C, all channels at one temperature, {}.",
                 short(self.reference_deg_c),
                 short(*low),
-                short(*high)
+                short(*high),
+                self.settled
             ));
         }
         if self.axes.iter().any(|axis| axis.significance.is_none() && axis.turned_arcsec > 0.0) {
@@ -100,9 +124,10 @@ impl Changes {
                 Some(format!("{} {}", short(largest_of(value)), value.unit))
             };
             let turned = plus_minus(axis.turned_arcsec, axis.turned_sigma_arcsec, tenths);
-            vec![axis.of.clone(), turned + " ″", or_dash(largest(false)), or_dash(largest(true))]
+            let different = or_dash(self.sections.get(&axis.of).map(|sections| sections.join(", ")));
+            vec![axis.of.clone(), turned + " ″", or_dash(largest(false)), or_dash(largest(true)), different]
         };
-        let head = ["", "axis turned", "bias by up to", "scale by up to"];
+        let head = ["", "axis turned", "bias by up to", "scale by up to", "different"];
         let summary = Table::of(head, self.axes.iter().map(row));
         let sheet = Report { summary: Some(summary), ..self.sheet() };
         let entries = counted(self.entries.len(), "entry differs", "entries differ");

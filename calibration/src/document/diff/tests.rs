@@ -1,5 +1,5 @@
 use isotherm_correction::thermal::Feature;
-use isotherm_protocol::document::{Curve, Document, Shape};
+use isotherm_protocol::document::{Curve, Document, Shape, StatedTerm, Trend};
 
 use super::*;
 
@@ -14,7 +14,7 @@ fn written(change: impl FnOnce(&mut Document)) -> Written {
 
 /// States standard errors of the axes of accelerometer x.
 fn sigma(document: &mut Document, arcsec: f64) {
-    let mut details = toml::Table::new();
+    let mut details = Table::new();
     let mut sigmas = Sigmas::default();
     sigmas.put("accel", "x", "axis_arcsec", vec![0.0, arcsec, arcsec]);
     sigmas.write(&mut details);
@@ -89,6 +89,20 @@ fn biases_and_scale_factors_change_over_temperature() {
 }
 
 #[test]
+fn terms_that_no_number_shows_are_named() {
+    let constant = |value: f64| Curve::new(Shape::Constant { value });
+    let after = written(|document| {
+        let gyro = &mut document.gyro.sensor[1];
+        gyro.put(StatedTerm::new(Feature::ForceZ, constant(2.0)));
+        gyro.trend = Some(Trend { coefficients_deg_per_h: vec![0.0, 0.1], interval_h: [0.0, 10.0] });
+        for accel in &mut document.accel.as_mut().unwrap().sensor {
+            accel.put(StatedTerm::new(Feature::ThermalRate, constant(0.5)));
+        }
+    });
+    insta::assert_snapshot!(changes([&written(|_| ()), &after], None).unwrap().in_brief());
+}
+
+#[test]
 fn equal_documents_are_told_as_such() {
     let one = written(|_| ());
     let changes = changes([&one, &one], None).unwrap();
@@ -111,7 +125,7 @@ fn standard_errors_grow_away_from_the_temperature_that_a_curve_is_given_about() 
                 hysteresis: Vec::new(),
             });
             document.gyro.sensor[0].set(Feature::One, Curve::new(bias));
-            let (mut details, mut sigmas) = (toml::Table::new(), Sigmas::default());
+            let (mut details, mut sigmas) = (Table::new(), Sigmas::default());
             sigmas.put("accel", "x", "axis_arcsec", vec![0.0, 3.0, 4.0]);
             sigmas.put("gyro", "x", "static_bias", vec![0.6, 0.01]);
             sigmas.write(&mut details);
