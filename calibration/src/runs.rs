@@ -129,8 +129,8 @@ impl Run {
         Self { left_out, ..self.clone() }
     }
 
-    /// An event in which the readings that are left out are no numbers.
-    fn kept<'a>(&self, event: &'a LogEvent) -> Cow<'a, LogEvent> {
+    /// An event in which the readings that are left out are no numbers; how many there are is added up.
+    fn kept<'a>(&self, event: &'a LogEvent, left_out: &mut u64) -> Cow<'a, LogEvent> {
         let mut kept = Cow::Borrowed(event);
         let (end_ns, gyro) = (event.time().as_ns(), matches!(event, LogEvent::Gyro { .. }));
         for (.., sensor) in self.left_out.range((end_ns, gyro, 0)..=(end_ns, gyro, usize::MAX)) {
@@ -140,6 +140,7 @@ impl Run {
                 LogEvent::Temperature(_) => None,
             };
             if let Some(reading) = reading {
+                *left_out += 1;
                 *reading = f64::NAN;
             }
         }

@@ -100,9 +100,10 @@ pub fn counters(stream: &UnitStream) -> impl Iterator<Item = (String, u64)> + us
     counters.filter(|counter| counter.value > 0).map(|counter| (counter.name, counter.value))
 }
 
-/// What a stream has refused or passed over, in words for whoever reads only the summary.
+/// What a stream has refused or passed over, in words for whoever reads only the summary. Of so many readings the caller itself has made
+/// no numbers: they are none of the log's.
 #[must_use]
-pub fn troubles(stream: &UnitStream) -> Vec<String> {
+pub fn troubles(stream: &UnitStream, left_out: u64) -> Vec<String> {
     /// Counters of what is as it should be, or that the summary and its flags show anyway.
     const EXPECTED: [&str; 8] = [
         "gyro_ticks_in",
@@ -115,8 +116,13 @@ pub fn troubles(stream: &UnitStream) -> Vec<String> {
         "switches_restored",
     ];
     let channels: Vec<_> = stream.unit().channels().map(|channel| channel.name.to_string()).collect();
-    let counters = counters(stream).filter(|(name, _)| !EXPECTED.contains(&name.as_str()));
-    let words = counters.map(|(name, value)| match name.as_str() {
+    let of_log = |(name, value): (String, u64)| match name.as_str() {
+        name if EXPECTED.contains(&name) => None,
+        "not_finite_readings" if value <= left_out => None,
+        "not_finite_readings" => Some((name, value - left_out)),
+        _ => Some((name, value)),
+    };
+    let words = counters(stream).filter_map(of_log).map(|(name, value)| match name.as_str() {
         "temperature_unknown_channel" => format!(
             "{value} temperature readings are of channels that the calibration does not have; it has: {}",
             if channels.is_empty() { "none".to_owned() } else { channels.join(", ") }

@@ -67,12 +67,12 @@ impl Run {
         let Some(first) = loaded.first() else { return Ok(Vec::new()) };
         // A document of gyros alone is asked about gyros: their log may well have accelerometers.
         let has_accelerometers = first.calibration.accel_count() > 0;
-        let mut units = Together::new(loaded);
+        let (mut units, mut left_out) = (Together::new(loaded), 0);
         self.walk(|fed| {
             beside(&fed);
             match fed {
                 fed if !has_accelerometers && fed.is_accel() => {}
-                Fed::Event(event) => units.handle(&self.taken(&self.kept(event))),
+                Fed::Event(event) => units.handle(&self.taken(&self.kept(event, &mut left_out))),
                 Fed::Frame(input, frame) => units.units.iter_mut().for_each(|unit| {
                     // One that cannot be read is counted, and its ticks are a gap.
                     let _ = unit.receive(input, frame);
@@ -83,7 +83,7 @@ impl Run {
         })?;
         units.units.iter_mut().for_each(UnitStream::flush);
         units.give_out(&mut each);
-        units.units.iter().map(|unit| self.judge_troubles(units.count, troubles(unit))).collect()
+        units.units.iter().map(|unit| self.judge_troubles(units.count, troubles(unit, left_out))).collect()
     }
 }
 

@@ -85,7 +85,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     bar.finish();
 
     let (summary, log) = (sums.summary(), events.report());
-    for trouble in troubles(&stream).into_iter().chain(summary.doubts()) {
+    for trouble in troubles(&stream, 0).into_iter().chain(summary.doubts()) {
         show::warn(&trouble);
     }
     let digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
