@@ -29,8 +29,11 @@ fn significant(value: f64, digits: f64) -> String {
     }
 }
 
-/// So many places behind the point; zero has no sign.
+/// So many places behind the point, an exponent where only zeros would stand before it; zero has no sign.
 pub fn fixed(value: f64, places: usize) -> String {
+    if value.abs() >= 1e16 {
+        return short(value);
+    }
     let words = format!("{value:.places$}");
     match words.strip_prefix('-') {
         Some(size) if size.bytes().all(|byte| matches!(byte, b'0' | b'.')) => size.to_owned(),
@@ -149,7 +152,9 @@ mod tests {
 
     #[test]
     fn numbers_are_written_as_people_do() {
-        assert_eq!([fixed(-0.001, 2), fixed(-0.016, 2), fixed(1.0, 1)], ["0.00", "-0.02", "1.0"]);
+        let words =
+            [(-0.001, 2), (-0.016, 2), (1.0, 1), (1e300, 1)].map(|(value, places)| fixed(value, places));
+        assert_eq!(words, ["0.00", "-0.02", "1.0", "1.00e300"]);
         assert_eq!(
             [counted(1, "pose", "poses"), counted(0, "pose", "poses"), counted(12, "pose", "poses")],
             ["1 pose", "0 poses", "12 poses"]

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{AxisChange, BEYOND, Changes, ValueChange};
 use crate::document::show::charts::HEIGHT;
-use crate::report::{Report, counted, or_dash, short};
+use crate::report::{Report, counted, fixed, or_dash, short};
 
 /// Sections that axes, biases and scale factors are made of.
 const SHOWN: [&str; 13] = [
@@ -218,7 +218,7 @@ pub(super) fn plus_minus(value: f64, sigma: Option<f64>, digits: fn(f64) -> Stri
 }
 
 pub(super) fn tenths(value: f64) -> String {
-    format!("{value:.1}")
+    fixed(value, 1)
 }
 
 fn largest_of(value: &ValueChange) -> f64 {

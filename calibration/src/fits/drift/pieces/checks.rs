@@ -6,7 +6,7 @@ use crate::axes::sensor_name;
 use crate::error::Error;
 use crate::fits::drift::columns::{Columns, Kind};
 use crate::numbers::{median, middle_and_scatter, real, scatter_of_steps, seconds};
-use crate::report::{short, six};
+use crate::report::{fixed, short, six};
 use crate::runs::faults::{self, Fault};
 use crate::runs::series::Ticks;
 use crate::runs::table::is_one_g;
@@ -108,8 +108,9 @@ pub fn at_rest(columns: &mut Columns, spacing: &Spacing) -> Result<Vec<String>, 
                 moving.push(words);
             } else if columns.corrected && middle.abs() > LARGEST_CORRECTED_DEG_PER_H {
                 notes.push(format!(
-                    "warning: {called} reads {middle:.0} °/h in the median after the correction, the Earth turns by \
-                     15 °/h: is the unit at rest? Check the unit of measure in the mapping"
+                    "warning: {called} reads {} °/h in the median after the correction, the Earth turns by \
+                     15 °/h: is the unit at rest? Check the unit of measure in the mapping",
+                    fixed(middle, 0)
                 ));
             }
         }
@@ -155,10 +156,11 @@ fn gravity(columns: &Columns) -> Option<String> {
 pub fn moves(called: &str, deg_per_s: f64) -> Option<String> {
     (deg_per_s.abs() > FASTEST_DEG_PER_S).then(|| {
         format!(
-            "{called} reads {deg_per_s:.1} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, are columns \
-             swapped, or is the unit of measure in the mapping wrong ({:.3} as °/s, {:.3} as °/h)?",
-            deg_per_s.to_radians(),
-            deg_per_s.to_radians() / 3600.0
+            "{called} reads {} °/s in the median, at most {FASTEST_DEG_PER_S} °/s is rest: does the unit move, are columns \
+             swapped, or is the unit of measure in the mapping wrong ({} as °/s, {} as °/h)?",
+            fixed(deg_per_s, 1),
+            fixed(deg_per_s.to_radians(), 3),
+            fixed(deg_per_s.to_radians() / 3600.0, 3)
         )
     })
 }
