@@ -1,38 +1,23 @@
 //! Several services correct one unit: each tick is used from the one that sends it first.
 
+use isotherm_correction::sample::TickFlags;
 use isotherm_protocol::corrected::CorrectedTick;
 
 /// Runs of the producer that are remembered, the present one included: a service may lag behind as many restarts less one.
 pub const RUNS: usize = 4;
-/// Longest duration of a raw tick that counts (ns).
-const LONGEST_NS: i128 = 10_000_000_000;
-/// Most ticks between two of one run.
-const MOST_STEPS: i128 = 1 << 20;
+/// Outputs that a service may lag behind: about as many as one holds.
+const MOST_BEHIND: u64 = 8192;
+/// With `RESTART`: beyond, a producer counts from the beginning again.
+const MOST_BEHIND_RESTART: u64 = 512;
 
-/// The last tick used of a run of the producer.
+/// What was used of a run of the producer.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     series: u64,
+    /// The highest number.
     sequence: u64,
+    /// The latest end: the clock may have stepped back since.
     end_time_ns: i64,
-}
-
-impl Run {
-    /// Whether a tick is of this run's series, and its sequence and time on this run's line.
-    fn has(&self, tick: &CorrectedTick) -> bool {
-        let CorrectedTick { series, sequence, end_time, duration, ticks, .. } = *tick;
-        if series != self.series {
-            return false;
-        }
-        let steps = i128::from(sequence) - i128::from(self.sequence);
-        if steps.abs() > MOST_STEPS {
-            return false;
-        }
-        let duration = i128::from(duration.as_ns().unsigned_abs() / u64::from(ticks.max(1))).min(LONGEST_NS);
-        let line = steps * duration;
-        let apart = (i128::from(end_time.as_ns()) - i128::from(self.end_time_ns) - line).abs();
-        apart <= duration / 2 + line.abs() / 8
-    }
 }
 
 /// First wins, for one unit (docs/wire.md).
@@ -48,27 +33,44 @@ pub struct FirstWins {
 impl FirstWins {
     /// Whether a tick is to be used.
     pub fn wins(&mut self, tick: &CorrectedTick) -> bool {
-        let CorrectedTick { series, sequence, end_time, ticks, .. } = *tick;
+        let CorrectedTick { series, sequence, end_time, flags, .. } = *tick;
+        let (end_time_ns, ticks) = (end_time.as_ns(), u64::from(tick.ticks.max(1)));
+        let first = sequence.saturating_sub(ticks - 1);
+        let restarts = flags.contains(TickFlags::RESTART);
+        let most = if restarts { MOST_BEHIND_RESTART } else { MOST_BEHIND };
+        let is_near = |distance: u64| distance / ticks < most;
+
         let [current, before @ ..] = &self.runs;
-        let is_of = |run: &Option<Run>| run.is_some_and(|run| run.has(tick));
-        let wins = match current {
-            Some(run) if is_of(current) => {
-                sequence.saturating_sub(u64::from(ticks.max(1)) - 1) > run.sequence
+        let current = current.filter(|run| run.series == series);
+        let goes_on = current.filter(|run| first > run.sequence && is_near(first - run.sequence));
+        let is_used = current.is_some_and(|run| {
+            let overlaps = sequence > run.sequence;
+            first <= run.sequence
+                && (end_time_ns <= run.end_time_ns || overlaps)
+                && is_near(run.sequence.saturating_sub(sequence))
+        });
+        let is_of_before = before.iter().flatten().filter(|run| run.series == series).any(|run| {
+            if first > run.sequence {
+                // The end of a run, which the other service's message lost.
+                return current.is_none() && !restarts && is_near(first - run.sequence);
             }
-            _ if before.iter().any(is_of) => false,
-            _ => {
-                self.runs.rotate_right(1);
-                true
-            }
-        };
-        if wins {
-            if let Some(current) = self.runs.first_mut() {
-                *current = Some(Run { series, sequence, end_time_ns: end_time.as_ns() });
-            }
-        } else {
+            let back = run.sequence.saturating_sub(sequence);
+            // Numbers and time began again: the present run comes past this one's.
+            let passes = |now: Run| end_time_ns > now.end_time_ns && first - now.sequence - 1 <= back;
+            end_time_ns <= run.end_time_ns && is_near(back) && !goes_on.is_some_and(passes)
+        });
+        if is_used || is_of_before {
             self.dropped += 1;
+            return false;
         }
-        wins
+        if goes_on.is_none() {
+            self.runs.rotate_right(1);
+        }
+        let latest = goes_on.map_or(end_time_ns, |run| run.end_time_ns.max(end_time_ns));
+        if let Some(current) = self.runs.first_mut() {
+            *current = Some(Run { series, sequence, end_time_ns: latest });
+        }
+        true
     }
 
     /// Outputs that were dropped: they, or a part of them, had been used.
@@ -80,7 +82,6 @@ impl FirstWins {
 
 #[cfg(test)]
 mod tests {
-    use isotherm_correction::sample::TickFlags;
     use isotherm_correction::units::{Span, Timestamp};
 
     use super::*;

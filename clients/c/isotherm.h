@@ -2436,59 +2436,66 @@ static inline void isotherm_enter(isotherm_account *account, uint64_t series, co
  * Enter into the account what isotherm_wins lets through.
  */
 typedef struct {
-    uint64_t series, sequence;
-    int64_t end_time_ns;
+    uint64_t series;
+    uint64_t sequence;   /* the highest used */
+    int64_t end_time_ns; /* the latest used: the clock may have stepped back since */
     bool known;
 } isotherm_run;
 
 /* The runs before the present one that are remembered: a service may lag behind as many restarts of the producer. */
 #define ISOTHERM_RUNS_BEFORE 3
+/* Outputs that a service may lag behind; with RESTART, beyond fewer a producer counts from the beginning again. */
+#define ISOTHERM_MOST_BEHIND 8192u
+#define ISOTHERM_MOST_BEHIND_RESTART 512u
 
 typedef struct {
     isotherm_run current, before[ISOTHERM_RUNS_BEFORE];
     uint64_t dropped;
 } isotherm_arbiter;
 
-/* Whether a tick is of the series of a run, and its sequence and time on the run's line, at most 2^20 ticks from its last. */
-static inline bool isotherm_is_of(const isotherm_run *run, uint64_t series, const isotherm_corrected_tick *tick) {
-    if (!run->known || series != run->series) return false;
-    const bool later = tick->sequence >= run->sequence;
-    const uint64_t steps = later ? tick->sequence - run->sequence : run->sequence - tick->sequence;
-    const bool after = tick->end_time_ns >= run->end_time_ns;
-    const uint64_t time = after ? (uint64_t)tick->end_time_ns - (uint64_t)run->end_time_ns
-                                : (uint64_t)run->end_time_ns - (uint64_t)tick->end_time_ns;
-    uint64_t duration = tick->duration_ns / (tick->ticks > 1 ? tick->ticks : 1u);
-    if (duration > UINT64_C(10000000000)) duration = UINT64_C(10000000000);
-    if (steps > UINT64_C(1) << 20) return false;
-    const uint64_t line = steps * duration;
-    const uint64_t tolerance = duration / 2 + line / 8;
-    if (later != after && line != 0 && time != 0) return time <= tolerance && line <= tolerance - time;
-    return (time > line ? time - line : line - time) <= tolerance;
+/* Whether a distance of numbers is so short that a lag of the other service may be the cause. */
+static inline bool isotherm_is_near(uint64_t distance, const isotherm_corrected_tick *tick) {
+    const bool restarts = (tick->flags & ISOTHERM_TICK_RESTART) != 0;
+    return distance / (tick->ticks > 1 ? tick->ticks : 1u) < (restarts ? ISOTHERM_MOST_BEHIND_RESTART : ISOTHERM_MOST_BEHIND);
 }
 
 /* Whether to use a tick of a batch of this series. */
 static inline bool isotherm_wins(isotherm_arbiter *arbiter, uint64_t series, const isotherm_corrected_tick *tick) {
-    isotherm_run *run = &arbiter->current;
+    isotherm_run *current = &arbiter->current;
+    const uint64_t first = isotherm_first(tick), last = tick->sequence;
+    const int64_t end = tick->end_time_ns;
+    const bool is_same = current->known && series == current->series;
+    const bool goes_on = is_same && first > current->sequence && isotherm_is_near(first - current->sequence, tick);
     bool wins = true;
-    if (isotherm_is_of(run, series, tick)) {
-        wins = isotherm_first(tick) > run->sequence;
-    } else {
-        for (size_t i = 0; i < ISOTHERM_RUNS_BEFORE; ++i) {
-            if (isotherm_is_of(&arbiter->before[i], series, tick)) wins = false;
+    if (is_same && first <= current->sequence) {
+        const bool overlaps = last > current->sequence;
+        wins = !((overlaps || end <= current->end_time_ns) && isotherm_is_near(overlaps ? 0 : current->sequence - last, tick));
+    }
+    for (size_t i = 0; i < ISOTHERM_RUNS_BEFORE && wins; ++i) {
+        const isotherm_run *run = &arbiter->before[i];
+        if (!run->known || series != run->series) continue;
+        if (first > run->sequence) {
+            /* The end of a run, which the other service's message lost. */
+            wins = is_same || (tick->flags & ISOTHERM_TICK_RESTART) != 0 || !isotherm_is_near(first - run->sequence, tick);
+            continue;
         }
-        if (wins) {
-            for (size_t i = ISOTHERM_RUNS_BEFORE - 1; i > 0; --i) arbiter->before[i] = arbiter->before[i - 1];
-            arbiter->before[0] = *run;
-        }
+        const uint64_t back = run->sequence > last ? run->sequence - last : 0;
+        /* Numbers and time began again: the present run comes past this one's. */
+        const bool passes = goes_on && end > current->end_time_ns && first - current->sequence - 1 <= back;
+        wins = end > run->end_time_ns || passes || !isotherm_is_near(back, tick);
     }
     if (!wins) {
         ++arbiter->dropped;
         return false;
     }
-    run->series = series;
-    run->sequence = tick->sequence;
-    run->end_time_ns = tick->end_time_ns;
-    run->known = true;
+    if (!goes_on) {
+        for (size_t i = ISOTHERM_RUNS_BEFORE - 1; i > 0; --i) arbiter->before[i] = arbiter->before[i - 1];
+        arbiter->before[0] = *current;
+    }
+    current->end_time_ns = goes_on && current->end_time_ns > end ? current->end_time_ns : end;
+    current->series = series;
+    current->sequence = last;
+    current->known = true;
     return true;
 }
 

@@ -12,9 +12,10 @@ from ._layout import TICK_FLAGS
 
 _RESTART = TICK_FLAGS["RESTART"]
 _MOST = (1 << 64) - 1
-_LONGEST_NS = 10**10
-_MOST_STEPS = 1 << 20
 _RUNS_BEFORE = 3
+# Outputs that a service may lag behind; with RESTART, beyond fewer a producer counts from the beginning again.
+_MOST_BEHIND = 8192
+_MOST_BEHIND_RESTART = 512
 
 
 def _follows(ticks: Array) -> bool:
@@ -79,22 +80,13 @@ class Account:
 
 @dataclass
 class _Run:
-    """The last tick used of a run of the producer."""
+    """What was used of a run of the producer."""
 
     series: int
+    #: The highest number.
     sequence: int
+    #: The latest end: the clock may have stepped back since.
     end_time_ns: int
-
-    def has(self, tick: Any, series: int) -> bool:
-        """Whether a tick is of this run's series, and its sequence and time on this run's line."""
-        if series != self.series:
-            return False
-        steps = int(tick["sequence"]) - self.sequence
-        duration = min(int(tick["duration_ns"]) // max(1, int(tick["ticks"])), _LONGEST_NS)
-        if abs(steps) > _MOST_STEPS:
-            return False
-        line = steps * duration
-        return abs(int(tick["end_time_ns"]) - self.end_time_ns - line) <= duration // 2 + abs(line) // 8
 
 
 class FirstWins:
@@ -128,43 +120,55 @@ class FirstWins:
     def _stale(self, ticks: Array, series: int) -> int:
         """How many ticks at the front have been used: what `_wins` finds of each, for all at once."""
         run = self._current
-        if run is None or len(ticks) == 0 or _first(ticks[0]) > run.sequence or not run.has(ticks[0], series):
+        if run is None or len(ticks) == 0 or series != run.series or _first(ticks[0]) > run.sequence:
             return 0
-        sequence, end = ticks["sequence"], ticks["end_time_ns"]
-        if max(int(sequence.max()), run.sequence, int(end.max()), -int(end.min()), abs(run.end_time_ns)) >= 1 << 62:
+        if max(int(ticks["sequence"].max()), run.sequence) >= 1 << 62:
             return 0
-        number = np.maximum(ticks["ticks"], 1).astype(np.int64)
-        steps = sequence.astype(np.int64) - run.sequence
-        duration = np.minimum(ticks["duration_ns"] // number.astype(np.uint64), np.uint64(_LONGEST_NS)).astype(np.int64)
-        near = np.abs(steps) <= _MOST_STEPS
-        line = np.where(near, steps, 0) * duration
-        apart = np.abs(end - run.end_time_ns - line)
-        used = near & (apart <= duration // 2 + np.abs(line) // 8) & (steps - (number - 1) <= 0)
+        sequence, number = ticks["sequence"].astype(np.int64), np.maximum(ticks["ticks"], 1).astype(np.int64)
+        most = np.where(ticks["flags"] & _RESTART, _MOST_BEHIND_RESTART, _MOST_BEHIND)
+        used = (sequence - (number - 1) <= run.sequence) & (np.maximum(run.sequence - sequence, 0) // number < most)
+        used &= (ticks["end_time_ns"] <= run.end_time_ns) | (sequence > run.sequence)
         return len(ticks) if used.all() else int(used.argmin())
 
     def _goes_on(self, ticks: Array, series: int) -> bool:
         """Whether every tick plainly follows what was used: what `_wins` finds of each, for all at once."""
         current = self._current
-        if current is None or _first(ticks[0]) != current.sequence + 1:
+        if current is None or series != current.series or _first(ticks[0]) != current.sequence + 1 or not _follows(ticks):
             return False
-        if not current.has(ticks[0], series) or not _follows(ticks):
-            return False
-        number = ticks["ticks"].astype(np.int64)[1:]
-        duration = np.minimum(ticks["duration_ns"][1:], np.uint64(number.max(initial=1) * _LONGEST_NS)).astype(np.int64) // number
-        line = number * duration
-        apart = np.abs(ticks["end_time_ns"][1:] - ticks["end_time_ns"][:-1] - line)
-        return bool(((duration <= _LONGEST_NS) & (apart <= duration // 2 + line // 8)).all())
+        end = ticks["end_time_ns"]
+        return int(end[0]) > current.end_time_ns and bool((end[1:] > end[:-1]).all())
 
     def _wins(self, tick: Any, series: int) -> bool:
+        sequence, end, number = int(tick["sequence"]), int(tick["end_time_ns"]), max(1, int(tick["ticks"]))
+        first, restarts = _first(tick), bool(int(tick["flags"]) & _RESTART)
+        most = _MOST_BEHIND_RESTART if restarts else _MOST_BEHIND
+
+        def is_near(distance: int) -> bool:
+            return distance // number < most
+
         current = self._current
-        if current is not None and current.has(tick, series):
-            if _first(tick) <= current.sequence:
-                self.dropped += 1
-                return False
-        elif any(run.has(tick, series) for run in self._before):
+        if current is not None and current.series != series:
+            current = None
+        goes_on = current is not None and first > current.sequence and is_near(first - current.sequence)
+
+        def is_of(run: _Run) -> bool:
+            if first > run.sequence:
+                # The end of a run, which the other service's message lost.
+                return current is None and not restarts and is_near(first - run.sequence)
+            back = max(0, run.sequence - sequence)
+            # Numbers and time began again: the present run comes past this one's.
+            passes = current is not None and goes_on and end > current.end_time_ns and first - current.sequence - 1 <= back
+            return end <= run.end_time_ns and is_near(back) and not passes
+
+        used = current is not None and first <= current.sequence and is_near(max(0, current.sequence - sequence))
+        used = used and current is not None and (end <= current.end_time_ns or sequence > current.sequence)
+        if used or any(run.series == series and is_of(run) for run in self._before):
             self.dropped += 1
             return False
-        elif current is not None:
-            self._before = [current, *self._before][:_RUNS_BEFORE]
-        self._current = _Run(series, int(tick["sequence"]), int(tick["end_time_ns"]))
+        if current is not None and goes_on:
+            self._current = _Run(series, sequence, max(end, current.end_time_ns))
+            return True
+        if self._current is not None:
+            self._before = [self._current, *self._before][:_RUNS_BEFORE]
+        self._current = _Run(series, sequence, end)
         return True
