@@ -111,6 +111,19 @@ class Ends(unittest.TestCase):
         self.assertRegex(logs.output[0], r"closed, not sent: gyro ticks 522…529 \(.*gyro ticks 10…521 were sent and none came back")
         self.assertEqual(self.service.numbers(512), list(range(10, 522)))
 
+    def test_ticks_of_another_run_come_back_to_nobody(self) -> None:
+        bus = self.bus(1.0)
+        # As the frozen batch has them.
+        for series in [1, 0]:
+            with bus.producer("ZLG-0042", batch_ticks=8, max_in_flight=256, series=series) as producer:
+                give(producer, *range(1000, 1008))
+                self.service.session.put("imu/ZLG-0042/corrected", frozen("corrected"))
+                if series == 0:
+                    producer.drain()
+                    continue
+                with self.assertRaisesRegex(TimeoutError, "gyro ticks 1000…1007 were sent and none came back"):
+                    producer.drain()
+
     def test_a_callback_that_raises_is_reported_and_the_stream_goes_on(self) -> None:
         done = threading.Event()
         seen: list[str] = []
