@@ -14,7 +14,7 @@ use super::account::value_of;
 const ASSUMED_INTERVAL: Duration = Duration::from_millis(250);
 /// A stream is stopped after this many times its usual distance of messages.
 const INTERVALS: u32 = 4;
-/// Longest distance of messages that is followed; what is longer was a pause.
+/// Longest distance of messages that is followed.
 const LONGEST_INTERVAL: Duration = Duration::from_millis(2500);
 
 /// Counters of what comes in, in the order of [`InputRates`].
@@ -36,7 +36,7 @@ const REPEATED: usize = 8;
 ///
 /// A producer that sends a batch of 64 ticks every 640 ms has not stopped 500 ms after the last one. The silence that
 /// counts as a stop therefore grows with the distance of the messages, so that a flush by the clock never meets a
-/// stream that goes on.
+/// stream that goes on. A pause is no such distance, unless the one before it was as long and not many messages ago.
 #[derive(Debug)]
 pub(super) struct Arrivals {
     /// Shortest silence that counts as a stop.
@@ -44,6 +44,8 @@ pub(super) struct Arrivals {
     /// When the last gyro message came, and the distance of such messages.
     last: Option<Instant>,
     interval: Duration,
+    /// The last silence that counted as a stop; it fades with each message after it.
+    pause: Duration,
     messages: u64,
     /// The counters at the last look, and the rates between the last two looks.
     looked: (Instant, [u64; 4]),
@@ -66,6 +68,7 @@ impl Arrivals {
             shortest: tail_flush.max(pairing_window * 2),
             last: None,
             interval: ASSUMED_INTERVAL,
+            pause: Duration::ZERO,
             messages: 0,
             looked: (now, [0; 4]),
             rates: InputRates::default(),
@@ -96,13 +99,21 @@ impl Arrivals {
         if input != Input::Raw(RawStream::Gyro) {
             return;
         }
+        let was_over = self.is_over(now);
         if let Some(last) = self.last.replace(now) {
-            let interval = now.saturating_duration_since(last).min(LONGEST_INTERVAL);
+            let mut interval = now.saturating_duration_since(last);
+            let pause =
+                if was_over && interval <= LONGEST_INTERVAL { interval } else { self.pause * 15 / 16 };
+            if was_over {
+                interval = interval.min(self.pause);
+            }
+            self.pause = pause;
             // Up at once, down slowly: bursts do not make the stream look faster than it is.
-            self.interval = interval.max(self.interval * 15 / 16);
+            self.interval = interval.min(LONGEST_INTERVAL).max(self.interval * 15 / 16);
         }
         if series.is_some() && series != self.series {
             let before = std::mem::replace(&mut self.series, series);
+            (self.interval, self.pause) = (ASSUMED_INTERVAL, Duration::ZERO);
             if let (Some(series), Some(before)) = (series, before) {
                 let remembered = |at: Instant| now.saturating_duration_since(at) < REMEMBERED;
                 let returns =
@@ -202,12 +213,21 @@ mod tests {
     fn silence(tail_flush: u32, pairing_window: u32, distances: &[u32]) -> u32 {
         let mut now = Instant::now();
         let mut arrivals = arrivals(tail_flush, pairing_window, now);
-        arrivals.note(GYRO, None, now);
+        arrivals.note(GYRO, Some(1), now);
         for distance in distances {
             now += MS * *distance;
-            arrivals.note(GYRO, None, now);
+            arrivals.note(GYRO, Some(1), now);
         }
-        (0..20_000).find(|ms| arrivals.is_over(now + MS * *ms)).unwrap()
+        let silence =
+            |arrivals: &Arrivals, now| (0..20_000).find(|ms| arrivals.is_over(now + MS * *ms)).unwrap();
+        let of_this = silence(&arrivals, now);
+        arrivals.note(GYRO, Some(2), now + MS);
+        assert_eq!(
+            silence(&arrivals, now + MS),
+            1000.max(2 * pairing_window),
+            "of a new series nothing is known"
+        );
+        of_this
     }
 
     #[test]
@@ -217,7 +237,9 @@ mod tests {
         assert_eq!(silence(100, 300, &fast), 600, "twice the pairing window");
         assert_eq!(silence(100, 50, &[640; 10]), 2560, "four times the distance");
         assert_eq!(silence(100, 50, &[]), 1000, "nothing is known of the distance yet");
-        assert_eq!(silence(100, 50, &[3_600_000]), 10_000, "a pause is not a distance");
+        assert_eq!(silence(100, 50, &[2000, 1, 2000, 1, 2000]), 8000, "bursts every 2 s");
+        assert_eq!(silence(100, 50, &[3000; 4]), 773, "pauses are no distance: four messages in a row");
+        assert_eq!(silence(100, 50, &[&fast[..], &[2000, 5]].concat()), 100, "a pause is no distance");
     }
 
     #[test]
