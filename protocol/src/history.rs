@@ -134,7 +134,7 @@ pub struct FirstTick {
     pub series: u64,
     /// Sequence number of the tick.
     pub first_sequence: u64,
-    /// End of the tick (ns on the producer's clock).
+    /// End of the output with the tick (ns on the producer's clock): of the tick itself, unless several are summed to a navigation step.
     pub first_end_time_ns: i64,
 }
 
