@@ -9,7 +9,7 @@ use isotherm_calibration::fits::positions::plan::Plan;
 use isotherm_calibration::fits::thermal::bare::bare;
 use isotherm_calibration::numbers::{ARCSEC_PER_RAD, Size};
 use isotherm_correction::sample::CorrectedTick;
-use isotherm_protocol::document::{Document, Residual, Sample};
+use isotherm_protocol::document::{Document, Residual, Sample, Trend};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::chamber::Profile;
 use nalgebra::{Matrix3, Vector3};
@@ -294,13 +294,17 @@ fn of_a_thermal_fit_to_recordings_with_accelerometers() {
     }
     // Without terms that a fit could be worse than.
     let document = path("base.toml");
-    let shipped = Written::read(&shipped("FOG-0001.toml")).unwrap().document;
-    Written::of(&bare(&shipped)).unwrap().save(Path::new(&document), false).unwrap();
+    let mut without = bare(&Written::read(&shipped("FOG-0001.toml")).unwrap().document);
+    without.gyro.sensor[1].trend = Some(Trend { coefficients_deg_per_h: vec![1e-6], interval_h: [0.0, 1.0] });
+    Written::of(&without).unwrap().save(Path::new(&document), false).unwrap();
     for method in ["sequential", "joint"] {
         let out = path(&format!("{method}.toml"));
         let fit =
             ["thermal", &train, "--judge", &judge, "--method", method, "--window", "20", "--accept-partial"];
-        json(&[&fit[..], &["--calibration", &document, "--out", &out, "--json"]].concat());
+        let report = json(&[&fit[..], &["--calibration", &document, "--out", &out, "--json"]].concat());
+        let warnings = report["warnings"].as_array().unwrap();
+        let of_trend = warnings.iter().filter(|words| words.as_str().unwrap().contains(" trend "));
+        insta::allow_duplicates! { insta::assert_snapshot!(of_trend.map(Value::to_string).collect::<String>()) };
         for (log, sample) in [(&train, Sample::In), (&judge, Sample::Out)] {
             let ticks = replayed(&[log], &out, &["--ignore-journal"]);
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {

@@ -83,6 +83,7 @@ pub fn fit(
                 .to_owned(),
         );
     }
+    warnings.extend(trends_removed(&base));
     let mut plain = bare(&base);
     if plain.temperature.channel.is_empty() {
         return Err(Error::refused(
@@ -151,6 +152,14 @@ pub fn fit(
         outcome.history(name, &known.history);
     }
     outcome.finish(sound.split_at(runs.len()), |run, stand| rest(run, &base, stand))
+}
+
+/// That the new terms of a gyro take the place of its trend, which the runs hold too.
+fn trends_removed(base: &Document) -> impl Iterator<Item = String> {
+    let with_trend = base.gyro.sensor.iter().filter(|gyro| gyro.trend.is_some());
+    with_trend.map(|gyro| {
+        format!("gyro {}: its trend since turn-on is removed if its new terms are accepted: they are of the whole reading", gyro.name)
+    })
 }
 
 /// The logs that have the same readings as a run.
