@@ -50,6 +50,12 @@ pub(crate) fn scale_at(sensor: &AccelSensor, deg_c: f64) -> f64 {
     sensor.scale_factor.shape().at(deg_c).unwrap_or(1.0)
 }
 
+/// r of an accelerometer's board that a document states at the board's temperature (°C); 1 where it states none there.
+pub(crate) fn board_ratio_at(sensor: &AccelSensor, board_deg_c: f64) -> f64 {
+    let error = || sensor.board_ratio_error.as_ref()?.shape().at(board_deg_c);
+    1.0 + error().unwrap_or(0.0) * 1e-6
+}
+
 /// Temperature that a polynomial is given about (°C).
 pub(crate) fn about(curve: Option<&Curve>) -> Option<f64> {
     match curve?.shape() {

@@ -34,7 +34,7 @@ pub(crate) struct GravityArgs {
     /// Gravity at the place (m/s²)
     #[arg(long, value_name = "M_PER_S2", value_parser = within(9.7, 9.9))]
     gravity: Option<f64>,
-    /// Latitude of the place (°), for normal gravity
+    /// Latitude of the place (°), for normal gravity; tumble: for the Earth's rate too
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, value_parser = within(-90.0, 90.0))]
     latitude: Option<f64>,
     /// Height of the place above the sea (m), for normal gravity
@@ -43,6 +43,11 @@ pub(crate) struct GravityArgs {
 }
 
 impl GravityArgs {
+    /// Latitude of the place (°).
+    pub(crate) const fn latitude_deg(&self) -> Option<f64> {
+        self.latitude
+    }
+
     /// Gravity (m/s²), and a warning where nothing is said of it.
     pub(crate) fn stated(&self) -> (f64, Option<String>) {
         gravity::stated(self.gravity, self.latitude, self.height)

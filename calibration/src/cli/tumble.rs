@@ -13,9 +13,9 @@ use crate::error::Error;
 use crate::fits::positions::bare::of_run;
 use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::track::Track;
-use crate::fits::tumble::document::{before, complete};
-use crate::fits::tumble::fit::{Settings, analyse};
-use crate::fits::tumble::report::{Left, details, report, sigmas};
+use crate::fits::tumble::document::{before, complete, track};
+use crate::fits::tumble::fit::{Settings, Tumble, analyse};
+use crate::fits::tumble::report::{Left, details, of_gyros, report, sigmas};
 use crate::limits::above_0;
 use crate::runs::Run;
 
@@ -67,9 +67,10 @@ impl TumbleArgs {
         let base = &*work.base_with_accelerometers("add [accel], or leave the document out", || {
             self.first_document(run)
         })?;
-        let track = Track::of(run, &base.loaded)?;
+        let track = track(run, base)?;
         let settings = Settings {
             gravity,
+            latitude_deg: self.gravity.latitude_deg(),
             limits: StillLimits {
                 window_s: self.window,
                 factor: self.threshold.unwrap_or(4.0),
@@ -85,23 +86,32 @@ impl TumbleArgs {
         fitting.finish();
         let mut tumble = found.map_err(Error::Refused)?;
         tumble.warnings.extend(about_gravity.clone());
-        let (document, warnings) = complete(&base.document, &tumble).map_err(Error::Refused)?;
-        tumble.warnings.extend(warnings);
-        let left = |written: &Written| -> Result<Left, Error> {
-            let track = Track::of(run, &written.loaded)?;
-            Ok(Left::of(&track, &tumble.poses, gravity))
+        let left = |written: &Written, tumble: &Tumble| -> Result<Left, Error> {
+            Ok(Left::of(&Track::of(run, &written.loaded)?, tumble, gravity))
         };
         let (before, about_before) = before(&base.document, &tumble, work.base.is_some());
-        let before = left(&Written::of(&before)?)?;
-        let written = Written::of(&document)?;
-        let after = left(&written)?;
-        let mut report = report(&document, &tumble, &settings, &run.name, [&before, &after]);
+        let before = left(&Written::of(&before)?, &tumble)?;
+        let new = |tumble: &Tumble| -> Result<(Written, Vec<String>, Left), Error> {
+            let (document, warnings) = complete(&base.document, tumble).map_err(Error::Refused)?;
+            let written = Written::of(&document)?;
+            let after = left(&written, tumble)?;
+            Ok((written, warnings, after))
+        };
+        let (mut written, mut warnings, mut after) = new(&tumble)?;
+        let gyros = of_gyros([&before, &after]);
+        if tumble.gyro.is_ok() && !gyros.accepted {
+            // Those that are made worse keep their terms.
+            tumble.gyro = Err(gyros.reason);
+            (written, warnings, after) = new(&tumble)?;
+        }
+        tumble.warnings.extend(warnings);
+        let mut report = report(&written.document, &tumble, &settings, &run.name, [&before, &after]);
         report.notes.push(about_before.to_owned());
         let about = About {
             method: "tumble: |f| = g over still poses; gyros against the accelerometers",
             key: "tumble",
             details: details(&tumble, &settings),
-            sigmas: sigmas(&document, &tumble),
+            sigmas: sigmas(&written.document, &tumble),
             ..About::default()
         };
         // Gyros are relative to the axes of the accelerometers that were found with them.

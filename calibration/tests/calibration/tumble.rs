@@ -7,8 +7,9 @@ use isotherm_calibration::fits::positions::bare::{bare, of_run};
 use isotherm_calibration::fits::positions::still::StillLimits;
 use isotherm_calibration::fits::positions::track::Track;
 use isotherm_calibration::fits::tumble::acceleration;
-use isotherm_calibration::fits::tumble::document::complete;
+use isotherm_calibration::fits::tumble::document::{self, complete};
 use isotherm_calibration::fits::tumble::fit::{Settings, Tumble, analyse};
+use isotherm_calibration::fits::tumble::report::Left;
 use isotherm_calibration::numbers::Size;
 use isotherm_calibration::runs::Run;
 use isotherm_correction::thermal::Feature;
@@ -17,7 +18,9 @@ use isotherm_log::mapping::Mapping;
 use isotherm_log::message::Topic;
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Part};
-use isotherm_protocol::document::{AccelOutput, Document, Shape};
+use isotherm_protocol::document::{
+    AccelOutput, Argument, Curve, Document, GyroSensor, OrientationThermal, Shape, Trend,
+};
 use isotherm_simulator::instrument::{Gyros, Instrument};
 use isotherm_simulator::presets::mems_chamber;
 use nalgebra::Matrix3;
@@ -95,7 +98,7 @@ fn real(files: &[PathBuf; 2]) -> Tumble {
     let run = Run::new("tumbled".to_owned(), unit, files, &Part::default());
     let document = bare(&run.series().unwrap(), AccelOutput::Volts).unwrap();
     let track = Track::of(&run, &Written::of(&document).unwrap().loaded).unwrap();
-    analyse(&track, &Settings { gravity: 9.81744, ..settings() }).unwrap()
+    analyse(&track, &Settings { gravity: 9.81744, latitude_deg: None, ..settings() }).unwrap()
 }
 
 /// What half of the poses say of drift with acceleration holds in the other half.
@@ -104,13 +107,14 @@ fn drift_with_acceleration_of_half_of_the_real_poses_holds_in_the_others() {
     let Some(data) = data("tumble-mems") else { return };
     let paths = ["gyro.txt.gz", "acc.txt.gz"].map(|name| data.join(name));
     let tumble = real(&paths);
-    let force: Vec<[f64; 3]> = tumble.poses.iter().map(|pose| tumble.accel.force(&pose.outputs)).collect();
+    let force = tumble.force();
     let mut dice = Dice::new(11);
     for (gyro, most) in [0.45, 0.25, 0.25].into_iter().enumerate() {
-        let reading = |pose: usize| tumble.poses[pose].gyros[gyro];
+        let readings: Vec<f64> = tumble.poses.iter().map(|pose| pose.gyros[gyro]).collect();
+        let reading = |pose: usize| readings[pose];
         let share = |order: &[usize]| {
             let (seen, unseen) = order.split_at(order.len() / 2);
-            let fit = acceleration::fit(&tumble.poses, &force, gyro, seen).unwrap();
+            let fit = acceleration::fit(&tumble.poses, &force, &readings, seen).unwrap();
             let mean = seen.iter().map(|pose| reading(*pose)).sum::<f64>() / seen.len() as f64;
             let rms = |of: &dyn Fn(usize) -> f64| {
                 Size::of(&unseen.iter().map(|pose| reading(*pose) - of(*pose)).collect::<Vec<_>>()).rms
@@ -208,7 +212,7 @@ pub(crate) fn how(seed: u64) -> Stand {
 
 pub(crate) fn settings() -> Settings {
     let limits = StillLimits { window_s: 1.0, factor: 4.0, rate_deg_per_s: 1.0, least_s: 1.0, settle_s: 0.0 };
-    Settings { gravity: GRAVITY, limits, search: true, start_s: 30.0 }
+    Settings { gravity: GRAVITY, latitude_deg: Some(55.75), limits, search: true, start_s: 30.0 }
 }
 
 #[test]
@@ -325,6 +329,53 @@ fn signs_columns_and_units_of_measure_that_a_good_fit_hides_are_pointed_out() {
     stated.gyro.sensor[1].increment_weight_rad_per_rad = Some(-57.1);
     told.extend(of(&stated, &degrees));
     told.extend(of(&plain, &|tumble| tumble.accel.scale[0] *= 9.8));
+    insta::assert_snapshot!(told.join("\n"));
+}
+
+#[test]
+fn what_stays_in_the_document_is_not_found_once_more() {
+    let run = stand::run("t", tumbled_log(24, 14));
+    let plain = bare(&run.series().unwrap(), AccelOutput::MetresPerSecondSquared).unwrap();
+    let fitted = |base: &Document| {
+        let base = Written::of(base).unwrap();
+        let tumble = analyse(&document::track(&run, &base).unwrap(), &settings()).unwrap();
+        let (document, warnings) = complete(&base.document, &tumble).unwrap();
+        let written = Written::of(&document).unwrap();
+        let left = Left::of(&Track::of(&run, &written.loaded).unwrap(), &tumble, GRAVITY);
+        (tumble, warnings.join("\n"), Size::of(&left.angle_deg).rms)
+    };
+    let (tumble, said, without) = fitted(&plain);
+    assert_eq!(said, "");
+    let flat = |value: f64| Curve::new(Shape::Constant { value });
+    let with = |change: &dyn Fn(&mut GyroSensor)| {
+        let mut base = plain.clone();
+        base.gyro.sensor.iter_mut().for_each(change);
+        let (_, said, left) = fitted(&base);
+        assert!((left / without - 1.0).abs() < 0.02, "{left} {without}: {base:?}");
+        said
+    };
+    let knots = vec![[-500.0, 20_000.0], [500.0, 20_000.0]];
+    let over_rate = Curve::new(Shape::PiecewiseLinear { knots }).over(Argument::DegPerS);
+    let trend = Trend { coefficients_deg_per_h: vec![200.0], interval_h: [0.0, 1.0] };
+    assert_eq!(with(&|gyro| gyro.set(Feature::LasingMode, flat(200.0))), "");
+    assert_eq!(with(&|gyro| gyro.increment_weight_over_rate = Some(over_rate.clone())), "");
+    assert_eq!(with(&|gyro| gyro.trend = Some(trend.clone())), "");
+    // A drift that the poses do not show.
+    let mut told = vec![with(&|gyro| gyro.set(Feature::ForceZ, flat(2000.0)))];
+    let mut base = plain.clone();
+    let slopes_arcsec_per_deg_c = vec![[0.0, 5.0, 0.0]; 3];
+    base.gyro.orientation.thermal = Some(OrientationThermal {
+        channels: Vec::new(),
+        reference_deg_c: 25.0,
+        range_deg_c: [0.0, 50.0],
+        slopes_arcsec_per_deg_c,
+        hysteresis: Vec::new(),
+    });
+    base.accel.as_mut().unwrap().sensor[1].board_ratio_error = Some(flat(1000.0));
+    let (document, warnings) = complete(&base, &tumble).unwrap();
+    let scale = constant(document.accel.unwrap().sensor[1].scale_factor.shape());
+    assert!((scale / tumble.accel.scale[1] - 1.001).abs() < 1e-9, "{scale}");
+    told.extend(warnings);
     insta::assert_snapshot!(told.join("\n"));
 }
 

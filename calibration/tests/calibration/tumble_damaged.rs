@@ -91,20 +91,20 @@ fn times_of(track: &mut Track, ticks: std::ops::Range<usize>, factor: f64) {
 fn poses_that_the_fit_has_not_seen_decide() {
     let (document, tumble) = changed(25, &|_| {});
     let count = tumble.poses.len();
-    let of = |before: f64, after: f64, outside: f64| -> [Verdict; 2] {
-        // Size counts, not the sign.
-        let wave =
-            |size: f64| (0..count).map(|k| if k % 2 == 0 { size } else { -size }).collect::<Vec<f64>>();
-        let left = |size: f64| Left {
+    // Of accelerometers size counts, not the sign.
+    let wave = |size: f64| (0..count).map(|k| if k % 2 == 0 { size } else { -size }).collect::<Vec<f64>>();
+    let with_angle = |before: f64, [after, outside]: [f64; 2], angle_deg: f64| -> [Verdict; 2] {
+        let left = |size: f64, angle_deg: f64| Left {
             length: wave(size),
             direction: vec![[0.0, 0.0, 1.0]; count],
-            angle_deg: vec![0.5; count - 1],
+            angle_deg: vec![angle_deg; count - 1],
             turn_s: vec![1.0; count - 1],
         };
         let tumble = Tumble { held_out: wave(outside), ..tumble.clone() };
-        let report = report(&document, &tumble, &settings(), "t", [&left(before), &left(after)]);
-        report.verdicts.try_into().unwrap()
+        let left = [&left(before, 0.5), &left(after, angle_deg)];
+        report(&document, &tumble, &settings(), "t", left).verdicts.try_into().unwrap()
     };
+    let of = |before, after, outside| with_angle(before, [after, outside], 0.5);
     let words = |[accel, gyro]: &[Verdict; 2]| format!("{}\n{}", accel.words(), gyro.words());
     let good = of(0.9, 1e-3, 1.4e-3);
     assert!(good.iter().all(|verdict| verdict.accepted) && good[0].reason.is_empty(), "{}", words(&good));
@@ -116,6 +116,12 @@ fn poses_that_the_fit_has_not_seen_decide() {
     assert!(worse.iter().all(|verdict| !verdict.accepted), "{}", words(&worse));
     let far = of(0.9, 0.1, 0.3);
     assert!(!far[0].accepted, "{}", words(&far));
-    insta::assert_snapshot!([good, same, as_good, worse, far].map(|verdicts| words(&verdicts)).join("\n\n"));
+    // What the fit leaves is not what its document leaves.
+    let other = of(0.9, 9.8e-3, 1.4e-3);
+    assert!(!other[0].accepted, "{}", words(&other));
+    let turned_away = with_angle(0.9, [1e-3, 1.4e-3], 0.6);
+    assert!(turned_away[0].accepted && !turned_away[1].accepted, "{}", words(&turned_away));
+    let all = [good, same, as_good, worse, far, other, turned_away];
+    insta::assert_snapshot!(all.map(|verdicts| words(&verdicts)).join("\n\n"));
     assert!(!of(0.9, 0.1, f64::NAN)[0].accepted, "no held-out fit at all");
 }

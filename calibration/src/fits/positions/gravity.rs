@@ -19,7 +19,7 @@ pub fn normal(latitude_deg: f64, height_m: f64) -> f64 {
 /// Gravity from what the command line says, and a warning where it says nothing.
 pub fn stated(gravity: Option<f64>, latitude_deg: Option<f64>, height_m: f64) -> (f64, Option<String>) {
     match (gravity, latitude_deg) {
-        (Some(gravity), _) => (gravity, None),
+        (Some(gravity), latitude) => (gravity, latitude.and_then(radians)),
         (None, Some(latitude)) => (normal(latitude, height_m), radians(latitude)),
         (None, None) => {
             let assumed = format!(
@@ -54,6 +54,7 @@ mod tests {
         assert!((normal(90.0, 0.0) - 9.832_184_938).abs() < 1e-6);
         assert!((normal(45.0, 1000.0) - normal(45.0, 0.0) + 3.086e-3).abs() < 1e-9);
         assert_eq!(stated(Some(9.81), None, 0.0), (9.81, None));
+        assert!(stated(Some(9.81), Some(0.97), 0.0).1.is_some());
         assert!(stated(None, None, 0.0).1.is_some());
         insta::assert_snapshot!(stated(None, Some(0.97), 0.0).1.unwrap());
         assert_eq!(stated(None, Some(55.75), 0.0).1, None);

@@ -7,7 +7,7 @@ use isotherm_protocol::document::Document;
 use super::fit::Settings;
 use super::pose::Pose;
 use crate::axes::{each, several};
-use crate::document::accelerometers;
+use crate::document::{accelerometers, board_ratio_at};
 use crate::numbers::{ends, mean, once_each};
 use crate::report::fixed;
 
@@ -164,9 +164,9 @@ pub(super) fn board_ratio(document: &Document, sensor: usize, pose: &Pose) -> f6
     let stated = || {
         let sensor = accelerometers(document).get(sensor)?;
         let t = pose.temperature_deg_c.get(sensor.board_channel.as_ref()?)?;
-        sensor.board_ratio_error.as_ref()?.shape().at(*t)
+        Some(board_ratio_at(sensor, *t))
     };
-    1.0 + stated().unwrap_or(0.0) * 1e-6
+    stated().unwrap_or(1.0)
 }
 
 /// Temperatures that are far enough apart to be several: the number of each one's level, and the levels' means.

@@ -3,6 +3,8 @@
 pub(super) mod doubts;
 pub(super) mod odd;
 
+use isotherm_protocol::document::Document;
+
 use crate::axes::AXES;
 use crate::fits::positions::faults;
 use crate::fits::positions::pose::Pose;
@@ -12,7 +14,7 @@ use crate::numbers::{Size, dot, ends, norm, real, unit};
 use crate::report::{counted, short};
 
 use super::accel::{self, AccelFit, SENSORS};
-use super::acceleration::{self, GyroDrift};
+use super::acceleration::{self, AtRest, mean_over};
 use super::gyro::{self, GyroFit, Transition};
 
 /// Fewest poses for nine parameters; as many as that leave no residual to judge by.
@@ -33,6 +35,8 @@ const LONGEST_TRANSITION_S: f64 = 60.0;
 pub struct Settings {
     /// Gravity (m/s²).
     pub gravity: f64,
+    /// Latitude of the place, for the Earth's rate (°).
+    pub latitude_deg: Option<f64>,
     /// What counts as still; the factor is searched where `search` says so.
     pub limits: StillLimits,
     /// Try several factors and keep the one with the smallest residual.
@@ -52,8 +56,8 @@ pub struct Tumble {
     pub accel: AccelFit,
     /// The gyros, or why not.
     pub gyro: Result<GyroFit, String>,
-    /// Drift with acceleration of each gyro, or why none is stated.
-    pub acceleration: [Result<GyroDrift, String>; 3],
+    /// What each gyro reads at rest; nothing where the gyros were not found.
+    pub at_rest: Vec<AtRest>,
     /// |f| − g (m/s²) of each pose, by the fit of all that are not within 15° of it; no number where these have none.
     pub held_out: Vec<f64>,
     /// Largest distance of each gyro's output from that at rest (rad/s of the log).
@@ -63,12 +67,17 @@ pub struct Tumble {
 }
 
 impl Tumble {
-    /// Mean temperature of a channel over all poses (°C).
-    pub fn mean_temperature(&self, channel: &str) -> Option<f64> {
+    /// Mean temperature of a channel over all poses (°C), or what a document assumes where there is none.
+    pub fn deg_c(&self, document: &Document, channel: Option<&String>) -> f64 {
         let of =
-            |pose: &Pose| Some((pose.temperature_deg_c.get(channel)? * pose.duration_s, pose.duration_s));
+            |pose: &Pose| Some((pose.temperature_deg_c.get(channel?)? * pose.duration_s, pose.duration_s));
         let (sum, time) = self.poses.iter().filter_map(of).fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
-        (time > 0.0).then(|| sum / time)
+        if time > 0.0 { sum / time } else { document.temperature.assumed_deg_c }
+    }
+
+    /// Specific force of each pose along the case axes (m/s²).
+    pub fn force(&self) -> Vec<[f64; 3]> {
+        self.poses.iter().map(|pose| self.accel.force(&pose.outputs)).collect()
     }
 }
 
@@ -113,14 +122,24 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
     }
     warnings.extend(doubts::beyond_noise(track, &poses, &accel));
     warnings.extend(doubts::ends_early(track, &poses));
-    let rest = at_rest(&poses);
-    let gyro = gyros(track, &poses, &accel, rest);
-    let acceleration = acceleration::judged(&poses, &force, |a, b| !apart(&directions, a, b));
+    let rest = [0, 1, 2].map(|gyro| mean_over(&poses, |pose| poses[pose].gyro(gyro)));
+    let gyro = gyros(track, &transitions(&poses, &directions, &directions), rest);
+    let alike = |a, b| !apart(&directions, a, b);
+    let at_rest = |gyro| acceleration::judged(&poses, &force, gyro, settings.latitude_deg, alike);
+    let at_rest = gyro.as_ref().map_or_else(|_| Vec::new(), at_rest);
+    let stated = at_rest.iter().any(|gyro| gyro.drift.is_ok());
+    if stated && settings.latitude_deg.is_none() {
+        warnings.push(format!(
+            "acceleration-sensitive drift: up to {} (°/h)/g of each gyro's may be the Earth's rate, and is corrected \
+             with it: state --latitude",
+            short(acceleration::largest_of_earth())
+        ));
+    }
     let largest_rate = [0, 1, 2].map(|gyro| {
         let away = track.gyros.get(gyro).into_iter().flatten().map(|rate| (rate - rest[gyro]).abs());
         away.filter(|away| away.is_finite()).fold(0.0, f64::max)
     });
-    Ok(Tumble { poses, factor, accel, gyro, acceleration, held_out, largest_rate, warnings })
+    Ok(Tumble { poses, factor, accel, gyro, at_rest, held_out, largest_rate, warnings })
 }
 
 /// Mean outputs of poses.
@@ -129,7 +148,7 @@ fn outputs(poses: &[Pose]) -> Vec<Vec<f64>> {
 }
 
 /// Sensors that cannot be fitted, before anything else.
-fn faults(track: &Track) -> Result<(), Vec<String>> {
+pub(super) fn faults(track: &Track) -> Result<(), Vec<String>> {
     let mut reasons = Vec::new();
     let kinds = [("accelerometer", &track.outputs), ("gyro", &track.gyros)];
     for (kind, columns) in kinds {
@@ -220,21 +239,11 @@ fn apart(directions: &[[f64; 3]], a: usize, b: usize) -> bool {
     dot(directions[a], directions[b]) < libm::cos(ALIKE_RAD)
 }
 
-/// Mean output of each gyro over all poses.
-fn at_rest(poses: &[Pose]) -> [f64; 3] {
-    let total: f64 = poses.iter().map(|pose| pose.duration_s).sum();
-    [0, 1, 2].map(|gyro| {
-        let of = |pose: &Pose| pose.gyro(gyro) * pose.duration_s;
-        poses.iter().map(of).sum::<f64>() / total
-    })
-}
-
 /// Fits the gyros to what lies between the poses.
-fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Result<GyroFit, String> {
+fn gyros(track: &Track, transitions: &[Transition], rest: [f64; 3]) -> Result<GyroFit, String> {
     if track.gyro_counts {
         return Err("the gyro readings are counts: convert them in the mapping".into());
     }
-    let transitions = transitions(poses, |pose| accel.force(&pose.outputs));
     if transitions.len() < 6 {
         return Err(format!(
             "{} of at least {:.0}° within {LONGEST_TRANSITION_S} s between the poses, six are needed: turn the unit about each of its \
@@ -243,24 +252,23 @@ fn gyros(track: &Track, poses: &[Pose], accel: &AccelFit, rest: [f64; 3]) -> Res
             SHORTEST_TURN_RAD.to_degrees()
         ));
     }
-    let fit = gyro::fit(track, rest, &transitions).map_err(|why| doubts::no_gyros(&why))?;
+    let fit = gyro::fit(track, rest, transitions).map_err(|why| doubts::no_gyros(&why))?;
     match doubts::lost(&fit) {
         Some(words) => Err(words),
         None => Ok(fit),
     }
 }
 
-/// Turns between neighbouring poses, by the specific force that each has.
-pub fn transitions(poses: &[Pose], force: impl Fn(&Pose) -> [f64; 3]) -> Vec<Transition> {
-    let direction = |pose: &Pose| unit(force(pose));
-    let between = |pair: &[Pose]| {
-        let [before, after] = pair else { return None };
-        let directions = [direction(before), direction(after)];
-        let cosine = dot(directions[0], directions[1]);
-        let ticks = [before.ticks.end, after.ticks.start];
+/// Turns between neighbouring poses by the direction of specific force that was found of each, with what `directions` has of them.
+pub fn transitions(poses: &[Pose], found: &[[f64; 3]], directions: &[[f64; 3]]) -> Vec<Transition> {
+    let between = |index: usize| {
+        let [before, after] = [&poses[index], &poses[index + 1]];
+        let turned = dot(found[index], found[index + 1]) < libm::cos(SHORTEST_TURN_RAD);
         let length = after.span_s[0] - before.span_s[1];
-        let turned = cosine < libm::cos(SHORTEST_TURN_RAD);
-        (turned && length < LONGEST_TRANSITION_S).then_some(Transition { ticks, directions })
+        (turned && length < LONGEST_TRANSITION_S).then_some(Transition {
+            ticks: [before.ticks.end, after.ticks.start],
+            directions: [directions[index], directions[index + 1]],
+        })
     };
-    poses.windows(2).filter_map(between).collect()
+    (0..poses.len().saturating_sub(1)).filter_map(between).collect()
 }

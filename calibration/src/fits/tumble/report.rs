@@ -7,11 +7,11 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 
 use super::accel::ANGLES;
-use super::acceleration::GyroDrift;
+use super::acceleration::{AtRest, mean_over};
 use super::fit::{Settings, Tumble, transitions};
-use super::gyro::{GyroFit, angle_of};
+use super::gyro::angle_of;
 use crate::axes::AXES;
-use crate::document::{accelerometers, rows, tidy};
+use crate::document::{accelerometers, rows, scale_at, tidy};
 use crate::fits::positions::doubts::LARGEST_LEFT_SHARE;
 use crate::fits::positions::pose::Pose;
 use crate::fits::positions::track::Track;
@@ -35,15 +35,16 @@ pub struct Left {
 }
 
 impl Left {
-    /// Of the same ticks as the poses.
-    pub fn of(track: &Track, poses: &[Pose], gravity: f64) -> Self {
-        let own: Vec<Pose> =
-            poses.iter().map(|pose| Pose::over(track, pose.run, pose.ticks.clone())).collect();
-        let force: Vec<[f64; 3]> = own.iter().map(|pose| pose.force_m_per_s2).collect();
-        let turns = transitions(&own, |pose| pose.force_m_per_s2);
+    /// Of the same ticks as the poses and the turns that were found.
+    pub fn of(track: &Track, tumble: &Tumble, gravity: f64) -> Self {
+        let over = |pose: &Pose| Pose::over(track, pose.run, pose.ticks.clone()).force_m_per_s2;
+        let force: Vec<[f64; 3]> = tumble.poses.iter().map(over).collect();
+        let [found, direction] =
+            [&tumble.force(), &force].map(|force| force.iter().map(|force| unit(*force)).collect::<Vec<_>>());
+        let turns = transitions(&tumble.poses, &found, &direction);
         Self {
             length: force.iter().map(|force| norm(*force) - gravity).collect(),
-            direction: force.iter().map(|force| unit(*force)).collect(),
+            direction,
             angle_deg: turns.iter().map(|turn| angle_of(track, turn).to_degrees()).collect(),
             turn_s: turns
                 .iter()
@@ -64,12 +65,11 @@ pub fn report(
     let title = "Accelerometers and gyros from a tumbled unit";
     let mut report = Report { counted: Some("poses, turns"), ..Report::new(title, &document.unit) };
     let accel = of_accelerometers(tumble, [&before.length, &after.length], settings.gravity);
-    let gyro = Verdict::new("gyros", "°", [Size::of(&before.angle_deg), Size::of(&after.angle_deg)]);
     let refused = |words: &str| Verdict::new("gyros", "°", [Size::default(); 2]).refused(words);
     let gyro = match &tumble.gyro {
         Err(words) => refused(words),
         Ok(_) if !accel.accepted => refused("they are relative to the accelerometers, which are refused"),
-        Ok(_) => gyro.remark(format!("{} between poses", counted(after.angle_deg.len(), "turn", "turns"))),
+        Ok(_) => of_gyros([before, after]),
     };
     report.verdicts.extend([accel, gyro]);
     report.warnings.clone_from(&tumble.warnings);
@@ -100,6 +100,23 @@ pub fn report(
     report
 }
 
+/// What came of the gyros, by the rule of all commands.
+pub fn of_gyros([before, after]: [&Left; 2]) -> Verdict {
+    let angles = [before, after].map(|left| left.angle_deg.clone());
+    let verdict = Verdict::of_values("gyros", "°", angles, None);
+    let turns = counted(after.angle_deg.len(), "turn", "turns");
+    match verdict.reason.as_str() {
+        "" => verdict.remark(format!("{turns} between poses")),
+        _ if verdict.accepted => verdict,
+        why => {
+            let words = format!(
+                "{why} over {turns}: they keep the document's terms; turn the unit more often, about all axes"
+            );
+            verdict.refused(words)
+        }
+    }
+}
+
 /// What came of the accelerometers: held-out poses decide.
 fn of_accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: f64) -> Verdict {
     let sizes = [before, after].map(|values| Size::of(values));
@@ -112,6 +129,13 @@ fn of_accelerometers(tumble: &Tumble, [before, after]: [&Vec<f64>; 2], gravity: 
              same throughout, and was the unit left alone in each pose?",
             short(100.0 * left / gravity),
             100.0 * LARGEST_LEFT_SHARE
+        ));
+    }
+    if sizes[1].rms > LARGEST_GROWTH * left {
+        return verdict.refused(format!(
+            "through the document {} m/s² remain: what it states of board, temperature and time does not go with the log; \
+             check the temperature channels of the mapping, or take these terms out, fit, and fit them again afterwards",
+            short(sizes[1].rms)
         ));
     }
     let change: Vec<f64> = before.iter().zip(after).map(|(before, after)| after - before).collect();
@@ -154,14 +178,16 @@ fn pose_rows(tumble: &Tumble, after: &Left) -> Table {
 }
 
 /// Reading of a gyro at rest without specific force, or its mean over the poses where that is not known (rad/s of the log).
-fn rest(tumble: &Tumble, gyro: &GyroFit, axis: usize) -> f64 {
-    tumble.acceleration[axis].as_ref().map_or(gyro.rest[axis], |drift| drift.response.bias)
+fn rest(tumble: &Tumble, axis: usize) -> f64 {
+    let AtRest { readings, drift } = &tumble.at_rest[axis];
+    let mean = |_: &String| mean_over(&tumble.poses, |pose| readings[pose]);
+    drift.as_ref().map_or_else(mean, |drift| drift.response.bias)
 }
 
 /// Drift of a gyro by the specific force along a case axis and its standard error ((°/h)/g).
 fn deg_per_h_per_g(tumble: &Tumble, gyro: usize, along: usize) -> Option<[f64; 2]> {
     let weight = tumble.gyro.as_ref().ok()?.weight[gyro];
-    let drift = tumble.acceleration[gyro].as_ref().ok()?;
+    let drift = tumble.at_rest[gyro].drift.as_ref().ok()?;
     let per_g = |value: f64| AngularRate::from_rad_per_s(value * STANDARD_GRAVITY_M_PER_S2).as_deg_per_h();
     Some([
         per_g(weight * drift.response.by_force[along]),
@@ -172,7 +198,7 @@ fn deg_per_h_per_g(tumble: &Tumble, gyro: usize, along: usize) -> Option<[f64; 2
 /// What the gyros read at rest, about their mean and with what follows acceleration taken off.
 fn at_rest(tumble: &Tumble) -> Option<String> {
     let gyro = tumble.gyro.as_ref().ok()?;
-    let of = |(axis, drift): (usize, &Result<GyroDrift, String>)| match drift {
+    let of = |(axis, at_rest): (usize, &AtRest)| match &at_rest.drift {
         Ok(drift) => {
             let [before, after] = drift.sizes.map(|size| {
                 fixed(AngularRate::from_rad_per_s(gyro.weight[axis].abs() * size.rms).as_deg_per_h(), 1)
@@ -181,19 +207,23 @@ fn at_rest(tumble: &Tumble) -> Option<String> {
         }
         Err(why) => format!("{} has no acceleration-sensitive drift stated: {why}", AXES[axis]),
     };
-    let gyros = tumble.acceleration.iter().enumerate().map(of).collect::<Vec<_>>();
+    let gyros = tumble.at_rest.iter().enumerate().map(of).collect::<Vec<_>>();
     Some(format!("Gyros at rest, in unseen poses: {}.", gyros.join("; ")))
 }
 
 fn coefficients(document: &Document, tumble: &Tumble, report: &mut Report) {
     let accel = &tumble.accel;
+    let sensors = accelerometers(document);
     let output = match output_unit(document) {
         "V" => "V or raw",
         other => other,
     };
     for (axis, name) in AXES.iter().enumerate() {
         let of = |what: &str| format!("accelerometer {name} {what}");
-        let per_output = 1.0 / accel.scale[axis];
+        // With the ratio of the board, as the document has it.
+        let stated =
+            sensors.get(axis).map(|sensor| scale_at(sensor, tumble.deg_c(document, sensor.channel.as_ref())));
+        let per_output = 1.0 / stated.unwrap_or(accel.scale[axis]);
         let unit = format!("m/s² per {output}");
         report.coefficient(of("1/K"), unit, per_output, per_output.abs() * accel.sigma[axis]);
         report.coefficient(of("S"), output, accel.bias[axis], accel.sigma[3 + axis]);
@@ -215,7 +245,7 @@ fn coefficients(document: &Document, tumble: &Tumble, report: &mut Report) {
     for (axis, name) in AXES.iter().enumerate() {
         let of_log = "rad/s per rad/s of the log";
         report.coefficient(format!("gyro {name} K"), of_log, gyro.weight[axis], gyro.sigma[axis]);
-        let rest = (gyro.weight[axis] * rest(tumble, gyro, axis)).to_degrees();
+        let rest = (gyro.weight[axis] * rest(tumble, axis)).to_degrees();
         report.coefficient(format!("gyro {name} at rest"), "°/s", rest, None);
         for (along, name_of_axis) in AXES.iter().enumerate() {
             if let Some([value, sigma]) = deg_per_h_per_g(tumble, axis, along) {
@@ -234,6 +264,7 @@ fn coefficients(document: &Document, tumble: &Tumble, report: &mut Report) {
 pub fn details(tumble: &Tumble, settings: &Settings) -> Value {
     json!({
         "gravity_m_per_s2": settings.gravity,
+        "latitude_deg": settings.latitude_deg,
         "poses": tumble.poses.len(),
         "stillness_factor": tumble.factor,
         "window_s": settings.limits.window_s,
