@@ -214,6 +214,8 @@ mod tests {
         // Without the latitude what is vertical cannot be told from it.
         let with_earth = of(50.0, None).unwrap();
         assert!((with_earth - 50.0 - 15.04 * libm::sin(55.75_f64.to_radians())).abs() < 0.5, "{with_earth}");
-        insta::assert_snapshot!([of(0.0, Some(55.75)), of(0.0, None)].map(Result::unwrap_err).join("\n"));
+        insta::assert_snapshot!(
+            [of(0.0, Some(55.75)), of(14.0, Some(55.75)), of(0.0, None)].map(Result::unwrap_err).join("\n")
+        );
     }
 }
