@@ -89,6 +89,9 @@ impl Worker {
     /// Has a unit begin anew with what is written down of it.
     pub(super) fn plan_again(&mut self, unit: &UnitId, record: Record) {
         let plan = record.plan.clone();
+        for (_, words) in record.problems() {
+            tracing::error!(%unit, "{words}");
+        }
         self.records.insert(unit.clone(), record);
         self.intake.plan_again(unit, plan);
     }

@@ -222,6 +222,7 @@ impl Worker {
         if !is_overlay {
             record.untrusted = None;
         }
+        record.skipped = None;
         record.accepted += u64::from(!first);
         self.accepted += u64::from(!first);
         let account = record.account();

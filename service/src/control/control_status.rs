@@ -13,6 +13,10 @@ use super::manager::Worker;
 
 /// Kind of the fault of a state folder that cannot be written.
 pub(crate) const STATE_FOLDER: &str = "state_folder";
+/// Kind of the fault of units whose calibration that was accepted last could not be put in force again.
+pub(crate) const OLDER: &str = "older_calibration";
+/// Kind of the fault of units whose calibration would be refused today.
+pub(crate) const UNTRUSTED: &str = "untrusted_calibration";
 /// Kind of the fault of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";
 
@@ -74,6 +78,10 @@ impl Worker {
         if let Some((_, words)) = self.losses.first() {
             add("audit_file", self.losses.len(), words.clone());
         }
+        let skipped = self.records.iter().filter_map(|(unit, record)| Some((unit, record.skipped.as_ref()?)));
+        if let Some((unit, first)) = skipped.clone().next() {
+            add(OLDER, skipped.count(), format!("unit {unit}: {}", first.words));
+        }
         let untrusted = self.records.iter().filter(|(_, record)| record.untrusted.is_some());
         let untrusted: Vec<_> = untrusted.map(|(unit, _)| unit.as_str()).collect();
         if !untrusted.is_empty() {
@@ -81,7 +89,7 @@ impl Worker {
                 "restored without a signature that is now trusted: {}; `isotherm status UNIT` says what to do",
                 few(&untrusted)
             );
-            add("untrusted_calibration", untrusted.len(), words);
+            add(UNTRUSTED, untrusted.len(), words);
         }
         let unwritten = self.folder.unwritten();
         if let Some(first) = unwritten.first() {

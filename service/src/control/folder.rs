@@ -231,7 +231,10 @@ impl Worker {
         let digest = read.digest;
         let active = |unit: &UnitId| self.records.get(unit).and_then(|record| record.last());
         let said = valid.as_ref().filter(|unit| active(unit).is_some());
-        if let Some(unit) = said.filter(|unit| self.store.said_by_folder(unit) == Some(digest)) {
+        // What it led to may not be in force: its copy in the state folder was damaged.
+        let is_lacking = |unit: &UnitId| self.records.get(unit).is_some_and(|record| record.lacks(&digest));
+        let said = said.filter(|unit| self.store.said_by_folder(unit) == Some(digest));
+        if let Some(unit) = said.filter(|unit| !is_lacking(unit)) {
             if !at_start {
                 tracing::info!(%unit, "{name} has the same content as before: the calibration in force stays");
             }

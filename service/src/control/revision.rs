@@ -18,6 +18,7 @@ use isotherm_protocol::stream::Label;
 
 use super::change::Change;
 use super::command::PreLaunchRun;
+use super::control_status::{OLDER, UNTRUSTED};
 use super::document::Document;
 use crate::receive::unit::SwapAccount;
 
@@ -145,6 +146,17 @@ pub(super) struct Record {
     pub(super) overlay: Option<Digest>,
     /// Why what was put in force again at the start would be refused today, for want of a signature.
     pub(super) untrusted: Option<String>,
+    /// Sets that were accepted last and could not be put in force again.
+    pub(super) skipped: Option<Skipped>,
+}
+
+/// Sets that could not be put in force again.
+#[derive(Debug, Clone)]
+pub(super) struct Skipped {
+    /// SHA-256 of their documents.
+    pub(super) digests: Vec<Digest>,
+    /// Why, what is in force in their place, and what to do.
+    pub(super) words: String,
 }
 
 impl Record {
@@ -165,10 +177,21 @@ impl Record {
         self.plan.current.as_ref().filter(|_| waits).or(Some(last))
     }
 
+    /// Whether this document was accepted last and could not be put in force again.
+    pub(super) fn lacks(&self, digest: &Digest) -> bool {
+        self.skipped.as_ref().is_some_and(|skipped| skipped.digests.contains(digest))
+    }
+
+    /// What is wrong with what was put in force again, until something else is accepted: kinds of faults, with words.
+    pub(super) fn problems(&self) -> Vec<(&'static str, String)> {
+        let skipped = self.skipped.iter().map(|skipped| (OLDER, skipped.words.clone()));
+        skipped.chain(self.untrusted.iter().map(|words| (UNTRUSTED, words.clone()))).collect()
+    }
+
     /// What the unit's status says of its swaps.
     pub(super) fn account(&self) -> SwapAccount {
         let (accepted, refused) = (self.accepted, self.refused);
         let swaps = Swaps { accepted, refused, last_refusal: self.last_refusal.clone() };
-        SwapAccount { swaps, overlay: self.overlay, problem: self.untrusted.clone() }
+        SwapAccount { swaps, overlay: self.overlay, problems: self.problems() }
     }
 }

@@ -1,19 +1,23 @@
 //! What holds when the service starts: the last good sets of the state folder, then what has become of the documents since.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
 use isotherm_correction::units::Span;
 use isotherm_document::few;
 use isotherm_protocol::control::Schedule;
-use isotherm_protocol::history::Intent;
+use isotherm_protocol::digest::Digest;
+use isotherm_protocol::document::Problem;
+use isotherm_protocol::history::{GoodSet, Intent};
 use isotherm_protocol::key::UnitId;
 
 use super::change::Change;
 use super::document::Document;
 use super::file::read_all;
 use super::manager::Worker;
-use super::revision::{Calibrations, Record, Revision};
+use super::revision::{Calibrations, Record, Revision, Skipped};
+use super::store::instead;
 use crate::control::watch::{Known, files_in};
 use crate::signing::check_signature;
 
@@ -28,18 +32,51 @@ impl Worker {
     /// Puts the last good set of every unit of the state folder in force again, under its old revision.
     pub(crate) fn restore(&mut self) {
         let units: Vec<_> = self.store.units().cloned().collect();
-        for unit in units {
-            let record = self.restored(&unit);
-            if let Some(last) = record.last() {
-                tracing::info!(%unit, revision = last.number.counter, "last good calibration restored");
+        let restored = units.into_iter().map(|unit| (self.restored(&unit), unit));
+        let mut restored: Vec<_> = restored.collect();
+        let skipped = restored.iter().filter_map(|(record, _)| record.skipped.as_ref());
+        let lacking: BTreeSet<_> = skipped.flat_map(|skipped| skipped.digests.iter().copied()).collect();
+        if self.fetch_from_folder(&lacking) {
+            let damaged = restored.iter_mut().filter(|(record, _)| record.skipped.is_some());
+            damaged.for_each(|(record, unit)| *record = self.restored(unit));
+        }
+        for (record, unit) in restored {
+            if let Some(current) = &record.plan.current {
+                tracing::info!(%unit, revision = current.number.counter, "last good calibration restored");
+            }
+            if let Some((revision, at)) = record.plan.waiting() {
+                tracing::info!(%unit, revision, ?at, "accepted calibration restored, it waits for its tick");
             }
             self.plan_again(&unit, record);
         }
     }
 
+    /// Writes documents that are damaged in the state folder anew, as far as the folder of calibrations has them; whether it had any.
+    fn fetch_from_folder(&mut self, lacking: &BTreeSet<Digest>) -> bool {
+        let Some(folder) = self.folder.path.as_ref().filter(|_| !lacking.is_empty()) else { return false };
+        // Where it cannot be read, that is told when it is read for its own sake.
+        let files = files_in(folder, "toml").unwrap_or_default();
+        let read = read_all(&files).into_iter().filter_map(|(file, read)| Some((file, read.ok()?)));
+        let mut found = false;
+        for (file, read) in read.filter(|(_, read)| lacking.contains(&read.digest)) {
+            match self.store.put_document(&read.bytes()) {
+                Ok(digest) => {
+                    found = true;
+                    tracing::warn!(
+                        "document {digest} of the state folder is damaged: restored from {}",
+                        file.display()
+                    );
+                }
+                Err(error) => tracing::error!("a damaged document cannot be written anew: {error}"),
+            }
+        }
+        found
+    }
+
     /// What the state folder says of a unit.
     pub(super) fn restored(&self, unit: &UnitId) -> Record {
         let mut record = Record::default();
+        let mut skipped: Vec<(&GoodSet, Vec<Problem>)> = Vec::new();
         let orders = self.store.intent(unit).into_iter().flat_map(Intent::orders);
         // What was carried out once is understood.
         record.plan.intent = orders.filter_map(|order| self.core_command(&order).ok()).collect();
@@ -47,14 +84,12 @@ impl Worker {
             let document = match Document::stored(&self.store, set) {
                 Ok(document) => Arc::new(document),
                 Err(problems) => {
-                    for problem in problems {
-                        tracing::error!(%unit, revision = set.revision, "cannot be put in force again: {problem}");
-                    }
+                    skipped.push((set, problems));
                     continue;
                 }
             };
             if record.last().is_none() {
-                record.untrusted = self.distrust(unit, set.revision, &document);
+                record.untrusted = self.distrust(set.revision, &document);
             }
             let next = Arc::new(Revision::new(set.revision, document, &set.source));
             // One that still waited for its tick goes on waiting, over the one before.
@@ -66,6 +101,15 @@ impl Worker {
                 break;
             }
         }
+        record.skipped = skipped.first().map(|(_, problems)| Skipped {
+            digests: skipped.iter().map(|(set, _)| set.digest).collect(),
+            words: format!(
+                "revision {} cannot be put in force again: {}; {}; put the newer document in force with `isotherm swap`",
+                few(skipped.iter().map(|(set, _)| set.revision.to_string())),
+                problems.first().map(ToString::to_string).unwrap_or_default(),
+                instead(record.plan.current.as_ref().map(|current| current.number.counter)),
+            ),
+        });
         record
     }
 
@@ -121,7 +165,7 @@ impl Worker {
 
     /// Why a calibration that is put in force again would be refused today for want of a signature, where signatures are
     /// asked for. It is put in force all the same: a unit does not lose its calibration by a key that was taken away.
-    fn distrust(&self, unit: &UnitId, revision: u64, document: &Document) -> Option<String> {
+    fn distrust(&self, revision: u64, document: &Document) -> Option<String> {
         if !self.swap.require_signature {
             return None;
         }
@@ -130,18 +174,17 @@ impl Worker {
         let (mut problems, mut warnings) = (Vec::new(), Vec::new());
         check_signature(&self.swap, &signed, &name, &mut problems, &mut warnings);
         let first = problems.first()?;
-        let words = format!(
+        Some(format!(
             "revision {revision} is restored, but would be refused now: {}; it stays in force until you swap to a \
              document signed by a trusted key (`isotherm swap`)",
             first.message
-        );
-        tracing::error!(%unit, revision, "{words}");
-        Some(words)
+        ))
     }
 
     /// Warns of units whose document has gone from the folder.
     fn miss_documents(&self) {
-        for (unit, record) in &self.records {
+        // What could not be put in force again is told by itself.
+        for (unit, record) in self.records.iter().filter(|(_, record)| record.skipped.is_none()) {
             let set = self.store.last_good(unit).filter(|set| !self.folder.holds(&set.digest));
             let file = set.and_then(|set| set.source.file()).filter(|file| !Path::new(file).exists());
             if let (Some(file), Some(last)) = (file, record.last()) {

@@ -27,7 +27,8 @@ mod trial;
 mod verify;
 
 pub use error::StoreError;
-pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn};
+pub(crate) use opened::instead;
+pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn, Unmarked};
 pub use verify::{Break, Lost, Verification, verify};
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

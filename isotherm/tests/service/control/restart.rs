@@ -5,6 +5,7 @@ use std::os::unix::fs::symlink;
 use isotherm_bus::open;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_protocol::control::{Schedule, SwapOptions};
+use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEvent, Source};
 use isotherm_protocol::status::State;
 use isotherm_service::{ServiceError, Settings};
@@ -89,7 +90,41 @@ async fn a_damaged_document_of_the_state_folder_is_told_and_the_one_before_taken
     std::fs::write(file, document(UNIT, 9.0)).unwrap();
     let mut stand = Stand::start(folders.settings()).await;
     assert_eq!(stand.revisions(UNIT, 20).await, [1]);
+    let status = until_service(&stand, |status| told(status, "older_calibration").is_some()).await;
+    let words = told(&status, "older_calibration").unwrap();
+    let parts = [UNIT, "revision 2", &reply.digest, "older revision 1", "isotherm swap"];
+    assert!(parts.iter().all(|part| words.contains(part)), "{words}");
     assert_accepted(&stand.swap(UNIT, &document(UNIT, 3.0), &plain()).await, 3);
+    until_service(&stand, |status| told(status, "older_calibration").is_none()).await;
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_document_of_the_state_folder_is_taken_from_the_folder_of_calibrations() {
+    let folders = Folders::new();
+    folders.put("a.toml", &document(UNIT, 1.0));
+    let stand = Stand::start(folders.settings()).await;
+    folders.put("a.toml", &document(UNIT, 2.0));
+    stand.until_accepted(UNIT, 2).await;
+    stand.stop().await;
+    let kept = Digest::of(document(UNIT, 2.0).as_bytes());
+    let kept = folders.state.join("documents").join(format!("{kept}.toml"));
+    std::fs::remove_file(&kept).unwrap();
+    let mut stand = Stand::start(folders.settings()).await;
+    assert_eq!(stand.revisions(UNIT, 20).await, [2], "under its old revision");
+    assert_eq!(told(&until_service(&stand, |_| true).await, "older_calibration"), None);
+    stand.stop().await;
+
+    // It comes back to the folder of calibrations only later: as a swap, then.
+    std::fs::write(&kept, "").unwrap();
+    let file = folders.documents.join("a.toml");
+    std::fs::remove_file(&file).unwrap();
+    let mut stand = Stand::start(folders.settings()).await;
+    assert_eq!(stand.revisions(UNIT, 20).await, [1]);
+    folders.put("a.toml", &document(UNIT, 2.0));
+    stand.until_accepted(UNIT, 3).await;
+    assert_eq!(stand.revisions(UNIT, 20).await, [3]);
+    until_service(&stand, |status| told(status, "older_calibration").is_none()).await;
     stand.stop().await;
 }
 

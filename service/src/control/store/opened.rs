@@ -165,7 +165,7 @@ impl Opened {
 }
 
 /// What is in force in the place of a revision that is lost.
-fn instead(older: Option<u64>) -> String {
+pub(crate) fn instead(older: Option<u64>) -> String {
     older.map_or_else(
         || "there is no older one to put in force".to_owned(),
         |older| format!("the older revision {older} is in force instead"),

@@ -25,6 +25,8 @@ pub(super) enum Kind {
     StateFolder,
     /// A document of the folder is good, and could not be written down.
     UnwrittenDocument,
+    /// A unit has an older calibration than was accepted last, or none: that one is damaged.
+    OlderCalibration,
     /// The service is not at work yet.
     Starting,
     /// The service is about to end.

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
 use crate::config::Settings;
-use crate::control::{ControlStatus, STATE_FOLDER, UNWRITTEN};
+use crate::control::{ControlStatus, OLDER, STATE_FOLDER, UNWRITTEN};
 use crate::observe::subscribers::Subscribers;
 use crate::pair::Pair;
 use crate::receive::fault::of_kind;
@@ -202,7 +202,11 @@ impl Source {
         let of_service = |kind, words: &str| Reason { kind, unit: None, words: words.to_owned() };
         let stopping = stopping.then(|| of_service(Kind::Stopping, STOPPING));
         let posted = self.control_status.read();
-        let standing = [(STATE_FOLDER, Kind::StateFolder), (UNWRITTEN, Kind::UnwrittenDocument)];
+        let standing = [
+            (STATE_FOLDER, Kind::StateFolder),
+            (UNWRITTEN, Kind::UnwrittenDocument),
+            (OLDER, Kind::OlderCalibration),
+        ];
         let standing = standing
             .into_iter()
             .filter_map(|(told, kind)| Some(of_service(kind, &of_kind(&posted.faults, told)?.first)));

@@ -18,8 +18,8 @@ pub(crate) struct SwapAccount {
     pub(crate) swaps: Swaps,
     /// Overlay that the last pre-launch calibration was stored as.
     pub(crate) overlay: Option<Digest>,
-    /// What is wrong with the calibration in force, in words; `None` where nothing is.
-    pub(crate) problem: Option<String>,
+    /// What is wrong with the calibration in force: kinds of faults, with words.
+    pub(crate) problems: Vec<(&'static str, String)>,
 }
 
 /// What a counter has counted; 0 where it is not there.
@@ -81,10 +81,9 @@ impl UnitActor {
         });
         status.counters = self.counters();
         status.counters.extend(self.faults.counters());
-        let problem = self.account.problem.as_ref();
-        let untrusted = problem.map(|problem| standing("untrusted_calibration", 1, problem.clone()));
+        let problems = self.account.problems.iter().map(|(kind, words)| standing(kind, 1, words.clone()));
         let unknown = self.unknown_channels.fault(self.stream.unit(), Instant::now());
-        for fault in untrusted.into_iter().chain(unknown) {
+        for fault in problems.chain(unknown) {
             status.faults.truncate(MAX_FAULTS - 1);
             status.faults.push(fault);
         }
