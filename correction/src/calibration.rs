@@ -35,7 +35,7 @@ use crate::lanes::Lanes;
 use crate::operation::SelfTestParts;
 use crate::orientation::Orientation;
 use crate::reversal::Reversal;
-use crate::sample::OutputKind;
+use crate::sample::{ChannelName, OutputKind};
 use crate::sigma::SigmaModel;
 use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
 
@@ -137,6 +137,20 @@ impl Calibration {
     #[must_use]
     pub fn channels(&self) -> &[Channel] {
         self.channels.get(..self.temperatures).unwrap_or_default()
+    }
+
+    /// The channel of a name, of either kind.
+    #[must_use]
+    pub fn channel(&self, name: &ChannelName) -> Option<&Channel> {
+        self.channels.iter().find(|channel| channel.name() == name)
+    }
+
+    /// Place, among those of the set before this one, of the channel whose memory a channel of this set goes on with: one of the
+    /// same definition, filtered in the same way. `None` where there is none, and the channel starts anew.
+    #[must_use]
+    pub fn goes_on_from(&self, before: &Self, channel: &Channel) -> Option<usize> {
+        let is_same = |other: &Channel| before.filter == self.filter && other == channel;
+        before.channels.iter().position(is_same)
     }
 
     /// Place of a channel among all.

@@ -163,6 +163,9 @@ pub struct ChannelMemory {
     last: Option<(Timestamp, f64)>,
     /// Whether there was a reading ever, in this series or in one before.
     seen: bool,
+    /// Last reading that was taken, as it came; of a channel that never took one, the last of all. No result rests on it.
+    #[serde(skip)]
+    raw: Option<f64>,
     rejected: bool,
     points_since_restart: usize,
     grid: VecDeque<f64>,
@@ -189,6 +192,13 @@ impl ChannelMemory {
     #[must_use]
     pub fn state(&self) -> Option<ThermalState> {
         self.seen.then_some(self.state)
+    }
+
+    /// The last reading that was taken, as it came; of a channel that never took one, the last of all. `None` before the first,
+    /// and where the memory was taken over from a snapshot.
+    #[must_use]
+    pub fn raw(&self) -> Option<f64> {
+        self.raw
     }
 
     /// Whether the derivatives still rest on the assumption that nothing moved before the first reading.
@@ -232,11 +242,14 @@ impl ChannelMemory {
             return Verdict::OutOfOrder;
         }
         let temperature = channel.convert(raw);
-        if !self.admit(channel, temperature) {
-            self.rejected = true;
+        let admitted = self.admit(channel, temperature);
+        if admitted || !self.seen {
+            self.raw = Some(raw);
+        }
+        self.rejected = !admitted;
+        if self.rejected {
             return Verdict::Rejected;
         }
-        self.rejected = false;
         self.seen = true;
 
         let step = filter.grid_step.as_ns();

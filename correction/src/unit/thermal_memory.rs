@@ -26,6 +26,8 @@ pub struct ChannelReport {
     pub name: ChannelName,
     /// Smoothed temperature and derivatives; `None` before the first reading.
     pub state: Option<ThermalState>,
+    /// [`ChannelMemory::raw`].
+    pub raw: Option<f64>,
     /// Missing, rejected or older than its limit.
     pub stale: bool,
     /// Derivatives do not rest on readings alone yet.
@@ -106,9 +108,8 @@ impl ThermalMemory {
     ) -> Self {
         let filter = &calibration.filter;
         let channels = calibration.channels.iter().map(|channel| {
-            let kept = before.filter(|(old, _)| old.filter == *filter).and_then(|(old, memory)| {
-                let index = old.channels.iter().position(|c| c == channel)?;
-                memory.channels.get(index).cloned()
+            let kept = before.and_then(|(old, memory)| {
+                memory.channels.get(calibration.goes_on_from(old, channel)?).cloned()
             });
             kept.unwrap_or_else(|| ChannelMemory::new(filter))
         });
@@ -390,6 +391,7 @@ impl ThermalMemory {
         calibration.channels.iter().zip(&self.channels).map(move |(channel, memory)| ChannelReport {
             name: *channel.name(),
             state: memory.state(),
+            raw: memory.raw(),
             stale: memory.stale(&calibration.filter, time),
             warming_up: memory.warming_up(&calibration.filter),
         })

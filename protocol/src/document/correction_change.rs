@@ -1,39 +1,30 @@
 //! What differs between the corrections of two documents at one thermal state.
 
-use isotherm_correction::calibration::{Calibration, Steady};
-use isotherm_correction::channel::ThermalState;
-use isotherm_correction::sample::{ChannelName, LasingMode};
+use isotherm_correction::calibration::Steady;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
 
 use super::measure::ARCSEC;
 use super::types::{Document, GyroOutput};
 use crate::control::CorrectionChange;
 
-/// A document with its calibration: one side of a comparison.
+/// A document with what its calibration does to the unit: one side of a comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct Side<'a> {
     /// What stands in the document.
     pub document: &'a Document,
-    /// What was made of it.
-    pub calibration: &'a Calibration,
+    /// What was made of it, at the temperatures and in the lasing mode of the unit.
+    pub steady: &'a Steady,
 }
 
-/// What the correction does under either document at the temperatures that `thermal` gives by the channel's name, and in
-/// a lasing mode: only what differs.
+/// What the correction does under either document: only what differs.
 ///
 /// Per sensor: bias (°/h, mg), weight (″/count or rad/rad) or scale factor with its board, and by how much the input axis
 /// turns (″, `before` being zero). Then, in case axes, the rate and the specific force that the biases take away. Sensors
 /// are matched by name; one that only one document has is left out: [`super::difference`] tells it. See
 /// [`isotherm_correction::calibration::Steady`] for what the state leaves out.
 #[must_use]
-pub fn correction_change(
-    before: Side<'_>,
-    after: Side<'_>,
-    thermal: impl Fn(&ChannelName) -> Option<ThermalState>,
-    mode: Option<LasingMode>,
-) -> Vec<CorrectionChange> {
-    let [old, new] =
-        [before, after].map(|side| stated(side.document, &side.calibration.steady(&thermal, mode)));
+pub fn correction_change(before: Side<'_>, after: Side<'_>) -> Vec<CorrectionChange> {
+    let [old, new] = [before, after].map(|side| stated(side.document, side.steady));
     let mut changes = Vec::new();
     for (quantity, unit, now) in new {
         let Some((.., then)) = old.iter().find(|(of, in_unit, _)| *of == quantity && *in_unit == unit) else {

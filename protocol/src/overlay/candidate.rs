@@ -4,7 +4,7 @@ use isotherm_correction::calibration::Calibration;
 
 use super::{Overlay, ParsedOverlay, is_overlay};
 use crate::digest::Digest;
-use crate::document::{Document, Parsed, Problem, Side};
+use crate::document::{Document, Parsed, Problem};
 use isotherm_document::unplaced;
 
 /// A calibration that holds, with the text that it is known by.
@@ -77,11 +77,5 @@ impl Candidate {
     ) -> Self {
         let Parsed { document, calibration, digest, .. } = parsed;
         Self { document, calibration, text, digest, base_digest, overlay, warnings }
-    }
-
-    /// The candidate as one side of a comparison.
-    #[must_use]
-    pub fn side(&self) -> Side<'_> {
-        Side { document: &self.document, calibration: &self.calibration }
     }
 }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use isotherm_correction::calibration::Calibration;
+use isotherm_correction::calibration::{Calibration, Steady};
 use isotherm_correction::operation::State;
-use isotherm_document::{file, parse_toml, unplaced};
+use isotherm_document::{few, file, parse_toml, unplaced};
 use isotherm_protocol::control::{Difference, DocumentChange};
 use isotherm_protocol::document::{self, CURRENT_SCHEMA, Problem, Side};
 use isotherm_protocol::history::WallTime;
@@ -19,7 +19,7 @@ use super::request::Request;
 use super::revision::{Record, Revision};
 use super::unlikely::unlikely;
 use crate::config::{Severity, SwapSettings};
-use crate::receive::unit::Present;
+use crate::receive::unit::{Present, StartsAnew};
 use crate::signing::check_signature;
 
 /// Seconds of a day.
@@ -98,10 +98,11 @@ impl Worker {
         let present = self.intake.present(&unit);
         warnings.extend(present.as_ref().and_then(|present| interrupts(request, present.state)));
         let active: Option<&Revision> = self.in_force(&unit).map(|active| &**active);
-        let compared = active.and_then(|active| compare(active, &document, present.as_ref()));
+        let outlook = Outlook::new(active, &document, present.as_ref());
+        let compared = active.and_then(|active| compare(active, &document, &outlook));
         let (difference, lost) = compared.map_or((None, Vec::new()), |(found, lost)| (Some(found), lost));
         let changes = difference.as_ref().map_or(&[][..], |difference| &difference.document);
-        let found = doubts(&self.swap, &document, active, (present.as_ref(), changes), SystemTime::now());
+        let found = doubts(&self.swap, &document, active, (&outlook, changes), SystemTime::now());
         for doubt in found.into_iter().chain(loss(&lost)) {
             let lenient = request.is_own() || request.options.force;
             let problem = document::problem_at(text, &request.name, &doubt.key, doubt.message(lenient));
@@ -146,22 +147,59 @@ fn read_document(
     Ok(Document::of(candidate, base.as_deref(), bytes))
 }
 
+/// A unit under what is in force, and under a document.
+struct Outlook<'a> {
+    /// The unit as it is; `None` where it has not appeared.
+    present: Option<&'a Present>,
+    /// The unit under the document, once every channel was read again.
+    next: Option<Present>,
+    /// Channels that start anew with it.
+    anew: Vec<StartsAnew>,
+    /// The corrections now and then; `None` where nothing is in force.
+    steady: Option<[Steady; 2]>,
+}
+
+impl<'a> Outlook<'a> {
+    fn new(active: Option<&Revision>, found: &Document, present: Option<&'a Present>) -> Self {
+        let before = active.map(|active| &*active.document.calibration);
+        let under = present.map(|present| match before {
+            Some(before) => present.under(before, &found.calibration),
+            None => (present.clone(), Vec::new()),
+        });
+        let (next, anew) = under.unzip();
+        let steady =
+            before.map(|before| [steady(present, before), steady(next.as_ref(), &found.calibration)]);
+        Self { present, next, anew: anew.unwrap_or_default(), steady }
+    }
+
+    /// Whether no temperature of the unit is known, so that it corrects at the assumed one.
+    fn is_assumed(&self) -> bool {
+        self.present.is_none_or(|present| present.words().is_empty())
+    }
+
+    /// The names of the channels that start anew.
+    fn names(&self) -> String {
+        few(self.anew.iter().map(|anew| anew.name.to_string()))
+    }
+}
+
+/// The correction of a unit, at the assumed temperature where it has not appeared.
+fn steady(present: Option<&Present>, calibration: &Calibration) -> Steady {
+    present.map_or_else(|| calibration.steady(|_| None, None), |present| present.steady(calibration))
+}
+
 /// The difference between what is in force and a document, in the document and in the correction, and the sections that the
 /// document does not have any more; `None` where the former never was a document.
 ///
 /// Temperatures and mode are those of the unit; of one that has not appeared the correction is not compared.
-fn compare(
-    active: &Revision,
-    found: &Document,
-    present: Option<&Present>,
-) -> Option<(Difference, Vec<String>)> {
+fn compare(active: &Revision, found: &Document, outlook: &Outlook<'_>) -> Option<(Difference, Vec<String>)> {
     let (old, new) = (active.document.content()?, found.content()?);
     let document = document::difference(&old, &new);
-    let before = Side { document: &old, calibration: &active.document.calibration };
-    let after = Side { document: &new, calibration: &found.calibration };
-    let (correction, temperatures) = present.map_or_else(Default::default, |present| {
-        let thermal = |name: &_| present.thermal(name);
-        (document::correction_change(before, after, thermal, present.mode), present.words())
+    let both = outlook.present.zip(outlook.steady.as_ref());
+    let (correction, temperatures) = both.map_or_else(Default::default, |(present, [now, then])| {
+        let before = Side { document: &old, steady: now };
+        let after = Side { document: &new, steady: then };
+        (document::correction_change(before, after), present.words())
     });
     Some((Difference { document, correction, temperatures }, document::lost_sections(&old, &new)))
 }
@@ -220,7 +258,7 @@ fn doubts(
     settings: &SwapSettings,
     candidate: &Document,
     active: Option<&Revision>,
-    (present, changes): (Option<&Present>, &[DocumentChange]),
+    (outlook, changes): (&Outlook<'_>, &[DocumentChange]),
     now: SystemTime,
 ) -> Vec<Doubt> {
     let mut doubts = Vec::new();
@@ -234,18 +272,65 @@ fn doubts(
     }
     doubts.extend(active.and_then(|active| stream(candidate, active)));
     doubts.extend(active.and_then(|active| downgrade(settings, candidate, active)));
-    // A unit of which no temperature is known is at the assumed one, as it corrects then.
-    let thermal = |name: &_| present?.thermal(name);
-    let steady = |of: &Calibration| of.steady(thermal, present.and_then(|present| present.mode));
-    let both =
-        active.map(|active| [&active.document.calibration, &candidate.calibration].map(|of| steady(of)));
+    let both = &outlook.steady;
     doubts.extend(both.iter().flat_map(unlikely).map(|words| Doubt::new("", Severity::Warn, "", words)));
-    if let Some(present) = present {
-        doubts.extend(range(settings, candidate, present));
+    doubts.extend(anew(outlook));
+    if let Some(next) = &outlook.next {
+        doubts.extend(range(settings, candidate, next));
     }
-    let jumps = both.iter().flat_map(|both| jump(settings, candidate, both, changes, present));
+    let jumps = both.iter().flat_map(|both| jumps(settings, candidate, both, (outlook, changes)));
     doubts.extend(jumps.map(|(key, words)| Doubt::new(&key, settings.jump, "jump", words)));
     doubts
+}
+
+/// Channels that start anew, and those of them that would reject what the unit reads now.
+fn anew(outlook: &Outlook<'_>) -> Vec<Doubt> {
+    let rejects = outlook.anew.iter().filter_map(|anew| {
+        // Nothing is lost where nothing was taken before either.
+        let severity = if anew.was.is_some() { Severity::Refuse } else { Severity::Warn };
+        Some(Doubt::new("", severity, "", anew.rejects()?))
+    });
+    let words = few(outlook.anew.iter().map(StartsAnew::words));
+    let told = (!outlook.anew.is_empty()).then(|| {
+        let words = format!(
+            "starts channels anew, as their definition or the filter changes: {words}; each is at the \
+             assumed temperature until its next reading and warms up again"
+        );
+        Doubt::new("", Severity::Warn, "", words)
+    });
+    told.into_iter().chain(rejects).collect()
+}
+
+/// Each jump of the output beyond what is allowed: once every channel was read again, and until then.
+fn jumps(
+    settings: &SwapSettings,
+    candidate: &Document,
+    both: &[Steady; 2],
+    (outlook, changes): (&Outlook<'_>, &[DocumentChange]),
+) -> Vec<(String, String)> {
+    if settings.max_jump_rad_per_s.or(settings.max_jump_m_per_s2).is_none() {
+        return Vec::new();
+    }
+    let assumed = candidate.content().filter(|_| outlook.is_assumed());
+    let at = assumed.map_or_else(String::new, |document| {
+        let assumed_deg_c = document.temperature.assumed_deg_c;
+        format!(" at the assumed {assumed_deg_c} °C (no temperature of the unit is known)")
+    });
+    let mut found = jump(settings, both, changes, &at);
+    // Where it is too far for good, that is enough to tell.
+    if let Some(next) = outlook.next.as_ref().filter(|_| found.is_empty() && !outlook.anew.is_empty()) {
+        let [now, _] = both.clone();
+        let until_read = next.without(&outlook.anew).steady(&candidate.calibration);
+        let until = format!(" until {} is read again", outlook.names());
+        found.extend(jump(settings, &[now, until_read], changes, &until));
+    }
+    let unread = outlook.anew.iter().filter(|anew| anew.read.is_none());
+    found.extend(unread.map(|StartsAnew { name, .. }| {
+        let words =
+            format!("the jump of the output is unknown until channel {name} is read: swap after that");
+        (String::new(), words)
+    }));
+    found
 }
 
 /// Ticks of another kind or number of sensors than the calibration has are refused, every one of them.
@@ -301,12 +386,12 @@ fn downgrade(settings: &SwapSettings, candidate: &Document, active: &Revision) -
 fn range<'a>(
     settings: &'a SwapSettings,
     candidate: &'a Document,
-    present: &'a Present,
+    next: &'a Present,
 ) -> impl Iterator<Item = Doubt> + 'a {
     let channels = candidate.calibration.channels().iter().enumerate();
     channels.filter_map(|(index, channel)| {
         let [low, high] = candidate.calibration.range_of(index)?;
-        let temperature_deg_c = present.thermal(channel.name())?.temperature;
+        let temperature_deg_c = next.thermal(channel.name())?.temperature;
         (!(low..=high).contains(&temperature_deg_c)).then(|| {
             let words = format!(
                 "channel {} is at {temperature_deg_c:.2} °C now, outside the fitted range {low} to {high} °C: the terms \

@@ -7,9 +7,7 @@ use isotherm_document::{element, join, tidy};
 use isotherm_protocol::control::DocumentChange;
 use isotherm_protocol::document::turn_rad;
 
-use super::document::Document;
 use crate::config::SwapSettings;
-use crate::receive::unit::Present;
 
 /// Names of the case axes.
 const AXES: [char; 3] = ['x', 'y', 'z'];
@@ -37,30 +35,20 @@ struct Kind {
     sensors: fn(&Steady) -> Sensors<'_>,
 }
 
-/// Each axis along which the output would jump by more than is allowed: the entry that does most of it, and words.
+/// Each axis along which the output would jump by more than is allowed, `at` being where or when: the entry that does most of it,
+/// and words.
 pub(super) fn jump(
     settings: &SwapSettings,
-    candidate: &Document,
     both: &[Steady; 2],
     changes: &[DocumentChange],
-    present: Option<&Present>,
+    at: &str,
 ) -> Vec<(String, String)> {
     let [rate_limit, force_limit] = [settings.max_jump_rad_per_s, settings.max_jump_m_per_s2];
-    if rate_limit.or(force_limit).is_none() {
-        return Vec::new();
-    }
     let Some(jump) = both[0].jump(&both[1]) else {
         let words = "has other sensors or another kind of output than the document in force: the jump of the output is \
                      unknown";
         return vec![(String::new(), words.to_owned())];
     };
-    let assumed = candidate.content().filter(|_| present.is_none_or(|present| present.words().is_empty()));
-    let at = assumed.map_or_else(String::new, |document| {
-        format!(
-            " at the assumed {} °C (no temperature of the unit is known)",
-            document.temperature.assumed_deg_c
-        )
-    });
     let gyros = Kind {
         section: "gyro",
         what: "the corrected angular rate about",
@@ -81,7 +69,7 @@ pub(super) fn jump(
         input: STANDARD_GRAVITY_M_PER_S2,
         sensors: |of| (&of.accel_bias, &of.accel_scale, &of.accel_axes),
     };
-    [gyros, accels].iter().flat_map(|kind| kind.too_far(both, changes, &at)).collect()
+    [gyros, accels].iter().flat_map(|kind| kind.too_far(both, changes, at)).collect()
 }
 
 impl Kind {

@@ -33,7 +33,7 @@ use speech::Speech;
 
 pub(crate) use account::SwapAccount;
 pub use journal_writer::{Journal, JournalOutlet};
-pub(crate) use present::Present;
+pub(crate) use present::{Present, StartsAnew};
 pub(crate) use speech::{Footing, Standing, Wants};
 use unknown_channels::UnknownChannels;
 

@@ -94,6 +94,41 @@ async fn a_jump_of_the_output_is_warned_about_or_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_changed_conversion_is_judged_by_what_it_makes_of_the_present_readings() {
+    let folders = Folders::new();
+    let mut settings = folders.settings();
+    // 0.05 °/h
+    settings.swap.max_jump_rad_per_s = Some(0.05_f64.to_radians() / 3600.0);
+    settings.swap.outside_range = Severity::Refuse;
+    let mut stand = Stand::start(settings).await;
+    stand.temperature_deg_c = 31.0;
+    let converted = |conversion: &str| {
+        let channel = "name = \"body\"\n";
+        document(UNIT, 1.0).replacen(channel, &format!("{channel}conversion_deg_c = {conversion}\n"), 1)
+    };
+    assert_accepted(&stand.swap(UNIT, &converted("[0.0, 1.0]"), &PLAIN).await, 1);
+    stand.revisions(UNIT, 2000).await;
+    // Beyond the sensor's range, beyond the fitted range; a jump by 0.01 °/h per °C: for good, and until the channel is read.
+    let cases: [(&str, &[&str]); 5] = [
+        ("[273.15, 1.0]", &["channel body", "304.15 °C", "-70 to 130 °C"]),
+        ("[0.0, 0.0, 1.0]", &["channel body", "961.00 °C"]),
+        ("[-50.0, 1.0]", &["channel body", "-19.00 °C", "-10 to 40 °C"]),
+        ("[-20.0, 1.0]", &["about x", "+0.2000 °/h"]),
+        ("[-0.5, 1.0]", &["about x", "+0.0600 °/h until body is read again"]),
+    ];
+    for (conversion, words) in cases {
+        let reply = stand.swap(UNIT, &converted(conversion), &PLAIN).await;
+        assert_refused(&reply, words);
+        assert!(!reply.difference.unwrap().correction.is_empty(), "{conversion}");
+    }
+    let reply = stand.swap(UNIT, &converted("[-0.5, 1.0]"), &SwapOptions { force: true, ..PLAIN }).await;
+    assert_accepted(&reply, 2);
+    let warnings: Vec<_> = reply.warnings.iter().map(ToString::to_string).collect();
+    assert!(warnings.iter().any(|it| it.contains("body (31.00 °C now, 30.50 °C then)")), "{warnings:#?}");
+    stand.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_jump_of_a_unit_that_was_not_heard_is_judged_at_the_assumed_temperature() {
     let folders = Folders::new();
     let mut settings = folders.settings();

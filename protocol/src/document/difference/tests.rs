@@ -7,6 +7,7 @@ use isotherm_correction::thermal::Feature;
 use super::super::tests::{FULL, OTHER, accept};
 use super::super::{Parsed, Side, correction_change};
 use super::*;
+use crate::control::CorrectionChange;
 
 /// The documents that are shipped.
 fn shipped() -> Vec<(String, String)> {
@@ -24,9 +25,17 @@ fn changed(text: &str, from: &str, to: &str) -> Vec<String> {
     difference(&before, &after).iter().map(DocumentChange::words).collect()
 }
 
-/// A document as one side of a comparison.
-fn side(parsed: &Parsed) -> Side<'_> {
-    Side { document: &parsed.document, calibration: &parsed.calibration }
+/// What the correction does under two documents, where every channel has this temperature.
+fn change(
+    before: &Parsed,
+    after: &Parsed,
+    deg_c: Option<f64>,
+    mode: Option<LasingMode>,
+) -> Vec<CorrectionChange> {
+    let state = deg_c.map(|deg_c| ThermalState { temperature: deg_c, ..ThermalState::default() });
+    let [old, new] = [before, after].map(|parsed| parsed.calibration.steady(|_| state, mode));
+    let before = Side { document: &before.document, steady: &old };
+    correction_change(before, Side { document: &after.document, steady: &new })
 }
 
 #[test]
@@ -37,7 +46,7 @@ fn every_shipped_document_is_no_different_from_itself() {
         let parsed = accept(&text);
         let rewritten = accept(&parsed.document.to_toml().unwrap());
         assert_eq!(difference(&parsed.document, &rewritten.document), [], "{name}");
-        assert_eq!(correction_change(side(&parsed), side(&rewritten), |_| None, None), [], "{name}");
+        assert_eq!(change(&parsed, &rewritten, None, None), [], "{name}");
     }
 }
 
@@ -172,7 +181,6 @@ fn what_is_only_for_readers_comes_last() {
 
 #[test]
 fn a_change_of_the_correction_is_told_per_sensor_and_in_case_axes() {
-    let at = |deg_c: f64| move |_: &_| Some(ThermalState { temperature: deg_c, ..ThermalState::default() });
     let before = accept(FULL);
     let text = FULL
         .replacen("coefficients_deg_per_h = [1.284, -0.0131", "coefficients_deg_per_h = [1.294, -0.0131", 1)
@@ -186,7 +194,7 @@ fn a_change_of_the_correction_is_told_per_sensor_and_in_case_axes() {
         .replacen("value_counts_per_s_per_m_per_s2 = 1021.3", "value_counts_per_s_per_m_per_s2 = 1021.4", 1);
     let after = accept(&text);
     assert_eq!(difference(&before.document, &after.document).len(), 5);
-    let found = correction_change(side(&before), side(&after), at(25.0), Some(LasingMode::Plus));
+    let found = change(&before, &after, Some(25.0), Some(LasingMode::Plus));
     let of = |quantity: &str| {
         let mut found = found.iter().filter(|change| change.quantity == quantity);
         found.next().unwrap_or_else(|| panic!("{quantity} is not told"))
@@ -215,7 +223,7 @@ fn a_change_of_the_correction_is_told_per_sensor_and_in_case_axes() {
     // What does not differ is not told.
     assert!(found.iter().all(|change| !change.quantity.starts_with("gyro s ")));
     // In the other mode the magnetic bias has the other sign.
-    let other = correction_change(side(&before), side(&after), at(25.0), Some(LasingMode::Minus));
+    let other = change(&before, &after, Some(25.0), Some(LasingMode::Minus));
     assert!((other[0].before - (1.284 - 3.41 + 0.082 + trend + supply)).abs() < 1e-9, "{:?}", other[0]);
 }
 
