@@ -5,6 +5,7 @@ mod paired;
 mod units;
 
 use std::any::Any;
+use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
@@ -42,6 +43,8 @@ pub struct Intake {
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
     looked_for_room: Mutex<Option<Instant>>,
+    /// Units with a calibration that there was no place for. Locked last.
+    refused: Mutex<BTreeSet<UnitId>>,
 }
 
 impl std::fmt::Debug for Intake {
@@ -69,6 +72,7 @@ impl Intake {
             units: RwLock::default(),
             faults: Mutex::default(),
             looked_for_room: Mutex::default(),
+            refused: Mutex::default(),
         }
     }
 

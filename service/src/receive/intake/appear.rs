@@ -7,7 +7,7 @@ use isotherm_document::few;
 use isotherm_protocol::codec::{self, CodecError};
 use isotherm_protocol::key::{Input, RawStream, UnitId};
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatch};
-use isotherm_protocol::status::{Fault, Output};
+use isotherm_protocol::status::Fault;
 
 use super::units::{Unit, Units};
 use super::{Intake, lock, read};
@@ -42,7 +42,7 @@ impl Intake {
         }
         // Looked at without the right to write first: a flood of strange serials must not hold the others up.
         if !self.has_place(&read(&self.units), calibrated) {
-            self.make_room(now);
+            self.make_room(calibrated, now);
         }
         let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
         if let Some(unit) = units.by_serial.get(serial) {
@@ -53,8 +53,12 @@ impl Intake {
             self.fault(FaultKind::TooManyUnits, || {
                 format!("unit {id} is refused: all {limit} places (max_units) are taken")
             });
+            if calibrated {
+                lock(&self.refused).insert(id);
+            }
             return None;
         }
+        lock(&self.refused).remove(&id);
         let outlet = match self.outlets.take(&id) {
             Ok(outlet) => outlet,
             Err(error) => {
@@ -123,21 +127,39 @@ impl Intake {
         calibrations.units().filter(|unit| self.takes(unit) && !units.by_serial.contains_key(*unit))
     }
 
-    /// That units with a calibration have not appeared: their serial may be misspelt, or their producer be off.
-    pub(crate) fn awaited(&self) -> Option<Fault> {
+    /// That units with a calibration have not appeared: their serial may be misspelt, or their producer be off; or there is no place
+    /// for them.
+    pub(crate) fn awaited(&self) -> Vec<Fault> {
         // The units first, as everywhere: what is locked in one order locks nobody out.
         let (units, calibrations) = (read(&self.units), read(&self.calibrations));
-        let awaited: Vec<_> = self.awaited_of(&units, &calibrations).map(UnitId::as_str).collect();
-        (!awaited.is_empty()).then(|| {
-            let words = format!("calibrated, nothing received yet: {}", few(&awaited));
-            standing("awaited_units", awaited.len() as u64, words)
-        })
+        let refused = lock(&self.refused);
+        let awaited = self.awaited_of(&units, &calibrations);
+        let limit = self.settings.max_units;
+        let (refused, silent): (Vec<_>, Vec<_>) =
+            awaited.partition(|unit| units.len() >= limit && refused.contains(*unit));
+        let told = [
+            ("awaited_units", silent, "calibrated, nothing received yet".to_owned()),
+            (
+                "refused_units",
+                refused,
+                format!(
+                    "calibrated, but refused: other calibrated units have all {limit} places, raise max_units"
+                ),
+            ),
+        ];
+        let told = told.into_iter().filter(|(_, units, _)| !units.is_empty());
+        let told = told.map(|(kind, units, words)| {
+            let names = few(units.iter().map(|unit| unit.as_str()));
+            standing(kind, units.len() as u64, format!("{words}: {names}"))
+        });
+        told.collect()
     }
 
-    /// Forgets the unit without a calibration that has been silent longest, if that is long enough: anybody can make one appear, and
-    /// it must not hold its place for ever. Looked for now and then, for a flood of strange serials is not to cost more.
-    fn make_room(&self, now: Instant) {
-        {
+    /// Forgets the unit without a calibration that has been silent longest: anybody can make one appear, and it must not hold its
+    /// place for ever. For a unit with a calibration at once; for another one of those without only after a silence that is long
+    /// enough, and looked for now and then, for a flood of strange serials is not to cost more.
+    fn make_room(&self, calibrated: bool, now: Instant) {
+        if !calibrated {
             let mut looked = lock(&self.looked_for_room);
             if looked.is_some_and(|looked| now.saturating_duration_since(looked) < ROOM_INTERVAL) {
                 return;
@@ -145,14 +167,19 @@ impl Intake {
             *looked = Some(now);
         }
         let units = read(&self.units).in_order();
-        let silent = units.iter().filter_map(|(id, unit)| {
+        let strangers: Vec<_> = {
+            let calibrations = read(&self.calibrations);
+            units.iter().filter(|(id, _)| !calibrations.has(id)).collect()
+        };
+        let silent = strangers.into_iter().filter_map(|(id, unit)| {
             // Whoever is at work on it hears of it.
-            let actor = unit.try_lock().ok()?;
-            (actor.doing().1 != Output::Calibrated).then(|| (actor.silence(now), id.clone()))
+            Some((unit.try_lock().ok()?.silence(now), id))
         });
-        if let Some((silence, id)) = silent.max().filter(|(silence, _)| *silence >= STRANGER_KEPT) {
-            tracing::info!(unit = %id, "forgotten: silent for {} s, and its place is needed", silence.as_secs());
-            self.forget(&id);
+        let shortest = if calibrated { Duration::ZERO } else { STRANGER_KEPT };
+        if let Some((silence, id)) = silent.max().filter(|(silence, _)| *silence >= shortest) {
+            let silence_s = silence.as_secs();
+            tracing::warn!(unit = %id, silence_s, calibrated, "forgotten: it has no calibration, and its place is needed");
+            self.forget(id);
         }
     }
 }

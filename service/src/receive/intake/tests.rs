@@ -1,5 +1,6 @@
 use std::time::Duration;
 
+use isotherm_correction::calibration::Calibration;
 use isotherm_correction::sample::{GyroTick, OutputKind};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
@@ -24,9 +25,13 @@ fn intake(max_units: usize, calibrated: &[&str]) -> Intake {
     with_outlets(max_units, calibrated, Box::new(|_| Ok(Box::new(|_| Ok(())))))
 }
 
-fn with_outlets(max_units: usize, calibrated: &[&str], outlets: OutletMaker) -> Intake {
+fn calibration() -> Arc<Calibration> {
     let text = include_str!("../../../../config/calibration/example-full.toml");
-    let calibration = Arc::new(Document::parse(text, None).unwrap().calibration);
+    Arc::new(Document::parse(text, None).unwrap().calibration)
+}
+
+fn with_outlets(max_units: usize, calibrated: &[&str], outlets: OutletMaker) -> Intake {
+    let calibration = calibration();
     let mut calibrations = Calibrations::default();
     for serial in calibrated {
         calibrations.insert(UnitId::new(serial).unwrap(), Arc::clone(&calibration), [7; 8]);
@@ -77,6 +82,30 @@ fn strange_units_do_not_take_the_places_of_calibrated_ones() {
     }
     assert_eq!(units(&intake), ["A", "CAL-1", "CAL-2"]);
     assert_eq!(intake.totals().refused.get("units_refused"), Some(&3));
+}
+
+#[test]
+fn a_calibrated_unit_takes_the_place_of_a_strange_one_and_is_told_where_there_is_none() {
+    let start = Instant::now();
+    let intake = intake(2, &[]);
+    let gyro = |unit: &str, ms| {
+        let at = start + Duration::from_millis(ms);
+        intake.receive(&format!("imu/{unit}/raw/gyro"), Some(&gyro_frame(ms)), at);
+        units(&intake).join(" ")
+    };
+    let faults = || intake.awaited().into_iter().map(|fault| (fault.kind, fault.count)).collect::<Vec<_>>();
+    assert_eq!([gyro("A", 0), gyro("B", 1)], ["A", "A B"]);
+    let calibration = calibration();
+    for serial in ["CAL-1", "CAL-2", "CAL-3"] {
+        let id = UnitId::new(serial).unwrap();
+        intake.calibrations.write().unwrap().insert(id, Arc::clone(&calibration), [7; 8]);
+    }
+    assert_eq!(faults(), [("awaited_units".to_owned(), 3)]);
+    assert_eq!([gyro("A", 2), gyro("CAL-1", 3), gyro("CAL-2", 4)], ["A B", "A CAL-1", "CAL-1 CAL-2"]);
+    assert_eq!([gyro("A", 5), gyro("CAL-3", 6)], ["CAL-1 CAL-2"; 2]);
+    assert_eq!(faults(), [("refused_units".to_owned(), 1)]);
+    intake.forget(&UnitId::new("CAL-1").unwrap());
+    assert_eq!((gyro("CAL-3", 7), faults()), ("CAL-2 CAL-3".to_owned(), vec![]));
 }
 
 #[test]
