@@ -260,15 +260,23 @@ fn lines_that_are_missing_in_the_middle_are_told_with_their_numbers() {
 
 #[test]
 fn lines_that_are_missing_at_the_end_are_counted_and_no_revision_is_given_twice() {
-    for torn in [0, 20] {
+    // Whether the file with the highest revision is lost too: no file, or an empty one.
+    for (torn, mark) in [(0, "whole"), (20, "whole"), (0, "missing"), (0, "")] {
         let folder = filled(7);
+        let file = folder.path().join("revisions.json");
+        match mark {
+            "whole" => {}
+            "missing" => fs::remove_file(file).unwrap(),
+            damaged => fs::write(file, damaged).unwrap(),
+        }
         let all = lines(folder.path());
         let rest = all[4][..torn].to_owned();
         fs::write(folder.path().join("audit.jsonl"), all[..4].concat() + &rest).unwrap();
         let (mut store, opened) = Store::open(folder.path()).unwrap();
         let cut = opened.cut.clone().unwrap();
         assert_eq!((cut.last, cut.written, opened.torn.is_some()), (4, 7, torn > 0));
-        assert_eq!(opened.losses().count(), 1);
+        assert_eq!(opened.losses().count(), if mark == "whole" { 1 } else { 2 });
+        assert_eq!(opened.unmarked.map(|unmarked| unmarked.floor), (mark != "whole").then_some(1004));
         assert_eq!(store.last_good(&unit()).unwrap().revision, 4);
         assert!(store.highest_revision(&unit()) >= 7);
         fill(&mut store, 1);
@@ -276,6 +284,7 @@ fn lines_that_are_missing_at_the_end_are_counted_and_no_revision_is_given_twice(
         drop(store);
         let (_, opened) = Store::open(folder.path()).unwrap();
         assert_eq!((opened.cut, opened.gaps.len()), (None, 1), "from now on it is a gap");
+        assert_eq!(opened.unmarked, None, "it was written anew");
     }
 }
 

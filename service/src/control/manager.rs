@@ -288,5 +288,5 @@ impl Worker {
 /// What was lost, in words, with the unit that it concerns.
 fn losses(opened: &Opened) -> Vec<(Option<UnitId>, String)> {
     let lost = opened.lost.iter().map(|lost| (UnitId::new(&lost.unit).ok(), lost.to_string()));
-    lost.chain(opened.emptied.iter().map(|emptied| (None, emptied.to_string()))).collect()
+    lost.chain(opened.losses_of_all().map(|loss| (None, loss))).collect()
 }

@@ -103,8 +103,23 @@ impl Store {
         let mut opened = Opened::default();
         let mut index = Index::default();
         let log = Log::open(folder, &mut opened, &mut index)?;
-        let mut mark = Mark::read(folder);
+        // The last line alone may be missing after a crash in mid-write.
+        let cut = Mark::last_entry(folder).filter(|written| *written > index.next_number());
         let unmarked = |source| StoreError::Write { path: folder.to_owned(), source };
+        let mut mark = match Mark::read(folder) {
+            Ok(Some(mark)) => mark,
+            // No revision was given yet.
+            Ok(None) if index.highest() == 0 && cut.is_none() => Mark::default(),
+            lost => {
+                let reason = lost
+                    .map_or_else(|error| format!("cannot be read ({error})"), |_| "is missing".to_owned());
+                let mark = Mark::beyond(index.highest());
+                mark.write(folder).map_err(unmarked)?;
+                opened.unmarked =
+                    Some(Unmarked { file: folder.join(folder::MARK), reason, floor: mark.floor });
+                mark
+            }
+        };
         let has_older = log.is_empty_behind_a_full_one()? && !being_begun_anew;
         let kept = documents.count();
         if has_older || (opened.entries == 0 && kept > 0) {
@@ -113,10 +128,7 @@ impl Store {
             index.last_number = index.last_number.max(Mark::last_entry(folder).unwrap_or(0));
             let (folder, floor) = (folder.to_owned(), mark.floor);
             opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
-        // The last line alone may be missing after a crash in mid-write.
-        } else if let Some(written) =
-            Mark::last_entry(folder).filter(|written| *written > index.next_number())
-        {
+        } else if let Some(written) = cut {
             mark.lose(folder).map_err(unmarked)?;
             opened.cut = Some(Cut { last: index.last_number, written, floor: mark.floor });
             index.last_number = written;

@@ -71,11 +71,11 @@ fn holder(file: File) -> String {
 }
 
 /// Name of the mark's file.
-const MARK: &str = "revisions.json";
+pub(super) const MARK: &str = "revisions.json";
 /// Name of the file with the number of the last entry.
 const LAST_ENTRY: &str = "last-entry";
 /// How far ahead it is written.
-const AHEAD: u64 = 1000;
+pub(super) const AHEAD: u64 = 1000;
 
 /// Which revisions may have been given, for the day on which the audit file is lost.
 ///
@@ -91,11 +91,23 @@ pub(super) struct Mark {
 }
 
 impl Mark {
-    /// What the folder's file says; nothing where there is none, or one that cannot be read.
-    pub(super) fn read(folder: &Path) -> Self {
+    /// What the folder's file says; `None` where there is none.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or is damaged.
+    pub(super) fn read(folder: &Path) -> io::Result<Option<Self>> {
         let path = folder.join(MARK);
-        let text = check_regular(&path).and_then(|()| std::fs::read_to_string(path)).unwrap_or_default();
-        serde_json::from_str(&text).unwrap_or_default()
+        match check_regular(&path).and_then(|()| std::fs::read_to_string(path)) {
+            Ok(text) => Ok(Some(serde_json::from_str(&text)?)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// One in the place of a file that is lost, above the highest revision that is known.
+    pub(super) fn beyond(highest: u64) -> Self {
+        let floor = highest.saturating_add(AHEAD);
+        Self { reserved: floor, floor }
     }
 
     /// Reserves a revision that is about to be given.

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::folder::AHEAD;
+
 /// Most damaged lines that are kept in words.
 const MAX_DAMAGES: usize = 16;
 
@@ -26,6 +28,24 @@ pub struct Opened {
     pub lost: Vec<LostRevision>,
     /// The audit file is empty, and was not always.
     pub emptied: Option<Emptied>,
+    /// The file with the highest revision that may have been given is lost.
+    pub unmarked: Option<Unmarked>,
+}
+
+/// The file with the highest revision that may have been given is damaged or missing.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "{file}, which has the highest revision that may have been given, {reason}: revisions continue from {}, {AHEAD} above \
+     the highest that the audit file has",
+    floor.saturating_add(1), file = file.display()
+)]
+pub struct Unmarked {
+    /// The file.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub reason: String,
+    /// Revisions up to this one are not given again.
+    pub floor: u64,
 }
 
 /// A revision that was accepted, and cannot be put in force again because its line is damaged.
@@ -148,9 +168,14 @@ impl Opened {
 
     /// What was lost, in words: an older calibration may be in force than the operator knows of, or none.
     pub fn losses(&self) -> impl Iterator<Item = String> {
-        let lost = self.lost.iter().map(ToString::to_string);
+        self.lost.iter().map(ToString::to_string).chain(self.losses_of_all())
+    }
+
+    /// The same of losses that concern every unit.
+    pub(crate) fn losses_of_all(&self) -> impl Iterator<Item = String> {
+        let emptied = self.emptied.iter().map(ToString::to_string);
         let cut = self.cut.iter().map(ToString::to_string);
-        lost.chain(self.emptied.iter().map(ToString::to_string)).chain(cut)
+        emptied.chain(cut).chain(self.unmarked.iter().map(ToString::to_string))
     }
 
     /// Everything else that an operator should know, a line each; none after a clean stop.
