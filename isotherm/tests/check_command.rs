@@ -133,6 +133,8 @@ fn what_cannot_be_read_is_a_failure_and_a_wrong_call_is_usage() {
     assert_eq!(output.status.code(), Some(1));
     assert!(lines(&output.stderr)[0].starts_with(missing.to_str().unwrap()), "{:?}", output.stderr);
     assert_eq!(check(&[folder.path().to_str().unwrap()]).status.code(), Some(1), "an empty folder");
+    let output = check(&["--trusted-keys", missing.to_str().unwrap(), &config("service.toml")]);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert_eq!(check(&[]).status.code(), Some(2));
 }
 
@@ -205,6 +207,10 @@ fn an_overlay_is_checked_as_what_it_is() {
     let [first, second] = found["files"].as_array().unwrap().as_slice() else { panic!("{found}") };
     assert_eq!((&first["kind"], &first["unit"]), (&Value::from("overlay"), &Value::from("ZLG-0001")));
     assert_ne!(first["digest"], second["digest"]);
+    // A service takes none of them from its folder.
+    let in_folder = check(&[folder.path().to_str().unwrap()]);
+    assert_eq!((in_folder.status.code(), lines(&in_folder.stdout).len()), (Some(78), 0));
+    assert!(lines(&in_folder.stderr).iter().all(|line| line.contains("isotherm swap")), "{in_folder:?}");
 
     let broken = write(&folder, "broken.toml", &text.replace("unit = \"ZLG-0001\"", "units = \"ZLG-0001\""));
     let output = check(&[&broken]);

@@ -8,12 +8,15 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use isotherm_cli::{Exit, print, say, say_warning};
+use isotherm_document::unplaced;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
 use serde::Serialize;
 
 pub use signer::Signer;
 
+use crate::ServiceError;
+use crate::control::NO_OVERLAYS;
 use crate::control::watch::files_in;
 use crate::signing::read_trusted_keys;
 
@@ -85,6 +88,12 @@ impl Finding {
     fn unreadable(path: &Path, words: String) -> Self {
         Self { file: path.display().to_string(), unreadable: Some(words), ..Self::default() }
     }
+
+    /// The file may not be used, though it holds by itself.
+    fn refuse(&mut self, problem: Problem) {
+        self.problems.push(problem);
+        (self.good, self.summary) = (false, None);
+    }
 }
 
 /// What a good file holds.
@@ -106,6 +115,12 @@ pub struct Summary {
 /// Validates the files and says what was found.
 #[must_use]
 pub fn run(args: &CheckArgs) -> Exit {
+    // A folder that cannot be read is no bad key.
+    if let Some(path) = &args.trusted_keys
+        && let Err(source) = std::fs::read_dir(path)
+    {
+        return ServiceError::Read { path: path.clone(), source }.tell();
+    }
     let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
         Ok(trusted) => trusted,
         Err(problems) => {
@@ -117,6 +132,7 @@ pub fn run(args: &CheckArgs) -> Exit {
     let trusted = trusted.as_ref().map(|(trusted, _)| trusted);
     let check = |file: &PathBuf| kinds::check_file(file, args.kind, trusted);
     let check_all = |path: &PathBuf| match files_of(path) {
+        Ok(files) if path.is_dir() => files.iter().map(check).map(in_folder).collect(),
         Ok(files) => files.iter().map(check).collect(),
         Err(words) => vec![Finding::unreadable(path, words)],
     };
@@ -139,6 +155,14 @@ fn files_of(path: &Path) -> Result<Vec<PathBuf>, String> {
     }
     let files = files_in(path, "toml").map_err(|error| error.to_string())?;
     if files.is_empty() { Err("the folder has no documents (*.toml)".to_owned()) } else { Ok(files) }
+}
+
+/// What is found in a file of a folder, as a service takes it.
+fn in_folder(mut finding: Finding) -> Finding {
+    if finding.kind == Some(FileKind::Overlay) {
+        finding.refuse(unplaced(Some(&finding.file), NO_OVERLAYS.to_owned()));
+    }
+    finding
 }
 
 /// Problems to stderr; the line for stdout, where the file is good.

@@ -45,6 +45,7 @@ pub(crate) mod watch;
 
 pub(crate) use carry::Carried;
 pub(crate) use control_status::{ControlStatus, OLDER, STATE_FOLDER, UNWRITTEN};
+pub(crate) use folder::NO_OVERLAYS;
 pub(crate) use manager::{SwapManager, Worker};
 pub(crate) use queue::{Asked, Inbox, Message, Notice, Origin, PreLaunchEnd};
 pub(crate) use request::is_asked;

@@ -34,9 +34,7 @@ pub(super) fn refuse(findings: &mut [Finding]) {
                 let Some(finding) = findings.get_mut(*index) else { continue };
                 let file = Some(finding.file.clone());
                 let key = "unit".to_owned();
-                finding.problems.push(Problem { file, line: 1, column: 1, key, message: message.clone() });
-                finding.good = false;
-                finding.summary = None;
+                finding.refuse(Problem { file, line: 1, column: 1, key, message: message.clone() });
             }
         }
     }

@@ -28,6 +28,9 @@ use super::request::Request;
 use crate::control::watch::{FolderEvent, read_document};
 use isotherm_document::unplaced;
 
+/// Why an overlay in the folder is not taken.
+pub(crate) const NO_OVERLAYS: &str =
+    "is an overlay, but this folder is for documents: put it in force with `isotherm swap`";
 /// Distance of the attempts to write down what could not be.
 const RETRY_INTERVAL: Duration = Duration::from_secs(2);
 
@@ -219,9 +222,7 @@ impl Worker {
         let bytes = &*read.bytes();
         let may_be_overlay = read.unit().is_none();
         if may_be_overlay && std::str::from_utf8(bytes).is_ok_and(overlay::is_overlay) {
-            let message =
-                "is an overlay, but this folder is for documents: put it in force with `isotherm swap`";
-            let problem = unplaced(Some(&name), message.to_owned());
+            let problem = unplaced(Some(&name), NO_OVERLAYS.to_owned());
             tracing::error!("{problem}");
             return vec![problem];
         }
