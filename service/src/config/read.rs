@@ -9,7 +9,7 @@ use isotherm_protocol::pair::is_name;
 
 use super::Settings;
 use super::metrics::LOOPBACK;
-use super::pair::{ALL_UNITS, chunk};
+use super::pair::chunk;
 use super::swap::Severity;
 
 static FORM: LazyLock<Form> = LazyLock::new(Form::of::<Settings>);
@@ -84,7 +84,7 @@ fn names(r: &mut Reader<'_>, settings: &mut Settings) {
         }
     }
     if settings.units.is_empty() {
-        settings.units = vec![ALL_UNITS.to_owned()];
+        r.report("units", "is empty, must have at least one pattern: [\"*\"] takes every unit");
     }
     if let Some(name) = settings.pair.name.as_ref().filter(|name| !is_name(name)) {
         let must_be = "1 to 32 letters A-Z a-z, digits, '.', '_' and '-'";

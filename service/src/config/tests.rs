@@ -155,6 +155,7 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         "max_units = 0",
         "\n max_units = 16385",
         "units = [\"a/b\"]",
+        "units = []",
         "[pair]\nname = \"a b\"",
         "max_units = 1.5",
         "max_units = -1",
