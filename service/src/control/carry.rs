@@ -99,7 +99,7 @@ impl Worker {
     fn carry_entries(&mut self, unit: &UnitId, entries: &[AuditEntry]) -> Result<usize, StoreError> {
         let mut fresh = Vec::new();
         for entry in entries {
-            if !self.store.has_written(unit, entry)? {
+            if !self.store.has_written(unit, entry)? && !self.knows(unit, &entry.event) {
                 fresh.push(entry);
             }
         }
@@ -121,6 +121,12 @@ impl Worker {
             self.store.append(entry.time.system_time(), Some(unit), &entry.by, entry.event.clone())?;
         }
         Ok(fresh.len())
+    }
+
+    /// Whether a set that another instance accepted holds here too: as it was ordered, or from the journal, without the operator's name.
+    fn knows(&self, unit: &UnitId, event: &AuditEvent) -> bool {
+        let AuditEvent::Accepted(accepted) = event else { return false };
+        self.store.by_revision(unit, accepted.revision).is_some_and(|set| set.digest == accepted.digest)
     }
 
     /// The first tick of a revision, while another instance speaks: that one writes it down, and where it does not any more, this one
@@ -221,4 +227,47 @@ fn running(before: Option<PreLaunchRun>, entries: &[AuditEntry]) -> Option<PreLa
         None if record.command == PRE_LAUNCH_ENDED => None,
         _ => run,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use isotherm_protocol::control::Schedule;
+
+    use super::*;
+    use crate::config::Settings;
+    use crate::control::revision::Calibrations;
+    use crate::control::store::{Opened, Store};
+    use crate::receive::intake::Intake;
+
+    #[test]
+    fn a_swap_that_was_taken_from_the_journal_is_not_written_down_again() {
+        let (settings, unit) = (Settings::default(), UnitId::new("U").unwrap());
+        let outlets = Box::new(|_: &_| Err("there is none".into()));
+        let intake = Arc::new(Intake::new(settings.clone(), Calibrations::default(), outlets));
+        let mut worker = Worker::new(&settings, intake, Store::in_memory(), &Opened::default());
+        let digests = ["one", "other"].map(|text| worker.store.put_document(text.as_bytes()).unwrap());
+        let accepted = |digest, changed: &[&str]| {
+            let changed = changed.iter().map(|it| (*it).to_owned()).collect();
+            AuditEvent::Accepted(Acceptance {
+                revision: 6,
+                digest,
+                overlay: None,
+                source: Source::Bus,
+                base: None,
+                changed,
+                schedule: Schedule::NextTick,
+                slew_ms: 0,
+            })
+        };
+        worker.append(Some(&unit), "root", accepted(digests[0], &[])).unwrap();
+        let mut carried = |digest| {
+            let (time, event) = (SystemTime::UNIX_EPOCH.into(), accepted(digest, &["from the journal"]));
+            let entry =
+                AuditEntry { number: 1, time, unit: Some(unit.to_string()), by: String::new(), event };
+            worker.carry_entries(&unit, &[entry]).unwrap()
+        };
+        assert_eq!(digests.map(&mut carried), [0, 1], "what holds there holds here");
+    }
 }
