@@ -358,7 +358,8 @@ fn age(settings: &SwapSettings, candidate: &Document, now: SystemTime) -> Option
     let doubt = |words| Some(Doubt::new("created", severity, "age", words));
     let days = |seconds: i64| seconds / DAY_S;
     let (Some(created), Some(created_unix_s)) = (&candidate.created, candidate.label.created_unix_s) else {
-        return doubt(format!("is missing: the document may be older than {} days", days(limit_s?)));
+        let (why, limit_days) = (undated(candidate), days(limit_s?));
+        return doubt(format!("{why}: the document may be older than {limit_days} days"));
     };
     let now_s = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let age_s = i64::try_from(now_s).unwrap_or(i64::MAX).saturating_sub(created_unix_s);
@@ -367,6 +368,13 @@ fn age(settings: &SwapSettings, candidate: &Document, now: SystemTime) -> Option
     }
     let limit_days = days(limit_s.filter(|limit| age_s > *limit)?);
     doubt(format!("is {created}: {} days old, more than {limit_days}", days(age_s)))
+}
+
+/// Why nothing is known of a document's age.
+fn undated(candidate: &Document) -> String {
+    let created = candidate.created.as_ref();
+    created
+        .map_or_else(|| "is missing".to_owned(), |created| format!("is {created}, which is no usable date"))
 }
 
 /// A document that was replaced, with a signature or not, must not come back unseen.
@@ -378,7 +386,7 @@ fn downgrade(settings: &SwapSettings, candidate: &Document, active: &Revision) -
             format!("is {created}: older than the document in force, of {shown}")
         }
         (Some(_), Some(_)) => return None,
-        _ => format!("is missing: the document may be older than the one in force, of {shown}"),
+        _ => format!("{}: the document may be older than the one in force, of {shown}", undated(candidate)),
     };
     Some(Doubt::new("created", settings.downgrade, "downgrade", words))
 }

@@ -67,7 +67,9 @@ async fn a_document_older_than_the_one_in_force_is_warned_about_or_refused() {
     let older = ["created: ", "2026-01-05", "2999-01-01T00:00:00"];
     policy(set, 25.0, &document(UNIT, 2.0), &older).await;
     let undated = document(UNIT, 2.0).replace("created = 2026-01-05\n", "");
-    policy(set, 25.0, &undated, &["created: "]).await;
+    policy(set, 25.0, &undated, &["created: is missing"]).await;
+    let unusable = document(UNIT, 2.0).replace("2026-01-05", "0000-01-01");
+    policy(set, 25.0, &unusable, &["created: is 0000-01-01, which"]).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
