@@ -15,8 +15,7 @@ use zenoh::Session;
 use crate::config::Settings;
 use crate::control::revision::Calibrations;
 use crate::logging::LogArgs;
-use crate::observe::metrics::Endpoint;
-use crate::service::{open_store, start_on, tell_state};
+use crate::service::{open_state, start_on, tell_state};
 use crate::supervisor;
 use crate::{ServiceError, Totals};
 
@@ -140,9 +139,8 @@ async fn serve(args: ServeArgs) -> Result<Option<Totals>, ServiceError> {
     };
 
     tell_state(&settings);
-    let state = open_store(settings.state.as_deref())?;
     let awaited = settings.zenoh.session.awaited()?;
-    let metrics = Endpoint::start(&settings.metrics, awaited.clone()).await?;
+    let (state, metrics) = open_state(&settings, awaited.clone()).await?;
     let start = async {
         let session = open_session(settings.zenoh.session.clone(), &awaited).await?;
         let locators = isotherm_bus::locators(&session);

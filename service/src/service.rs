@@ -82,8 +82,7 @@ pub fn start_with(
     session: Session,
 ) -> BoxFuture<'static, Result<RunningService, ServiceError>> {
     Box::pin(async move {
-        let state = open_store(settings.state.as_deref())?;
-        let metrics = Endpoint::start(&settings.metrics, "its units".to_owned()).await?;
+        let (state, metrics) = open_state(&settings, "its units".to_owned()).await?;
         start_on(settings, calibrations, state, metrics, session).await
     })
 }
@@ -168,10 +167,24 @@ pub(crate) async fn start_on(
     })
 }
 
-/// Opens the state folder, or its stand-in.
+/// Opens the state folder, or its stand-in, and answers on the address for metrics as a service that waits for something.
 ///
-/// Before any port is taken: who starts a service twice is to read that it runs already, not that a port is taken.
-pub(crate) fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
+/// Who starts a service twice is to read that it runs already, not that a port is taken. No folder is made for a service that cannot
+/// have its port.
+pub(crate) async fn open_state(
+    settings: &Settings,
+    waits_for: String,
+) -> Result<((Store, Opened), Option<Endpoint>), ServiceError> {
+    let mut metrics = Endpoint::start(&settings.metrics, waits_for).await;
+    if settings.state.as_deref().is_some_and(|folder| !folder.exists()) {
+        metrics = Ok(metrics?);
+    }
+    let state = open_store(settings.state.as_deref())?;
+    Ok((state, metrics?))
+}
+
+/// Opens the state folder, or its stand-in.
+fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
     let Some(folder) = folder else { return Ok((Store::in_memory(), Opened::default())) };
     let (store, opened) = Store::open(folder)?;
     for warning in opened.warnings() {

@@ -299,6 +299,16 @@ fn strict_start_refuses_bad_documents_and_names_every_problem() {
 }
 
 #[test]
+fn a_start_without_its_port_leaves_no_state_folder_behind() {
+    let holder = TcpListener::bind("127.0.0.1:0").unwrap();
+    let (taken, folder) = (holder.local_addr().unwrap().to_string(), tempfile::tempdir().unwrap());
+    let state = folder.path().join("state");
+    let listen = ["serve", "--listen", "127.0.0.1:0"];
+    let arguments = [&listen[..], &["--metrics", &taken, "--state", state.to_str().unwrap()]].concat();
+    assert_eq!((run(&arguments).status.code(), state.exists()), (Some(1), false));
+}
+
+#[test]
 fn the_ready_file_says_where() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("ready.json");
