@@ -230,7 +230,8 @@ impl Known {
     /// Whether a batch of the series begins it again, rather than to come late or twice.
     fn begins_again(&self, first: &GyroTick, last: &GyroTick) -> bool {
         let (newest, end_time) = self.newest;
-        if first.sequence > newest || last.sequence == newest {
+        // The same batch again has the same end; a run as long as the one before it has a later one.
+        if first.sequence > newest || (last.sequence == newest && last.end_time <= end_time) {
             return false;
         }
         let behind = newest - if last.sequence < newest { last.sequence } else { first.sequence };
@@ -304,6 +305,7 @@ mod tests {
         assert_eq!(series(&[(50, 50), (60, 60), (50, 50), (60, 60)]), [0, 0, 1, 1], "a short log twice");
         assert_eq!(series(&[(50, 50), (900, 900), (60, 60), (70, 70)]), [0, 0, 1, 1], "far behind");
         assert_eq!(series(&[(50, 50), (90, 90), (0, 100), (10, 110)]), [0, 0, 1, 1], "time goes on");
+        assert_eq!(series(&[(0, 0), (0, 10), (0, 10), (0, 20)]), [0, 1, 1, 2], "runs of one batch each");
         assert_eq!(series(&[(50, 50), (50, 50), (60, 60), (80, 80), (70, 70), (70, 70), (90, 90)]), [0; 7]);
     }
 
