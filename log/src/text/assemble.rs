@@ -42,6 +42,8 @@ pub(super) struct Assembler {
     accel: Timeline,
     /// The last gyro tick's mode.
     mode: Option<LasingMode>,
+    /// Times that the gyro ticks' own numbers began anew: each run of them is a series.
+    series: u64,
     /// Ticks that began and whose end is not known yet: their starts and events.
     open: [Option<(i64, LogEvent)>; 2],
     /// Events whose turn has not come.
@@ -60,6 +62,7 @@ impl Assembler {
             gyro: timeline.clone(),
             accel: timeline,
             mode: None,
+            series: 0,
             open: [None, None],
             queue: VecDeque::new(),
             settled: i64::MIN,
@@ -76,11 +79,11 @@ impl Assembler {
     /// Makes events of a row.
     pub(super) fn take(&mut self, parts: Parts, temperatures: &[TemperatureReading], columns: &Columns) {
         let Parts { stamp, gyro, accel, .. } = parts;
-        if accel.is_some() {
-            self.close(ACCEL, Some(stamp), columns);
+        if let Some(readings) = &accel {
+            self.close(ACCEL, Some((stamp, readings.sequence)), columns);
         }
-        if gyro.is_some() {
-            self.close(GYRO, Some(stamp), columns);
+        if let Some((readings, _)) = &gyro {
+            self.close(GYRO, Some((stamp, readings.sequence)), columns);
         }
         for reading in temperatures {
             self.enqueue(LogEvent::Temperature(*reading));
@@ -103,8 +106,9 @@ impl Assembler {
             let changed = columns.by_mode && self.mode.is_some() && self.mode != states.mode;
             self.mode = states.mode;
             let waits = self.gyro.waits(readings.duration.is_some());
+            self.series += u64::from(self.gyro.begins_anew(readings.sequence));
             let timing = self.gyro.tick(stamp, readings.sequence, readings.duration);
-            let tick = gyro_tick(timing, &readings, states, changed);
+            let tick = GyroTick { series: self.series, ..gyro_tick(timing, &readings, states, changed) };
             self.add(GYRO, waits, stamp, LogEvent::Gyro { output, tick }, columns);
         }
         self.settled = stamp;
@@ -112,7 +116,7 @@ impl Assembler {
 
     /// A row that could not be read, which had ticks of gyros and of accelerometers or not; `stamp` where that much of it could.
     pub(super) fn skip(&mut self, stamp: Option<i64>, had: [bool; 2], columns: &Columns) {
-        self.close_all(stamp, columns);
+        self.close_all(stamp.map(|stamp| (stamp, None)), columns);
         for (timeline, had) in [&mut self.gyro, &mut self.accel].into_iter().zip(had) {
             if had {
                 timeline.skip(stamp);
@@ -139,13 +143,13 @@ impl Assembler {
     }
 
     /// Closes both open ticks.
-    fn close_all(&mut self, next: Option<i64>, columns: &Columns) {
+    fn close_all(&mut self, next: Option<(i64, Option<u64>)>, columns: &Columns) {
         self.close(ACCEL, next, columns);
         self.close(GYRO, next, columns);
     }
 
-    /// Closes the open tick of a kind, whose successor begins at `next`.
-    fn close(&mut self, kind: usize, next: Option<i64>, columns: &Columns) {
+    /// Closes the open tick of a kind; `next` is when its successor begins, and the number that it states.
+    fn close(&mut self, kind: usize, next: Option<(i64, Option<u64>)>, columns: &Columns) {
         let Some((start, mut event)) = self.open.get_mut(kind).and_then(Option::take) else { return };
         let timeline = if kind == GYRO { &self.gyro } else { &self.accel };
         if let Some(tick) = Tick::of(&mut event) {

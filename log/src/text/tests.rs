@@ -268,13 +268,19 @@ fn a_gap_is_read_where_the_mapping_or_the_log_knows_of_it() {
     let bad = "?,1,7,20\n".repeat(12);
     let (events, report) = read(&skip, format!("10,1,7,20\n{bad}140,2,7,20\n").as_bytes());
     assert_eq!((gyro(&events).len(), report.skipped_rows), (2, 12));
-    // A log that numbers its ticks tells of its gaps itself.
-    let mut numbered = mapping("delimiter = \"comma\"", STAMPS);
+    // A log that numbers its ticks tells of its gaps itself, and of another run of its producer; a row that comes late is neither.
+    let mut numbered = skip;
     numbered.files[0].gyro.as_mut().unwrap().ticks.sequence = Some(Column::Index(3));
     numbered.files[0].temperatures.clear();
-    let (events, _) = read(&numbered, b"10,1,7,5\n20,2,7,6\n2020,3,7,206\n");
-    let sequences: Vec<_> = gyro(&events).iter().map(|tick| tick.0).collect();
-    assert_eq!(sequences, [5, 6, 206]);
+    let rows = b"10,1,7,5\n20,2,7,6\n2020,3,7,206\n2031,4,7,0\n2025,5,7,0\n2040,6,7,1\n9000,7,7,1\n";
+    let (events, _) = read(&numbered, rows);
+    let series = events.iter().filter_map(|event| match event {
+        LogEvent::Gyro { tick, .. } => Some(tick.series),
+        _ => None,
+    });
+    assert!(series.eq([0, 0, 0, 1, 1, 2]), "{events:?}");
+    let ticks: Vec<_> = gyro(&events).iter().map(|tick| (tick.0, tick.2)).collect();
+    assert_eq!(ticks, [(5, 10), (6, 10), (206, 10), (0, 11), (1, 10), (1, 10)]);
 }
 
 #[test]

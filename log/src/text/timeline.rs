@@ -28,6 +28,8 @@ pub struct Timeline {
     longest: Option<Span>,
     /// Number of the next tick.
     next: u64,
+    /// Number that a row stated last.
+    stated: Option<u64>,
     /// Stamp of the row before, where it is known.
     last_stamp: Option<i64>,
 }
@@ -43,6 +45,7 @@ impl Timeline {
             measured: mapping.measured,
             longest: mapping.gap_after_ticks.map(|ticks| Span::from_s(tick.as_s() * ticks)),
             next: 0,
+            stated: None,
             last_stamp: None,
         }
     }
@@ -52,6 +55,8 @@ impl Timeline {
     /// `sequence` and `duration` are what the row states itself.
     pub fn tick(&mut self, stamp: i64, sequence: Option<u64>, duration: Option<Span>) -> Timing {
         let measured = self.step(stamp);
+        let measured = self.one_tick(measured, sequence);
+        self.stated = sequence.or(self.stated);
         let sequence = sequence.unwrap_or(self.next);
         self.next = sequence.saturating_add(1);
         let nominal = if self.measured && self.marks == Marks::End { measured } else { self.tick };
@@ -75,11 +80,27 @@ impl Timeline {
         }
     }
 
-    /// Measured duration of a tick that began at `stamp`, once the next one began.
-    pub(super) fn until(&self, stamp: i64, next: Option<i64>) -> Span {
-        let Some(next) = next else { return self.tick };
+    /// Measured duration of a tick that began at `stamp`, once the next one began, which may state its number.
+    pub(super) fn until(&self, stamp: i64, next: Option<(i64, Option<u64>)>) -> Span {
+        let Some((next, sequence)) = next else { return self.tick };
         let duration = Span::from_ns(next.saturating_sub(stamp));
-        if self.longest.is_some_and(|longest| duration > longest) { self.tick } else { duration }
+        if self.longest.is_some_and(|longest| duration > longest) {
+            return self.tick;
+        }
+        self.one_tick(duration, sequence)
+    }
+
+    /// Whether the number that a row states begins anew: rows come in order of time, so that it is neither late nor double.
+    pub(super) fn begins_anew(&self, sequence: Option<u64>) -> bool {
+        sequence.zip(self.stated).is_some_and(|(sequence, last)| sequence <= last)
+    }
+
+    /// What of a time between two stamps is one tick: not the ticks that the second one's number shows to be missing, nor a pause
+    /// before numbers that begin anew.
+    fn one_tick(&self, measured: Span, sequence: Option<u64>) -> Span {
+        let gap = sequence.is_some_and(|sequence| sequence > self.next);
+        let pause = self.begins_anew(sequence) && missing(measured, self.tick) > 0;
+        if gap || pause { self.tick } else { measured }
     }
 
     /// Ticks that are missing before a row with this stamp, as far as stamps say.
@@ -138,6 +159,29 @@ mod tests {
         assert_eq!(gaps, [(0, 100, 10), (1, 111, 11), (2, 120, 9), (5, 151, 10)]);
         let starts = run(timeline(Marks::Start, false, Some(1.5)), &stamps);
         assert_eq!(starts, [(0, 110, 10), (1, 121, 10), (2, 130, 10), (5, 161, 10)]);
+    }
+
+    #[test]
+    fn a_number_that_jumps_or_begins_anew_leaves_its_tick_as_long_as_others() {
+        // Stamp, number, and the duration that comes of it.
+        let rows = [
+            (100, 7, 10),
+            (111, 8, 11),
+            (131, 10, 10),
+            (140, 11, 9),
+            (180, 15, 10),
+            (191, 0, 11),
+            (900, 0, 10),
+        ];
+        let mut timeline = timeline(Marks::End, true, None);
+        for (stamp, sequence, duration) in rows {
+            let timing = timeline.tick(stamp, Some(sequence), None);
+            assert_eq!((timing.sequence, timing.duration.as_ns()), (sequence, duration), "{stamp}");
+        }
+        for (next, duration) in [(Some(1), 12), (Some(3), 10), (Some(0), 12), (None, 12)] {
+            assert_eq!(timeline.until(900, Some((912, next))).as_ns(), duration, "{next:?}");
+        }
+        assert_eq!(timeline.until(900, Some((925, Some(0)))).as_ns(), 10, "a pause");
     }
 
     #[test]
