@@ -80,13 +80,9 @@ impl Names {
         name.into()
     }
 
-    /// The raw streams of a run, from 1.
-    fn raw(&self, run: u64) -> PathBuf {
-        if run == 1 { self.with("", &self.end) } else { self.with(&format!(".{run}"), &self.end) }
-    }
-
-    fn mapping(&self) -> PathBuf {
-        self.with("", ".mapping.toml")
+    /// The raw streams of a run, from 1, or their mapping.
+    fn of_run(&self, run: u64, end: &str) -> PathBuf {
+        if run == 1 { self.with("", end) } else { self.with(&format!(".{run}"), end) }
     }
 
     /// Something beside the raw streams.
@@ -131,8 +127,6 @@ impl UnitText {
             whole: Vec::new(),
         };
         if contents.has_raw() {
-            let mapping = place.write(&text.names.mapping(), &text.columns.mapping())?;
-            text.whole.push((mapping, "mapping", 1));
             text.open_raw()?;
         }
         if contents.corrected_ticks > 0 {
@@ -148,9 +142,11 @@ impl UnitText {
         Ok(text)
     }
 
-    /// Begins the file of a run.
+    /// Begins the file of a run, with the mapping that reads it.
     fn open_raw(&mut self) -> Result<(), Error> {
-        let mut sink = self.place.sink(&self.names.raw(self.run))?;
+        let mapping = self.names.of_run(self.run, ".mapping.toml");
+        self.whole.push((self.place.write(&mapping, &self.columns.mapping())?, "mapping", 1));
+        let mut sink = self.place.sink(&self.names.of_run(self.run, &self.names.end))?;
         sink.write(|writer| self.columns.write_header(writer))?;
         self.raw = Some((sink, 0));
         Ok(())

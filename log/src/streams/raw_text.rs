@@ -1,7 +1,7 @@
 //! Raw streams as a text log, with the mapping that reads it back to the same ticks.
 //!
 //! One row per time. Counts are whole numbers, means and readings have as many digits as it takes to read the same bits
-//! back. What a text log has no place for: the producer's series (each run is a file of its own), health readings, the
+//! back. What a text log has no place for: the producer's series (a run that numbers do not tell is a file of its own), health readings, the
 //! payload of a NaN, and how ticks were put into messages.
 
 use std::collections::BTreeSet;

@@ -15,7 +15,7 @@ const WAIT_NS: i64 = 5_000_000_000;
 const MOST_ROWS: usize = 1 << 14;
 /// Most items that wait for the gyro tick that shows whether a new run began.
 const MOST_EARLY: usize = 1 << 13;
-/// Most runs that are told apart.
+/// Most series that are told apart.
 const MOST_RUNS: usize = 1 << 12;
 
 /// Everything of a unit that has one time.
@@ -71,7 +71,8 @@ fn source(event: &LogEvent) -> Source {
 ///
 /// A row waits until every stream and channel is five seconds of the log's time further, or thousands of rows wait: one may
 /// come in long batches, or have ended. Where the producer's series changes, or a producer
-/// without series goes back in time, a new run begins, and the order begins anew.
+/// without series goes back in time, a new run begins, and the order begins anew. A series whose time goes on while its numbers begin
+/// anew is told by these alone.
 #[derive(Debug, Default)]
 pub struct Rows {
     waiting: BTreeMap<i64, Row>,
@@ -81,6 +82,8 @@ pub struct Rows {
     given_ns: Option<i64>,
     series: Option<u64>,
     known_series: BTreeSet<u64>,
+    /// Time and number of the newest gyro tick of the run.
+    newest_gyro: Option<(i64, u64)>,
     /// Items without a series that are before everything given: late, or of a run whose first gyro tick is still to come.
     early: Vec<LogEvent>,
     ready: VecDeque<Step>,
@@ -130,15 +133,25 @@ impl Rows {
                 self.tally.late += 1;
                 return;
             }
-        } else if self.known_series.len() < MOST_RUNS && !self.known_series.contains(&tick.series) {
-            self.new_run(&tick);
         } else {
-            // Of a run that is over, or one of very many.
-            self.tally.late += 1;
-            return;
+            let is_known = self.known_series.contains(&tick.series);
+            let number = |(newest_ns, sequence)| time_ns > newest_ns && tick.sequence <= sequence;
+            let told_by_number = !passed && self.newest_gyro.is_some_and(number);
+            let is_many = self.known_series.len() >= MOST_RUNS;
+            if is_known || (is_many && !told_by_number) {
+                // Of a run that is over, or one of very many.
+                self.tally.late += 1;
+                return;
+            }
+            if !told_by_number {
+                self.new_run(&tick);
+            }
         }
         self.series = Some(tick.series);
-        self.known_series.insert(tick.series);
+        if self.known_series.len() < MOST_RUNS {
+            self.known_series.insert(tick.series);
+        }
+        self.newest_gyro = self.newest_gyro.max(Some((time_ns, tick.sequence)));
         self.insert(LogEvent::Gyro { output, tick });
     }
 
@@ -217,6 +230,7 @@ impl Rows {
             self.ready.push_back(Step::NewRun);
         }
         self.given_ns = None;
+        self.newest_gyro = None;
         self.newest_ns.values_mut().for_each(|newest| *newest = None);
         early.into_iter().chain(kept).for_each(|item| self.insert(item));
     }

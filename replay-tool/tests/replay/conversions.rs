@@ -224,9 +224,10 @@ fn doubled_and_late_ticks_and_new_runs_are_told() {
     assert_eq!(summary["duplicates"], 1);
     let lost = serde_json::json!({ "frames that cannot be read": 1, "too late to be sorted": 1 });
     assert_eq!(summary["lost"], lost);
-    assert_eq!(files(&summary), pairs(&[("x.2.csv", 5), ("x.csv", 700), ("x.mapping.toml", 1)]));
-    for (name, ticks) in [("x.csv", 700), ("x.2.csv", 5)] {
-        let back = events(&path("x.mapping.toml"), &path(name));
+    let expected = [("x.2.csv", 5), ("x.2.mapping.toml", 1), ("x.csv", 700), ("x.mapping.toml", 1)];
+    assert_eq!(files(&summary), pairs(&expected));
+    for (name, ticks) in [("x", 700), ("x.2", 5)] {
+        let back = events(&path(&format!("{name}.mapping.toml")), &path(&format!("{name}.csv")));
         let sequences: Vec<_> = back
             .iter()
             .filter_map(|event| match event {

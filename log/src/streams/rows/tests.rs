@@ -115,16 +115,29 @@ fn another_series_is_a_new_run_with_what_came_shortly_before_it() {
     rows.accel(OutputKind::Mean, accel(0, 10_000));
     // Time goes on: the accelerometer tick of the new run comes first.
     rows.accel(OutputKind::Mean, accel(0, 12_000));
-    rows.gyro(OutputKind::Mean, gyro(8, 0, 12_000));
+    rows.gyro(OutputKind::Mean, gyro(8, 1, 12_000));
     // Time goes back, and the temperature comes first.
-    rows.gyro(OutputKind::Mean, gyro(8, 1, 20_000));
+    rows.gyro(OutputKind::Mean, gyro(8, 2, 20_000));
     rows.temperature(reading(5, 1.0));
     rows.gyro(OutputKind::Mean, gyro(9, 0, 10));
     // A straggler of a run that is over.
-    rows.gyro(OutputKind::Mean, gyro(8, 2, 20_010));
+    rows.gyro(OutputKind::Mean, gyro(8, 3, 20_010));
     let (words, tally) = steps(rows);
     assert_eq!(words, "10000ag | 12000ag 20000g | 5t 10g");
     assert_eq!(tally, Tally { late: 1, ..Tally::default() });
+}
+
+#[test]
+fn however_many_series_are_one_run_where_their_numbers_tell_them_apart() {
+    let mut rows = Rows::default();
+    let mut given = 0;
+    for n in 0..20_000_u64 {
+        rows.gyro(OutputKind::Mean, gyro(n / 2, n % 2, 10 * n.cast_signed()));
+        given += std::iter::from_fn(|| rows.next_step()).filter(|step| *step != Step::NewRun).count();
+    }
+    let (words, tally) = steps(rows);
+    assert_eq!((given + words.split(' ').count(), words.contains('|')), (20_000, false));
+    assert_eq!(tally, Tally::default());
 }
 
 #[test]
