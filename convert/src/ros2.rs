@@ -237,6 +237,8 @@ impl UnitBag {
             return Ok(());
         };
         let force = row.accel.as_ref().and_then(|(output, accel)| nominal.force(*output, accel));
+        let unstated = u64::from(row.accel.is_some() && force.is_none());
+        converted.leave_out("raw accelerometer readings without a document that scales them", unstated);
         let imu = |header| Imu::new(header, Some(rate), force);
         self.write(&format!("{}/data_raw", self.base), None, row.time_ns, imu, bag, converted)
     }

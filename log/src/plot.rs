@@ -35,6 +35,7 @@ use crate::part::Messages;
 use crate::source::LogReport;
 
 use isotherm_pages::Page;
+pub use nominal::nominal_forces;
 use reading::Plot;
 
 /// Most units on a page.

@@ -4,7 +4,8 @@
 //! first, second and third sensor, not the case axes.
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind};
-use isotherm_correction::units::Angle;
+use isotherm_correction::units::{Angle, Span};
+use isotherm_log::plot::nominal_forces;
 use isotherm_protocol::document::{AccelOutput, Document};
 
 /// Nominal scale of a unit's raw readings.
@@ -12,8 +13,8 @@ use isotherm_protocol::document::{AccelOutput, Document};
 pub(crate) struct Nominal {
     /// Angle per count (rad) of three gyros; `None` without a document that says it.
     per_count: Option<[f64; 3]>,
-    /// The accelerometers' means are m/s².
-    means_are_forces: bool,
+    /// Specific force per unit of the reading (m/s²) of three accelerometers; `None` without a document that says it.
+    per_reading: Option<[f64; 3]>,
     /// Coefficients of each temperature channel's conversion to °C.
     channels: Vec<(String, Vec<f64>)>,
 }
@@ -26,15 +27,18 @@ impl Nominal {
             let weight = document.gyro.sensor.get(sensor)?.increment_weight_arcsec_per_count?;
             Some(Angle::from_arcsec(weight).as_rad())
         };
-        let three = document.gyro.sensor.len() == 3;
+        let are_three = document.gyro.sensor.len() == 3;
         let per_count = match (weight(0), weight(1), weight(2)) {
-            (Some(x), Some(y), Some(z)) if three => Some([x, y, z]),
+            (Some(x), Some(y), Some(z)) if are_three => Some([x, y, z]),
             _ => None,
         };
-        let forces = |output| output == AccelOutput::MetresPerSecondSquared;
+        let per_reading = document.accel.as_ref().and_then(|accel| match accel.output {
+            AccelOutput::MetresPerSecondSquared => Some([1.0; 3]),
+            AccelOutput::Counts | AccelOutput::Volts => three(&nominal_forces(document)),
+        });
         Self {
             per_count,
-            means_are_forces: document.accel.as_ref().is_some_and(|accel| forces(accel.output)),
+            per_reading,
             channels: document
                 .temperature
                 .channel
@@ -56,19 +60,15 @@ impl Nominal {
         let readings = three(&tick.readings)?;
         match output {
             OutputKind::Mean => Some(readings),
-            OutputKind::Counts => {
-                let [x, y, z] = self.per_count?;
-                let duration_s = tick.duration.as_s();
-                let [px, py, pz] = readings;
-                (duration_s > 0.0).then(|| [x * px, y * py, z * pz].map(|angle| angle / duration_s))
-            }
+            OutputKind::Counts => per_second(scaled(readings, self.per_count?), tick.duration),
         }
     }
 
-    /// Specific forces along the three input axes (m/s²), where the document says that the readings are such.
+    /// Specific forces along the three input axes (m/s²), where a document says what the readings are.
     #[must_use]
     pub(crate) fn force(&self, output: OutputKind, tick: &AccelTick) -> Option<[f64; 3]> {
-        (self.means_are_forces && output == OutputKind::Mean).then(|| three(&tick.readings)).flatten()
+        let forces = scaled(three(&tick.readings)?, self.per_reading?);
+        if output == OutputKind::Mean { Some(forces) } else { per_second(forces, tick.duration) }
     }
 
     /// A raw reading of a channel as °C, where the document has the channel.
@@ -79,6 +79,17 @@ impl Nominal {
     }
 }
 
+/// Each reading by its scale.
+fn scaled([x, y, z]: [f64; 3], [by_x, by_y, by_z]: [f64; 3]) -> [f64; 3] {
+    [x * by_x, y * by_y, z * by_z]
+}
+
+/// What was counted in a tick, by its duration.
+fn per_second(counted: [f64; 3], duration: Span) -> Option<[f64; 3]> {
+    let duration_s = duration.as_s();
+    (duration_s > 0.0).then(|| counted.map(|counted| counted / duration_s))
+}
+
 /// Three readings, where there are three.
 fn three(readings: &[f64]) -> Option<[f64; 3]> {
     readings.try_into().ok()
@@ -86,7 +97,7 @@ fn three(readings: &[f64]) -> Option<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use isotherm_correction::units::{Span, Timestamp};
+    use isotherm_correction::units::Timestamp;
 
     use super::*;
 
@@ -96,7 +107,8 @@ mod tests {
             env!("CARGO_MANIFEST_DIR"),
             "/../config/calibration/ZLG-0001.toml"
         ));
-        let laser = Nominal::of(&Document::parse(&text.unwrap(), None).unwrap().document);
+        let laser_document = Document::parse(&text.unwrap(), None).unwrap().document;
+        let laser = Nominal::of(&laser_document);
         let unknown = Nominal::default();
         let tick = |readings: &[f64]| GyroTick {
             readings: readings.iter().copied().collect(),
@@ -114,7 +126,14 @@ mod tests {
             (0.05..5.0).contains(&rate[0].abs()) && rate[0] * rate[1] < 0.0 && rate[2] == 0.0,
             "{rate:?}"
         );
-        let accel = AccelTick { readings: [1.0, 2.0, 3.0].into_iter().collect(), ..AccelTick::default() };
-        assert_eq!(unknown.force(OutputKind::Mean, &accel), None, "volts or m/s²?");
+        let accel = |reading: f64| AccelTick {
+            readings: [reading, 0.0, -reading].into_iter().collect(),
+            duration: Span::from_ms(10),
+            ..AccelTick::default()
+        };
+        assert_eq!(unknown.force(OutputKind::Mean, &accel(1.0)), None, "volts or m/s²?");
+        let [per_count_per_s, ..] = three(&nominal_forces(&laser_document)).unwrap();
+        let force = laser.force(OutputKind::Counts, &accel(0.01 / per_count_per_s)).unwrap();
+        assert!((force[0] - 1.0).abs() < 1e-12 && force[1] == 0.0 && force[2] < 0.0, "{force:?}");
     }
 }

@@ -32,18 +32,24 @@ pub(super) struct Nominal {
 impl Nominal {
     pub(super) fn of(document: &Document) -> Self {
         let parts = document.to_parts();
-        let assumed = parts.filter.assumed_deg_c;
         let gyro = Scale::new(
             parts.gyros.iter().map(|gyro| gyro.increment_weight * DEG_PER_H).collect(),
             &parts.gyro_orientation.rows,
         );
-        let accel = parts.accel_orientation.as_ref().map(|orientation| {
-            let factor = |curve: Option<Curve>| curve.map_or(f64::NAN, |curve| 1.0 / curve.at(assumed).value);
-            let factors = parts.accels.iter().map(|accel| factor(Curve::new(&accel.scale_factor).ok()));
-            Scale::new(factors.collect(), &orientation.rows)
-        });
+        let accel = parts.accel_orientation.as_ref();
+        let accel = accel.map(|orientation| Scale::new(nominal_forces(document), &orientation.rows));
         Self { gyro, accel }
     }
+}
+
+/// Specific force (m/s²) that each accelerometer of a document reads 1 at, as a mean or as counts per second, by its scale factor at the
+/// assumed temperature.
+#[must_use]
+pub fn nominal_forces(document: &Document) -> Vec<f64> {
+    let parts = document.to_parts();
+    let factor = |curve: Curve| 1.0 / curve.at(parts.filter.assumed_deg_c).value;
+    let curves = parts.accels.iter().map(|accel| Curve::new(&accel.scale_factor).ok());
+    curves.map(|curve| curve.map_or(f64::NAN, factor)).collect()
 }
 
 impl Scale {
