@@ -24,7 +24,7 @@ use isotherm_correction::units::Timestamp;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::mapping::{Delimiter, Encoding, Mapping};
+use crate::mapping::{Delimiter, Encoding, FileMapping, Mapping};
 use crate::part::{Part, Stretch};
 use crate::progress::Progress;
 use file::FileReader;
@@ -186,7 +186,7 @@ pub struct LogReader {
 }
 
 impl LogReader {
-    /// Opens a log: `paths` are its files in the order of the mapping's, or one folder that has them all.
+    /// Opens a log: `paths` are its files by the mapping's names or in its order, or one folder that has them all.
     ///
     /// # Errors
     /// [`Error::Usage`] where files and mapping do not go together, [`Error::File`] where one cannot be opened,
@@ -289,5 +289,13 @@ fn locate(mapping: &Mapping, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
             "{got} log files are given, the mapping describes {need}{names}: give them in its order, or the folder that has them"
         )));
     }
-    Ok(paths.iter().map(|path| Path::to_path_buf(path)).collect())
+    // Files that have the mapping's names are told by these, in whichever order they are given.
+    let has_name = |path: &&PathBuf, name: &str| path.file_name().is_some_and(|own| own == name);
+    let named = |file: &FileMapping| {
+        let name = file.name.as_deref()?;
+        paths.iter().find(|path| has_name(path, name)).cloned()
+    };
+    let by_name: Option<Vec<_>> = mapping.files.iter().map(named).collect();
+    let by_name = by_name.filter(|named| paths.iter().all(|path| named.contains(path)));
+    Ok(by_name.unwrap_or_else(|| paths.to_vec()))
 }

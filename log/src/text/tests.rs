@@ -452,12 +452,15 @@ fn files_are_merged_in_time() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a"), "10,1,7,20\n20,2,7,20\n").unwrap();
     std::fs::write(folder.path().join("b"), "5,1,7\n10,1,7\n25,1,7\n").unwrap();
-    let reader = LogReader::open(&both, &[folder.path().to_path_buf()]).unwrap();
-    let orders: Vec<_> = reader
-        .map(|event| event.unwrap())
-        .map(|event| (event.time().as_ns() / 1_000_000, event.rank()))
-        .collect();
-    assert_eq!(orders, [(5, 1), (10, 0), (10, 1), (10, 2), (20, 0), (20, 2), (25, 1)]);
+    let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+    for paths in [vec![folder.path().to_path_buf()], vec![a.clone(), b.clone()], vec![b, a]] {
+        let reader = LogReader::open(&both, &paths).unwrap();
+        let orders: Vec<_> = reader
+            .map(|event| event.unwrap())
+            .map(|event| (event.time().as_ns() / 1_000_000, event.rank()))
+            .collect();
+        assert_eq!(orders, [(5, 1), (10, 0), (10, 1), (10, 2), (20, 0), (20, 2), (25, 1)], "{paths:?}");
+    }
     assert!(matches!(LogReader::open(&both, &[folder.path().join("a")]), Err(Error::Usage(_))));
 }
 
