@@ -1,6 +1,7 @@
 //! A part of a log: some of its units, some of its time. It can be opened again and again.
 
 use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use isotherm_correction::units::{Span, Timestamp};
@@ -193,3 +194,8 @@ pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
         (recording, _) => Ok(recording.is_some()),
     }
 }
+    let named = |path: &&PathBuf| path.extension().is_some_and(|end| end == "mcap") && path.is_file();
+    if let Some(path) = paths.iter().filter(named).find(|path| !is_recording(path)) {
+        let words = "its first bytes are damaged; repair it with `isotherm-replay recover`";
+        return Err(Error::file(path, "read the recording", io::Error::other(words)));
+    }
