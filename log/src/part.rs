@@ -14,6 +14,7 @@ use crate::message::Message;
 use crate::progress::Progress;
 use crate::recording::RecordingReader;
 use crate::source::{LogReport, Source, is_recording};
+use crate::text::LogReader;
 
 /// The files of a log, and how they are read.
 #[derive(Debug, Clone)]
@@ -54,8 +55,8 @@ impl Part {
 
 /// Where in the time of a part a log is that is taken tick by tick.
 ///
-/// The log begins with the start of its first tick, or the time of its first temperature reading. A tick belongs to the part when it
-/// begins and ends inside.
+/// The log begins with the start of its first tick, or the time of its first temperature reading. A tick belongs to the part that it
+/// ends in: parts that adjoin share no tick and lack none.
 #[derive(Debug, Default)]
 pub(crate) struct Stretch {
     start: Span,
@@ -76,7 +77,7 @@ impl Stretch {
     pub(crate) fn holds(&mut self, began: Timestamp, ended: Timestamp) -> bool {
         let beginning = *self.beginning.get_or_insert(began);
         self.over = self.end.is_some_and(|end| ended > beginning + end);
-        !self.over && (self.start == Span::ZERO || began >= beginning + self.start)
+        !self.over && (self.start == Span::ZERO || ended > beginning + self.start)
     }
 }
 
@@ -94,10 +95,8 @@ impl LogFiles {
             Self::Recordings(paths) => {
                 let mut before_ns = 0;
                 if part.start > Span::ZERO {
-                    let first = Source::recordings(paths, 0)?.0.next_message()?;
-                    beginning_ns = first.map(|message| message.received_ns);
-                    let start_ns = u64::try_from(part.start.as_ns()).unwrap_or(0);
-                    before_ns = beginning_ns.map_or(0, |beginning| beginning.saturating_add(start_ns));
+                    beginning_ns = self.beginning_ns()?;
+                    before_ns = beginning_ns.map_or(0, |beginning| later_ns(beginning, part.start));
                 }
                 (Source::recordings(paths, before_ns)?, part.window())
             }
@@ -107,6 +106,55 @@ impl LogFiles {
         };
         Ok(Messages { source, progress, units: part.units.clone(), window, beginning_ns, over: false })
     }
+
+    /// Lets a part begin with the log, for who must be given all that came before it; from which time of reception on messages belong
+    /// to the part. A text log's messages are then of one tick each, so that none is of both.
+    ///
+    /// # Errors
+    /// As [`LogFiles::open`], and where the first message cannot be read.
+    pub fn from_beginning(&mut self, part: &mut Part) -> Result<u64, Error> {
+        let start = std::mem::take(&mut part.start);
+        if start == Span::ZERO {
+            return Ok(0);
+        }
+        let from_ns = self.beginning_ns()?.map_or(0, |beginning| later_ns(beginning, start));
+        match self {
+            Self::Recordings(_) => Ok(from_ns),
+            Self::Text { batch_ticks, .. } => {
+                *batch_ticks = 1;
+                // A tick that ends with the time before the part is of that time.
+                Ok(from_ns.saturating_add(1))
+            }
+        }
+    }
+
+    /// The last time of reception that belongs to a part; `None` where it goes to the end.
+    ///
+    /// # Errors
+    /// As [`LogFiles::from_beginning`].
+    pub fn end_ns(&self, part: &Part) -> Result<Option<u64>, Error> {
+        let Some(end) = part.end else { return Ok(None) };
+        Ok(self.beginning_ns()?.map(|beginning| later_ns(beginning, end)))
+    }
+
+    /// When the log begins: with the reception of its first message, a text log with its first event.
+    fn beginning_ns(&self) -> Result<Option<u64>, Error> {
+        match self {
+            Self::Recordings(paths) => {
+                let first = Source::recordings(paths, 0)?.0.next_message()?;
+                Ok(first.map(|message| message.received_ns))
+            }
+            Self::Text { paths, mapping, .. } => {
+                let first = LogReader::open(mapping, paths)?.next().transpose()?;
+                Ok(first.map(|event| u64::try_from(event.began().as_ns()).unwrap_or(0)))
+            }
+        }
+    }
+}
+
+/// A time so long after another one (ns).
+fn later_ns(time_ns: u64, by: Span) -> u64 {
+    time_ns.saturating_add(u64::try_from(by.as_ns()).unwrap_or(0))
 }
 
 /// The messages of a part of a log, one by one in constant memory.
@@ -181,9 +229,14 @@ impl Messages {
 /// Whether these files are recordings; recordings and text logs do not go together.
 ///
 /// # Errors
-/// [`Error::Usage`] where some are recordings and others are not, or one is a pipe.
+/// [`Error::Usage`] where some are recordings and others are not, or one is a pipe; [`Error::File`] for one that only its name tells.
 pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
     paths.iter().try_for_each(|path| refuse_pipe(path))?;
+    let named = |path: &&PathBuf| path.extension().is_some_and(|end| end == "mcap") && path.is_file();
+    if let Some(path) = paths.iter().filter(named).find(|path| !is_recording(path)) {
+        let words = "its first bytes are damaged; repair it with `isotherm-replay recover`";
+        return Err(Error::file(path, "read the recording", io::Error::other(words)));
+    }
     let recording = |path: &PathBuf| is_recording(Path::new(path));
     match (paths.iter().find(|path| recording(path)), paths.iter().find(|path| !recording(path))) {
         (Some(recording), Some(other)) => Err(Error::Usage(format!(
@@ -194,8 +247,3 @@ pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
         (recording, _) => Ok(recording.is_some()),
     }
 }
-    let named = |path: &&PathBuf| path.extension().is_some_and(|end| end == "mcap") && path.is_file();
-    if let Some(path) = paths.iter().filter(named).find(|path| !is_recording(path)) {
-        let words = "its first bytes are damaged; repair it with `isotherm-replay recover`";
-        return Err(Error::file(path, "read the recording", io::Error::other(words)));
-    }

@@ -50,8 +50,9 @@ pub struct PlotLog {
     pub messages: Messages,
     /// The serial that its only unit is shown under; `None` leaves all as they are.
     pub shown_as: Option<UnitId>,
-    /// Whether its raw messages are corrected with [`PlotOptions::calibration`]: for logs that hold nothing corrected.
-    pub correct: bool,
+    /// Its raw messages are corrected with [`PlotOptions::calibration`], and shown from this time of reception on (ns): for logs that
+    /// hold nothing corrected.
+    pub correct_from: Option<u64>,
 }
 
 /// How logs are plotted.
@@ -59,7 +60,7 @@ pub struct PlotLog {
 pub struct PlotOptions {
     /// Most bins of each quantity (2…2²⁰); up to three times as many ticks are shown one by one.
     pub detail: usize,
-    /// A calibration document: the nominal scale of raw readings, and what [`PlotLog::correct`] corrects with.
+    /// A calibration document: the nominal scale of raw readings, and what [`PlotLog::correct_from`] corrects with.
     pub calibration: Option<Parsed>,
 }
 

@@ -86,7 +86,7 @@ impl LogEvent {
     }
 
     /// When it began: the start of a tick, or the time of a reading.
-    fn began(&self) -> Timestamp {
+    pub(crate) fn began(&self) -> Timestamp {
         match self {
             Self::Gyro { tick, .. } => tick.end_time - tick.duration,
             Self::Accel { tick, .. } => tick.end_time - tick.duration,

@@ -36,7 +36,7 @@ struct Source {
 impl Source {
     /// Reads on by one message, and makes what is to be corrected of it; whether there was one.
     fn read(&mut self) -> Result<bool, Error> {
-        let message = self.log.messages.next_message()?;
+        let mut message = self.log.messages.next_message()?;
         self.over = message.is_none();
         let received_ns = message.as_ref().map_or(0, |message| message.received_ns);
         if let Some((stream, unit)) = &mut self.corrects {
@@ -48,6 +48,10 @@ impl Source {
                     let _ = stream.receive(*kind, frame);
                 }
                 Some(_) => {}
+            }
+            if !self.over && self.log.correct_from.is_some_and(|from_ns| received_ns < from_ns) {
+                stream.drop_ready();
+                message = None;
             }
         }
         self.ahead.extend(message);
@@ -97,7 +101,7 @@ impl Plot {
     pub(super) fn new(logs: Vec<PlotLog>, options: &PlotOptions) -> Result<Self, Error> {
         let mut sources = Vec::with_capacity(logs.len());
         for log in logs {
-            let calibration = options.calibration.as_ref().filter(|_| log.correct);
+            let calibration = options.calibration.as_ref().filter(|_| log.correct_from.is_some());
             let corrects = calibration.cloned().map(Loaded::of).transpose()?.map(|loaded| {
                 let stream = UnitStream::new(loaded.unit.clone(), UnitSettings::default());
                 (loaded.installed(stream), loaded.unit)
@@ -144,7 +148,7 @@ impl Plot {
     /// The log that is behind on the axis; `None` when all are over.
     fn next_log(&mut self) -> Result<Option<usize>, Error> {
         for source in &mut self.logs {
-            if source.ahead.is_empty() && !source.over {
+            while source.ahead.is_empty() && !source.over {
                 source.read()?;
             }
         }

@@ -51,7 +51,7 @@ fn recording(
 fn log(path: &std::path::Path) -> PlotLog {
     let messages = LogFiles::Recordings(vec![path.to_owned()]).open(&Part::default()).unwrap();
     let name = path.file_name().unwrap().to_string_lossy().into_owned();
-    PlotLog { name, messages, shown_as: None, correct: false }
+    PlotLog { name, messages, shown_as: None, correct_from: None }
 }
 
 #[test]

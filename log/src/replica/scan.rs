@@ -25,12 +25,13 @@ use crate::recording::{MAGIC, MESSAGE_ENCODING, chunk_records};
 /// What is read of a recording at once (bytes): heads and indexes.
 const BLOCK: usize = 1 << 13;
 
-/// Looks through recordings, in this order, for journals and for the units there are.
+/// Looks through recordings, in this order, for journals and for the units there are; entries that were received after `end_ns`, where
+/// that is given, are passed over.
 ///
 /// # Errors
 /// [`Error::File`] where one cannot be opened or read. What is damaged ends the look at its file, as it ends its reading.
-pub fn scan(paths: &[PathBuf]) -> Result<Outlines, Error> {
-    Ok(look(paths, true)?.finish())
+pub fn scan(paths: &[PathBuf], end_ns: Option<u64>) -> Result<Outlines, Error> {
+    Ok(look(paths, Some(end_ns.unwrap_or(u64::MAX)))?.finish())
 }
 
 /// Refuses units that none of these recordings has, before they are read for what they do not hold.
@@ -41,7 +42,7 @@ pub fn check_units(paths: &[PathBuf], units: &BTreeSet<UnitId>) -> Result<(), Er
     if units.is_empty() {
         return Ok(());
     }
-    let there = look(paths, false)?.units;
+    let there = look(paths, None)?.units;
     let Some(unit) = units.iter().find(|unit| !there.contains_key(*unit)) else { return Ok(()) };
     let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
     Err(Error::NoSuchUnit {
@@ -51,8 +52,8 @@ pub fn check_units(paths: &[PathBuf], units: &BTreeSet<UnitId>) -> Result<(), Er
     })
 }
 
-/// Goes through recordings; without `journals`, for the units alone.
-fn look(paths: &[PathBuf], journals: bool) -> Result<Found, Error> {
+/// Goes through recordings, for the journals up to a time of reception; without one, for the units alone.
+fn look(paths: &[PathBuf], journals: Option<u64>) -> Result<Found, Error> {
     let mut found = Found::default();
     for path in paths {
         let failed = |source| Error::file(path, "read the recording", source);
@@ -111,12 +112,12 @@ struct Recording {
     at: u64,
     /// Topic of each channel so far; `None` for channels of something else.
     topics: HashMap<u16, Option<Topic>>,
-    /// Whether journals are read.
-    journals: bool,
+    /// Up to which time of reception journals are read, if at all (ns).
+    journals: Option<u64>,
 }
 
 impl Recording {
-    fn open(path: &Path, journals: bool) -> io::Result<Self> {
+    fn open(path: &Path, journals: Option<u64>) -> io::Result<Self> {
         let records = RecordFile::new(File::open(path)?, BLOCK)?;
         Ok(Self { records, at: MAGIC.len() as u64, topics: HashMap::new(), journals })
     }
@@ -143,7 +144,7 @@ impl Recording {
         let (channels, behind) = self.records.indexed(chunk)?;
         self.at = behind;
         let wanted = channels.iter().any(|id| match self.topics.get(id) {
-            Some(topic) => self.journals && matches!(topic, Some(Topic::Journal(_))),
+            Some(topic) => self.journals.is_some() && matches!(topic, Some(Topic::Journal(_))),
             None => true,
         });
         // At the file's end some of its indexes may be cut off.
@@ -167,7 +168,7 @@ impl Recording {
             }
             Record::Message { header, data } => {
                 if let Some(Some(Topic::Journal(unit))) = self.topics.get(&header.channel_id)
-                    && self.journals
+                    && self.journals.is_some_and(|end_ns| header.log_time <= end_ns)
                 {
                     found.journal(unit, header.log_time, data);
                 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::{Done, Replica, entry_words, input_name};
 use crate::error::Error;
-use crate::part::Messages;
+use crate::part::{LogFiles, Messages, Part};
 use crate::streams::decoded::Decoded;
 
 /// What happened.
@@ -134,17 +134,31 @@ pub struct Stepper {
     replica: Replica,
     number: u64,
     received_ns: u64,
+    /// Events received earlier are gone through without a word (ns since 1970-01-01 UTC).
+    from_ns: u64,
     over: bool,
     counters: Counters,
     out: Vec<CorrectedTick>,
 }
 
 impl Stepper {
-    /// Over the messages of the replica's unit alone.
-    #[must_use]
-    pub fn new(messages: Messages, replica: Replica) -> Self {
-        let counters = Counters::default();
-        Self { messages, replica, number: 0, received_ns: 0, over: false, counters, out: Vec::new() }
+    /// Over the part of a log, whose messages are of the replica's unit alone; what comes before the part is gone through too.
+    ///
+    /// # Errors
+    /// As [`LogFiles::from_beginning`].
+    pub fn open(mut files: LogFiles, mut part: Part, replica: Replica) -> Result<Self, Error> {
+        let from_ns = files.from_beginning(&mut part)?;
+        let (messages, counters) = (files.open(&part)?, Counters::default());
+        Ok(Self {
+            messages,
+            replica,
+            number: 0,
+            received_ns: 0,
+            from_ns,
+            over: false,
+            counters,
+            out: Vec::new(),
+        })
     }
 
     /// The next event.
@@ -191,6 +205,9 @@ impl Stepper {
                     self.received_ns = *received_ns;
                 }
                 self.number += 1;
+                if self.received_ns < self.from_ns {
+                    continue;
+                }
                 return Ok(Some(done));
             }
             match self.messages.next_message()? {

@@ -138,7 +138,7 @@ fn unnamed(args: &DiffArgs, units: &BTreeSet<UnitId>) -> Result<UnitId, Error> {
         };
     }
     let of_other: Vec<UnitId> = if is_recording(other) {
-        let outlines = scan(std::slice::from_ref(other))?;
+        let outlines = scan(std::slice::from_ref(other), None)?;
         outlines.units.into_iter().filter(|(_, unit)| unit.has_corrected).map(|(unit, _)| unit).collect()
     } else {
         let mut log = CorrectedLog::open(other, &Part::default(), &unit_id("unit")?)?;

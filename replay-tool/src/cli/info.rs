@@ -6,6 +6,7 @@ pub(super) mod tables;
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
+use isotherm_log::part::Part;
 
 use super::log_args::{LogArgs, unnamed};
 use super::{print, show};
@@ -71,6 +72,6 @@ impl LogArgs {
         if self.is_recording()? {
             return Ok(self.log.clone());
         }
-        Ok(self.events()?.paths().to_vec())
+        Ok(self.events(&Part::default())?.paths().to_vec())
     }
 }

@@ -118,16 +118,15 @@ impl LogArgs {
         Ok(self.files(batch_ticks, unit)?.open(&self.part()?)?)
     }
 
-    /// Opens the part of a text log as events.
+    /// Opens a part of a text log as events.
     ///
     /// # Errors
     /// As [`LogArgs::files`], and where the log is a recording.
-    pub(crate) fn events(&self) -> Result<LogReader, Error> {
+    pub(crate) fn events(&self, part: &Part) -> Result<LogReader, Error> {
         if self.is_recording()? {
             return Err(Error::Usage("this needs a text log, the log is recordings".to_owned()));
         }
-        let part = self.part()?;
-        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.within(&part))
+        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.within(part))
     }
 
     /// The file of a text log's mapping: the one given, else the one beside the log.

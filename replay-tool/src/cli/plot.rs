@@ -136,12 +136,17 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let mut logs = Vec::new();
     let mut bar = None;
     for log in std::iter::once(&args.log).chain(&other) {
+        let mut correct_from = None;
         let messages = if let Some(messages) = corrected(log, unnamed.as_ref())? {
             messages
         } else {
             let document = calibration.as_ref().map(|parsed| parsed.document.unit.as_str());
             document.map_or(Ok(()), |unit| log.refuse_document_of_another(unit))?;
-            log.messages(BATCH, unnamed.as_ref())?
+            let (mut files, mut part) = (log.files(BATCH, unnamed.as_ref())?, log.part()?);
+            if calibration.is_some() && !log.is_recording()? {
+                correct_from = Some(files.from_beginning(&mut part)?);
+            }
+            files.open(&part)?
         };
         bar.get_or_insert_with(|| Bar::over_log(messages.progress().watch()));
         let names: Vec<_> = log.log.iter().filter_map(|path| path.file_name()).collect();
@@ -150,8 +155,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
         let one =
             |units: &std::collections::BTreeSet<UnitId>| units.first().filter(|_| units.len() == 1).cloned();
         let shown_as = one(&first_units).filter(|_| log.units().is_ok_and(|units| units.len() == 1));
-        let correct = !log.is_recording()? && calibration.is_some();
-        logs.push(PlotLog { name, messages, shown_as, correct });
+        logs.push(PlotLog { name, messages, shown_as, correct_from });
     }
     let options = PlotOptions { detail: usize::try_from(args.detail).unwrap_or(usize::MAX), calibration };
     let (page, summary) = plot(logs, &options, &mut |messages| {

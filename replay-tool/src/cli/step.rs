@@ -66,14 +66,12 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
             return Err(Error::Usage("a text log needs --calibration FILE".to_owned()));
         };
         args.log.refuse_document_of_another(loaded.unit.as_str())?;
-        let messages = args.log.messages(1, Some(&loaded.unit))?;
-        return Ok(Stepper::new(
-            messages,
-            Replica::without_journal(loaded.unit.clone(), settings, Some(loaded)),
-        ));
+        let files = args.log.files(1, Some(&loaded.unit))?;
+        let replica = Replica::without_journal(loaded.unit.clone(), settings, Some(loaded));
+        return Ok(Stepper::open(files, args.log.part()?, replica)?);
     }
     let files = args.log.files(1, None)?;
-    let mut outlines = scan(&args.log.log)?;
+    let mut outlines = scan(&args.log.log, files.end_ns(&args.log.part()?)?)?;
     outlines.damaged.iter().for_each(|words| show::warn(words));
     let wanted = args.log.units()?;
     let holds = |unit: &UnitId| wanted.is_empty() || wanted.contains(unit);
@@ -92,7 +90,6 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
     };
     let journal = outlines.units.remove(unit).unwrap_or_default().journal;
     let part = Part { units: [unit.clone()].into(), ..args.log.part()? };
-    let messages = files.open(&part)?;
     let replica = match loaded {
         Some(loaded) if loaded.unit != *unit => {
             return Err(Error::Usage(format!(
@@ -110,7 +107,7 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
             return Err(Error::Usage(words));
         }
     };
-    Ok(Stepper::new(messages, replica))
+    Ok(Stepper::open(files, part, replica)?)
 }
 
 /// Prints what was asked for.

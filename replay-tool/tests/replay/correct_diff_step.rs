@@ -204,6 +204,35 @@ fn a_recording_of_raw_messages_is_corrected_with_a_document_as_its_text_is() {
 }
 
 #[test]
+fn a_part_is_corrected_as_in_the_whole() {
+    let folder = simulated();
+    correct(folder.path(), "mems.toml", "whole.csv");
+    let told = |args: &[&str], code: i32| -> Value {
+        let part = ["--calibration", "mems.toml", "--start", "5", "--duration", "3"];
+        let part = if args[0] == "diff" { &[][..] } else { &part };
+        let output = replay(folder.path(), &[args, part, &["--json"]].concat());
+        ended(&output, code);
+        serde_json::from_str(&stdout(&output)).unwrap()
+    };
+    for (log, out, least) in
+        [("mems.csv", "part.csv", 300), ("mems.csv", "part.mcap", 300), ("raw.mcap", "part-of-raw.csv", 290)]
+    {
+        told(&["correct", log, "--out", out], 0);
+        let summary = told(&["diff", "whole.csv", out], 1);
+        let account = summary["units"].as_object().unwrap().values().next().unwrap();
+        assert!(account["ticks"].as_u64().unwrap() >= least, "{out}: {summary}");
+        assert_eq!(account["different"], 0, "{out}: {summary}");
+    }
+    let page = told(&["plot", "mems.csv", "--beside", "whole.csv", "--out", "part.html"], 0);
+    let difference = &page["differences"]["log"];
+    assert!(difference["common_ticks"].as_u64().unwrap() >= 299, "{page}");
+    assert_eq!(difference["differing_ticks"], 0, "{page}");
+    // What comes before it has been gone through.
+    let first = told(&["step", "mems.csv", "--from", "0", "--count", "1"], 0);
+    assert!(first["number"].as_u64().unwrap() > 1000, "{first}");
+}
+
+#[test]
 fn what_does_not_go_together_is_refused() {
     let folder = simulated();
     fs::write(folder.path().join("other.toml"), document().replace("MEMS-0001", "MEMS-0002")).unwrap();

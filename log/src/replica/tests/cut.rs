@@ -1,14 +1,21 @@
 //! Recordings that end in the middle.
 
-use super::session::Session;
+use isotherm_correction::units::Span;
+
+use super::session::{DOCUMENT, Session};
 use super::*;
 use crate::diff::Account;
-use crate::offline::{Basis, Form, RunOptions, UnitPlan, correct};
+use crate::offline::{Basis, Form, RunOptions, UnitPlan, UnitReport, correct};
 use crate::part::{LogFiles, Part};
 use crate::recording::{RecordingOptions, RecordingWriter};
 
 /// What `correct` makes of these messages as a file.
 fn corrected(messages: &[Message]) -> Account {
+    corrected_to(messages, None).published.unwrap()
+}
+
+/// Likewise of a part that ends so long after the beginning.
+fn corrected_to(messages: &[Message], end: Option<Span>) -> UnitReport {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cut.mcap");
     let mut writer = RecordingWriter::create(&path, RecordingOptions::default()).unwrap();
@@ -16,16 +23,16 @@ fn corrected(messages: &[Message]) -> Account {
         writer.write(message).unwrap();
     }
     writer.finish().unwrap();
-    let outlines = scan(std::slice::from_ref(&path)).unwrap();
+    let (part, files) = (Part { end, ..Part::default() }, LogFiles::Recordings(vec![path.clone()]));
+    let outlines = scan(&[path], files.end_ns(&part).unwrap()).unwrap();
     let plan = |(id, outline): (UnitId, UnitOutline)| {
         let basis = Basis::Journal { outline: outline.journal, changes: Changes::default() };
         UnitPlan { id, basis, compare: true }
     };
     let plans = outlines.units.into_iter().map(plan).collect();
     let options = RunOptions { threads: 1, form: Form::Sums, from_ns: 0 };
-    let files = LogFiles::Recordings(vec![path]);
-    let (mut units, _) = correct(&files, &Part::default(), plans, options, &mut |_, _| Ok(())).unwrap();
-    units.remove(0).published.unwrap()
+    let (mut units, _) = correct(&files, &part, plans, options, &mut |_, _| Ok(())).unwrap();
+    units.remove(0)
 }
 
 fn count(messages: &[Message], is: impl Fn(&Topic) -> bool) -> u64 {
@@ -60,6 +67,23 @@ fn the_unfinished_tail_of_a_cut_recording_is_told_and_is_no_difference() {
             tails += account.unfinished;
         }
         assert_eq!(tails > 0, raw_later_ns > 0, "{raw_later_ns}: {tails}");
+    }
+}
+
+#[test]
+fn a_part_of_a_whole_recording_lacks_nothing_of_its_journal() {
+    let mut session = Session::new();
+    for _ in 0..4 {
+        session.ticks(100);
+        session.memory();
+        session.swap(DOCUMENT, Schedule::NextTick, 0);
+    }
+    let whole = session.recording();
+    for end_ms in [500, 1500, 2995, 3005, 9000] {
+        let report = corrected_to(&whole, Some(Span::from_ms(end_ms)));
+        let account = report.published.unwrap();
+        assert_eq!(report.replica.notices, [], "{end_ms}");
+        assert!(account.agrees() && account.ticks >= u64::from(end_ms.min(3900)) / 10 - 10, "{account:#?}");
     }
 }
 

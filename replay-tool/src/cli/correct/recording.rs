@@ -5,7 +5,6 @@ use std::path::Path;
 use std::thread::available_parallelism;
 
 use isotherm_cli::{Bar, Exit};
-use isotherm_correction::units::Span;
 use isotherm_document::few;
 use isotherm_log::file::read_small_text;
 use isotherm_log::offline::{Basis, Loaded, RunOptions, UnitPlan, correct, load_calibration};
@@ -24,9 +23,9 @@ const TEXT_BATCH: usize = 64;
 
 /// Runs the command on recordings.
 pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
-    let files = args.log.files(1, None)?;
-    let mut part = args.log.part()?;
-    let outlines = scan(&args.log.log)?;
+    let mut files = args.log.files(1, None)?;
+    let part = args.log.part()?;
+    let outlines = scan(&args.log.log, files.end_ns(&part)?)?;
     let mut loaded = BTreeMap::new();
     for path in &args.calibration {
         let calibration = load_calibration(path)?;
@@ -48,7 +47,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
         show::warn(words);
     }
     let documents: Vec<_> = loaded.values().map(|(path, _)| path.as_path()).collect();
-    let outcome = make(args, &files, &mut part, plans, &documents)?;
+    let outcome = make(args, &mut files, part, plans, &documents)?;
     Ok(if without.is_some() { Exit::DataLoss } else { outcome })
 }
 
@@ -57,18 +56,18 @@ pub(super) fn run_text(args: &CorrectArgs, calibration: &Path) -> Result<Exit, E
     let loaded = load_calibration(calibration)?;
     loaded.warnings.iter().for_each(|warning| show::warn(&warning.to_string()));
     args.log.refuse_document_of_another(loaded.unit.as_str())?;
-    let files = args.log.files(TEXT_BATCH, Some(&loaded.unit))?;
+    let mut files = args.log.files(TEXT_BATCH, Some(&loaded.unit))?;
     let id = loaded.unit.clone();
     let basis = Basis::Given { settings: args.settings()?, calibration: Some(loaded) };
     let plans = vec![UnitPlan { id, basis, compare: false }];
-    make(args, &files, &mut args.log.part()?, plans, &[calibration])
+    make(args, &mut files, args.log.part()?, plans, &[calibration])
 }
 
 /// Corrects the units as planned, and writes what comes of it with the documents beside it.
 fn make(
     args: &CorrectArgs,
-    files: &LogFiles,
-    part: &mut Part,
+    files: &mut LogFiles,
+    mut part: Part,
     plans: Vec<UnitPlan>,
     documents: &[&Path],
 ) -> Result<Exit, Error> {
@@ -78,9 +77,8 @@ fn make(
     for path in documents {
         sink.document(read_small_text(path, "read the calibration document")?.into_bytes())?;
     }
-    // A journal is followed from its beginning; what comes before the part is corrected and not given out.
-    let by_journal = plans.iter().any(|plan| matches!(plan.basis, Basis::Journal { .. }));
-    let from_ns = if by_journal && part.start > Span::ZERO { beginning(files, part)? } else { 0 };
+    // A unit's state rests on all that came before the part: that is corrected and not given out.
+    let from_ns = files.from_beginning(&mut part)?;
     let cores = available_parallelism().map_or(1, usize::from);
     let options = RunOptions {
         threads: args.threads.map_or(cores, usize::from),
@@ -88,7 +86,7 @@ fn make(
         from_ns,
     };
     let (mut bar, mut ticks) = (None, 0);
-    let result = correct(files, part, plans, options, &mut |made, progress| {
+    let result = correct(files, &part, plans, options, &mut |made, progress| {
         let bar = bar.get_or_insert_with(|| Bar::over_log(progress.watch()));
         ticks += made.iter().map(|(_, output)| output.ticks).sum::<u64>();
         bar.show(format!("{ticks} ticks"));
@@ -108,14 +106,6 @@ fn make(
     report.warn();
     print_summary(args, &if args.json { show::json(&report) } else { report.human() })?;
     Ok(Exit::of_loss(report.lost_data()))
-}
-
-/// From which time of reception on ticks are given out; the part then begins with the log.
-fn beginning(files: &LogFiles, part: &mut Part) -> Result<u64, Error> {
-    let first = files.open(&Part::default())?.next_message()?;
-    let start = std::mem::take(&mut part.start);
-    let start_ns = u64::try_from(start.as_ns()).unwrap_or(0);
-    Ok(first.map_or(0, |message| message.received_ns.saturating_add(start_ns)))
 }
 
 /// What each unit of the log is corrected by; and what is said of units that nothing is known to correct by.

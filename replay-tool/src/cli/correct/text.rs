@@ -60,7 +60,10 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     for warning in &loaded.warnings {
         show::warn(&warning.to_string());
     }
-    let mut events = args.log.events()?;
+    let mut part = args.log.part()?;
+    // A unit's state rests on all that came before the part: that is corrected and not given out.
+    let from_ns = args.log.files(1, Some(&loaded.unit))?.from_beginning(&mut part)?;
+    let mut events = args.log.events(&part)?;
     let mut inputs = events.paths().to_vec();
     inputs.extend(args.log.mapping_file().into_iter().chain([calibration.to_owned()]));
     let mut sink = Sink::open(args, std::slice::from_ref(&loaded.unit), &inputs)?;
@@ -68,8 +71,14 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let mut stream = loaded.stream(settings);
     let mut sums = Sums::default();
     let mut bar = Bar::over_log(events.progress().watch());
+    let mut ticks_before = 0;
     for event in &mut events {
-        stream.handle((&event?).into());
+        let event = event?;
+        stream.handle((&event).into());
+        if u64::try_from(event.time().as_ns()).unwrap_or(0) < from_ns {
+            stream.drop_ready();
+            ticks_before = stream.unit().counters().gyro_ticks_in;
+        }
         if stream.ready().len() >= BLOCK {
             sink.write(take(&mut stream, &mut sums, form))?;
         }
@@ -77,7 +86,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     }
     stream.flush();
     let ticks_in = stream.unit().counters().gyro_ticks_in;
-    if ticks_in == 0 && !events.report().lost_data() {
+    if ticks_in == ticks_before && !events.report().lost_data() {
         return Err(Error::Nothing("corrected"));
     }
     sink.write(take(&mut stream, &mut sums, form))?;
