@@ -31,20 +31,27 @@ impl Files {
     /// Looks whether there is a place for them.
     ///
     /// # Errors
-    /// [`Error::Usage`] where there are files of this name already, and may not be written over, or are being written.
+    /// [`Error::Usage`] where `out` has no file name, or there are files of this name already, and may not be written over, or are
+    /// being written.
     pub(super) fn new(
         out: &Path,
         rotates: bool,
         keep: Option<usize>,
         overwrite: bool,
     ) -> Result<Self, Error> {
+        let is_folder = out.as_os_str().as_encoded_bytes().ends_with(b"/");
+        let Some(name) = out.file_name().filter(|_| !is_folder) else {
+            let folder = out.display();
+            let words = format!("--out {folder} is a folder: give the file's name too, such as {folder}/run");
+            return Err(Error::Usage(words.replace("//", "/")));
+        };
         let out = match out.extension() {
             Some(extension) if extension == EXTENSION => out.to_owned(),
             _ => {
-                let mut name = out.as_os_str().to_owned();
+                let mut name = name.to_owned();
                 name.push(".");
                 name.push(EXTENSION);
-                name.into()
+                out.with_file_name(name)
             }
         };
         let files = Self { out, rotates, keep, overwrite, number: 0, kept: VecDeque::new(), deleted: 0 };
@@ -129,6 +136,12 @@ mod tests {
         fs::write(folder.path().join("run.mcap"), "").unwrap();
         assert!(Files::new(&out, false, None, false).is_err());
         assert!(Files::new(&out, false, None, true).is_ok());
+        for folder in ["folder/", "folder/run.mcap/", ".", "..", "/"] {
+            assert!(
+                matches!(Files::new(Path::new(folder), false, None, false), Err(Error::Usage(_))),
+                "{folder}"
+            );
+        }
 
         let mut row = Files::new(&out, true, Some(2), false).unwrap();
         for number in 1..=4 {
