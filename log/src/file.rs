@@ -53,20 +53,22 @@ pub(crate) fn open_log(path: &Path, action: &'static str) -> Result<File, Error>
     File::open(path).map_err(|source| Error::file(path, action, source))
 }
 
-/// Refuses an output that is one of the other files of the command, before anything is written.
+/// Refuses an output that is one of the other files of the command, or is called as one until it is whole, before anything is written.
 ///
 /// # Errors
 /// [`Error::Usage`].
 pub fn refuse_overwriting(out: &Path, others: &[&Path]) -> Result<(), Error> {
-    match others.iter().find(|other| are_one(out, other)) {
-        // Devices may be given twice.
-        Some(other) if out.is_file() || !out.exists() => Err(Error::Usage(format!(
-            "{} would be overwritten: it is also the {} of this command; give another name",
-            out.display(),
-            other.display()
-        ))),
-        _ => Ok(()),
+    // Devices may be given twice.
+    for out in [out, &partial_of(out)].into_iter().filter(|out| out.is_file() || !out.exists()) {
+        if let Some(other) = others.iter().find(|other| are_one(out, other)) {
+            return Err(Error::Usage(format!(
+                "{} would be overwritten: it is also the {} of this command; give another name",
+                out.display(),
+                other.display()
+            )));
+        }
     }
+    Ok(())
 }
 
 /// Refuses an output that would replace what is there, unless it may; a device or a pipe is written to as it is.
@@ -276,6 +278,7 @@ mod tests {
             ("link.csv", "log.csv", false),
             ("./log.csv", "link.csv", false),
             ("new.csv", "new.csv", false),
+            ("new.csv", "new.csv.partial", false),
             ("new.csv", "log.csv", true),
         ] {
             assert_eq!(refuse_overwriting(&path(out), &[&path(other)]).is_ok(), allowed, "{out} {other}");
