@@ -67,7 +67,9 @@ fn known(kind: Kind, increment: bool, plain: &str) -> Option<Unit> {
     let (unit, scale) = match (kind, plain) {
         (Kind::Gyro, "deg") if increment => ("deg", 1.0),
         (Kind::Gyro, "rad") if increment => ("rad", 1.0),
-        (Kind::Gyro, "arcs" | "as" | "\"" | "″") if increment => ("arcsec", 1.0),
+        (Kind::Gyro, "as" | "\"" | "″") if increment => ("arcsec", 1.0),
+        // No rate is measured in it.
+        (Kind::Gyro, "arcs") => ("arcsec", 1.0),
         (Kind::Accel, "ms" | "ms-1") if increment => ("m_per_s", 1.0),
         (Kind::Gyro | Kind::Accel, _) if increment => return None,
         (Kind::Gyro, "degs" | "degs-1" | "dps") => ("deg_per_s", 1.0),
@@ -118,7 +120,8 @@ pub(super) fn named(kind: Kind, increment: bool, parts: &[String]) -> Option<(Un
 /// The quantity that is measured in a unit of angular rate, specific force or temperature.
 pub(super) fn kind_of(text: &str) -> Option<Kind> {
     let is = |kind: &Kind| {
-        unit(*kind, false, text).is_some_and(|(unit, _)| !matches!(unit, "raw" | "counts" | "volt"))
+        unit(*kind, false, text)
+            .is_some_and(|(unit, _)| !matches!(unit, "raw" | "counts" | "volt" | "arcsec"))
     };
     [Kind::Gyro, Kind::Accel, Kind::Temperature].into_iter().find(is)
 }
@@ -147,6 +150,7 @@ mod tests {
             ("gx (°/h)", Some(("deg_per_h", None))),
             ("gx [°/min]", Some(("deg_per_s", Some(1.0 / 60.0)))),
             ("gx_arcsec_s", Some(("deg_per_h", None))),
+            ("gx [arcsec]", Some(("arcsec", None))),
             ("gx_deg_s", Some(("deg_per_s", None))),
             ("gyro_deg_x", Some(("deg_per_s", None))),
             ("ax [ug]", Some(("g", Some(1e-6)))),
