@@ -46,12 +46,10 @@ fn with_help(command: Command) -> Command {
     }
     let rare = command.get_arguments().any(Arg::is_hide_short_help_set);
     let help = Arg::new("help").short('h').long("help").action(ArgAction::HelpShort).help("Print help");
-    let command = command.disable_help_flag(true).arg(help);
-    if !rare {
-        return command;
-    }
     let all = Arg::new("help-advanced").long("help-advanced").action(ArgAction::HelpLong);
-    command.arg(all.help("Print help with rare options"))
+    // Where no option is rare, it is taken and says the same.
+    let all = all.help("Print help with rare options").hide(!rare);
+    command.disable_help_flag(true).arg(help).arg(all)
 }
 
 #[cfg(test)]
@@ -103,6 +101,9 @@ mod tests {
             assert!(!text.contains("--rarely"), "{text}");
         }
         assert!(help("--help-advanced").contains("--rarely"));
+        let order = command::<Cli>().try_get_matches_from(["program", "order", "--help-advanced"]);
+        let order = order.unwrap_err();
+        assert!(order.kind() == ErrorKind::DisplayHelp && !order.to_string().contains("advanced"), "{order}");
         command::<Cli>().debug_assert();
     }
 
