@@ -147,7 +147,7 @@ pub const fn input_name(input: Input) -> &'static str {
 }
 
 fn counted(frames: u64, input: Input) -> String {
-    format!("{frames} frame{} {}", if frames == 1 { "" } else { "s" }, input_name(input))
+    format!("{frames} {} frame{}", input_name(input), if frames == 1 { "" } else { "s" })
 }
 
 fn entries(from: u64, to: u64) -> String {
