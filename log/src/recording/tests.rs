@@ -14,7 +14,7 @@ use super::*;
 use crate::error::Error;
 use crate::file::is_being_written;
 use crate::message::{Message, Topic};
-use crate::part::{LogFiles, Part};
+use crate::part::{LogFiles, Part, are_recordings};
 use crate::source::LogReport;
 
 fn message(serial: &str, time_ns: i64, received_ns: u64) -> Message {
@@ -281,4 +281,18 @@ fn a_file_given_up_ends_behind_what_was_whole() {
     // Others read it too.
     let bytes = std::fs::read(&path).unwrap();
     assert_eq!(mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count(), 10);
+}
+
+#[test]
+fn a_recording_is_told_by_its_first_bytes_and_a_damaged_one_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        are_recordings(&[path])
+    };
+    assert!(matches!(told("whole", MAGIC), Ok(true)));
+    assert!(matches!(told("log.csv", b"1,2\n"), Ok(false)));
+    assert!(matches!(told("damaged.mcap", &MAGIC[1..]), Err(Error::File { .. })));
+    assert!(matches!(are_recordings(&[folder.path().join("none.mcap")]), Ok(false)));
 }
