@@ -232,7 +232,9 @@ impl Messages {
 /// [`Error::Usage`] where some are recordings and others are not, or one is a pipe; [`Error::File`] for one that only its name tells.
 pub fn are_recordings(paths: &[PathBuf]) -> Result<bool, Error> {
     paths.iter().try_for_each(|path| refuse_pipe(path))?;
-    let named = |path: &&PathBuf| path.extension().is_some_and(|end| end == "mcap") && path.is_file();
+    // An empty one holds nothing to repair.
+    let has_bytes = |path: &PathBuf| path.metadata().is_ok_and(|file| file.is_file() && file.len() > 0);
+    let named = |path: &&PathBuf| path.extension().is_some_and(|end| end == "mcap") && has_bytes(path);
     if let Some(path) = paths.iter().filter(named).find(|path| !is_recording(path)) {
         let words = "its first bytes are damaged; repair it with `isotherm-replay recover`";
         return Err(Error::file(path, "read the recording", io::Error::other(words)));

@@ -294,5 +294,6 @@ fn a_recording_is_told_by_its_first_bytes_and_a_damaged_one_by_its_name() {
     assert!(matches!(told("whole", MAGIC), Ok(true)));
     assert!(matches!(told("log.csv", b"1,2\n"), Ok(false)));
     assert!(matches!(told("damaged.mcap", &MAGIC[1..]), Err(Error::File { .. })));
+    assert!(matches!(told("empty.mcap", b""), Ok(false)));
     assert!(matches!(are_recordings(&[folder.path().join("none.mcap")]), Ok(false)));
 }
