@@ -5,7 +5,7 @@
 
 FOLDER holds log.mcap and what was made of it: text/UNIT/{raw,corrected}.csv, the bag ros2 (with --raw) and
 parquet/UNIT/STREAM.parquet; and documents.json with what the units' calibration documents say of raw readings: the
-angle of a count (rad, null for means), and whether the accelerometers read m/s2. The CSV files say what there must be; the recording, the bag and the tables must say the
+angle of a count (rad, null for means), the specific force of an accelerometer's reading (m/s2), and whether these are counts. The CSV files say what there must be; the recording, the bag and the tables must say the
 same, to the last bit. Prints how much was compared as one JSON object. Exit codes: 0 all is equal, 1 something is not.
 """
 
@@ -325,15 +325,18 @@ def check_ros2(path, units, documents):
             no_force = flags & (ACCELEROMETER_MISSING | VELOCITY_INVALID)
             check_imu(what, imu, time_ns, None if flags & ANGLE_INVALID else rate, None if no_force else force)
         same(f"ros2: {name}: raw: number", len(raw[name]), len(unit.gyro))
-        weights, forces = documents[name]
-        accel = {tick["end_time_ns"]: tick["readings"] for tick in unit.accel}
+        weights, scales, are_counts = documents[name]
+        accel = {}
+        for tick in unit.accel:
+            seconds = float(tick["duration_ns"]) * 1e-9 if are_counts else 1.0
+            accel[tick["end_time_ns"]] = [reading * scale / seconds for reading, scale in zip(tick["readings"], scales)]
         for (time_ns, imu), tick in zip(raw[name], unit.gyro):
             what, seconds = f"ros2: {name}: raw {tick['sequence']}", float(tick["duration_ns"]) * 1e-9
             same(f"{what}: time", time_ns, tick["end_time_ns"])
             rate = tick["readings"]
             if weights:
                 rate = [weight * count / seconds for weight, count in zip(weights, rate)]
-            check_imu(what, imu, time_ns, rate, accel.get(time_ns) if forces else None)
+            check_imu(what, imu, time_ns, rate, accel.get(time_ns))
         same(f"ros2: {name}: applied temperatures", any(kind == "temperature" for kind, *_ in temperature[name]), True)
         given = sorted((time_ns, channel) for kind, channel, time_ns, _ in temperature[name] if kind == "temperature_raw")
         same(f"ros2: {name}: raw temperatures", given, [(time_ns, channel) for time_ns, channel, _ in unit.temperature])

@@ -8,6 +8,7 @@ use isotherm_log::mapping::Mapping;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::load_calibration;
 use isotherm_log::part::{LogFiles, Part};
+use isotherm_log::plot::nominal_forces;
 use isotherm_log::recording::{RecordingOptions, RecordingWriter};
 use isotherm_protocol::document::{AccelOutput, Document};
 use isotherm_protocol::key::UnitId;
@@ -79,8 +80,11 @@ fn raw_readings(unit: &str) -> serde_json::Value {
     let document = Document::parse(&text, None).unwrap().document;
     let weights = document.gyro.sensor.iter().map(|sensor| sensor.increment_weight_arcsec_per_count);
     let weights = weights.map(|weight| weight.map(|weight| Angle::from_arcsec(weight).as_rad()));
-    let forces = document.accel.is_some_and(|accel| accel.output == AccelOutput::MetresPerSecondSquared);
-    serde_json::json!([weights.collect::<Option<Vec<_>>>(), forces])
+    let weights = weights.collect::<Option<Vec<_>>>();
+    let output = document.accel.as_ref().map(|accel| accel.output);
+    let are_forces = output == Some(AccelOutput::MetresPerSecondSquared);
+    let scales = if are_forces { vec![1.0; 3] } else { nominal_forces(&document) };
+    serde_json::json!([weights, scales, output == Some(AccelOutput::Counts)])
 }
 
 /// Records the raw messages of the log in the folder, and what the service would publish of them.
