@@ -95,6 +95,12 @@ impl Size {
     }
 }
 
+/// Values less their mean.
+pub fn about_mean(values: &[f64]) -> Vec<f64> {
+    let mean = Size::of(values).mean;
+    values.iter().map(|value| value - mean).collect()
+}
+
 /// Standard deviation of a normal distribution, in medians of absolute deviations.
 pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Median of |a − b| of two normal numbers, in standard deviations of either.

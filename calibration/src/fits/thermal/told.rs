@@ -13,7 +13,7 @@ use super::scale::Kept;
 use super::select::{Target, Tried};
 use crate::document::{About, by_name};
 use crate::fits::drift::pieces::steps;
-use crate::numbers::Size;
+use crate::numbers::{Size, about_mean};
 use crate::report::{Curve, Report, Sigmas, Verdict, is_worse, output_unit, short};
 
 /// What a fit may leave on parts that it did not see, as a share of what the mean leaves.
@@ -147,15 +147,10 @@ impl Outcome {
 pub(super) fn wider(curves: &[Curve], verdicts: &[Verdict]) -> Vec<String> {
     let words = |verdict: &Verdict| {
         let mine = |curve: &&Curve| curve.of == verdict.of && curve.sample == Sample::Out;
-        let about_mean = |values: fn(&Curve) -> &[f64]| -> Vec<f64> {
-            let runs = curves.iter().filter(mine).map(values);
-            runs.flat_map(|run| {
-                let mean = Size::of(run).mean;
-                run.iter().map(move |value| value - mean)
-            })
-            .collect()
+        let spread_of = |values: fn(&Curve) -> &[f64]| -> Vec<f64> {
+            curves.iter().filter(mine).map(values).flat_map(about_mean).collect()
         };
-        let spread = [about_mean(|curve| &curve.before), about_mean(|curve| &curve.after)];
+        let spread = [spread_of(|curve| &curve.before), spread_of(|curve| &curve.after)];
         let [before, after] = spread.each_ref().map(|values| short(Size::of(values).rms));
         is_worse(&spread[0], &spread[1]).then(|| {
             format!(

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::gyro::GyroFit;
 use crate::fits::positions::pose::Pose;
 use crate::lsq::linear::{SINGULAR, Weak, solve};
-use crate::numbers::{Size, dot, norm, real, unit};
+use crate::numbers::{Size, about_mean, dot, norm, real, unit};
 use crate::report::short;
 
 /// Most that may be left of a gyro's scatter over the poses, in poses that the fit has not seen, by what there was.
@@ -64,11 +64,6 @@ fn earth(latitude_deg: Option<f64>) -> [f64; 2] {
         let (sine, cosine) = libm::sincos(latitude.to_radians());
         [rate * sine, rate * cosine]
     })
-}
-
-/// Most that the Earth's rate may add to a drift along a gyro's own axis where the latitude is not stated ((°/h)/g).
-pub fn largest_of_earth() -> f64 {
-    EARTH_RATE.as_deg_per_h()
 }
 
 /// Mean of something over poses, each as long as it lasted.
@@ -158,12 +153,6 @@ fn beyond_scatter(
         ));
     }
     Ok(GyroDrift { response, sizes })
-}
-
-/// Values less their mean.
-pub fn about_mean(values: &[f64]) -> Vec<f64> {
-    let mean = Size::of(values).mean;
-    values.iter().map(|value| value - mean).collect()
 }
 
 #[cfg(test)]

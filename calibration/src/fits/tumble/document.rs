@@ -5,7 +5,7 @@ use isotherm_correction::units::{AngularRate, STANDARD_GRAVITY_M_PER_S2};
 use isotherm_protocol::document::{Accel, AccelOutput, Document, GyroSensor};
 
 use super::accel::AccelFit;
-use super::acceleration::{AtRest, about_mean, mean_over};
+use super::acceleration::{AtRest, mean_over};
 use super::fit::odd::odd;
 use super::fit::{Tumble, faults};
 use super::gyro::GyroFit;
@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::fits::positions::document::{held_twice, level};
 use crate::fits::positions::track::Track;
 use crate::fits::thermal::bare::along_axes;
-use crate::numbers::dot;
+use crate::numbers::{about_mean, dot};
 use crate::report::is_worse;
 use crate::runs::Run;
 

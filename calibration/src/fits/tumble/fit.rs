@@ -3,6 +3,7 @@
 pub(super) mod doubts;
 pub(super) mod odd;
 
+use isotherm_correction::earth::EARTH_RATE;
 use isotherm_protocol::document::Document;
 
 use crate::axes::AXES;
@@ -132,7 +133,7 @@ pub fn analyse(track: &Track, settings: &Settings) -> Result<Tumble, Vec<String>
         warnings.push(format!(
             "acceleration-sensitive drift: up to {} (°/h)/g of each gyro's may be the Earth's rate, and is corrected \
              with it: state --latitude",
-            short(acceleration::largest_of_earth())
+            short(EARTH_RATE.as_deg_per_h())
         ));
     }
     let largest_rate = [0, 1, 2].map(|gyro| {
