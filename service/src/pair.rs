@@ -290,9 +290,11 @@ impl Pair {
     }
 }
 
-/// Of the units that an instance takes.
+/// Of the units that an instance takes, in whatever order they are named.
 fn group(settings: &Settings) -> String {
-    Digest::of(settings.units.join("\n").as_bytes()).to_string().chars().take(8).collect()
+    let units: BTreeSet<&str> = settings.units.iter().map(String::as_str).collect();
+    let units: Vec<_> = units.into_iter().collect();
+    Digest::of(units.join("\n").as_bytes()).to_string().chars().take(8).collect()
 }
 
 #[cfg(test)]
