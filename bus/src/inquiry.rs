@@ -117,7 +117,8 @@ pub enum Unanswered {
     Refused(String),
 }
 
-/// Every answer to a question, once somebody is there to answer it; all within `limit`.
+/// Every answer to a question, once somebody is there to answer it; all within `limit`. Of a pair one may answer what the other refuses:
+/// then the answer counts.
 ///
 /// # Errors
 /// [`Unanswered`].
@@ -137,20 +138,23 @@ pub async fn ask(
         get = get.payload(payload);
     }
     let replies = get.await.map_err(declare)?;
-    let mut answers = Vec::new();
-    loop {
+    let (mut answers, mut refusal) = (Vec::new(), None);
+    let in_time = loop {
         match timeout_at(deadline, replies.recv_async()).await {
             Ok(Ok(reply)) => match reply.into_result() {
                 Ok(sample) => answers.push(sample.payload().to_bytes().into_owned()),
                 Err(error) => {
-                    let words = String::from_utf8_lossy(&error.payload().to_bytes()).into_owned();
-                    return Err(Unanswered::Refused(words));
+                    refusal = Some(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned());
                 }
             },
-            Err(_) if answers.is_empty() => return Err(Unanswered::Silence),
             // The end of the answers, or of the time for them.
-            Ok(Err(_)) | Err(_) => return Ok(answers),
+            ended => break ended.is_ok(),
         }
+    };
+    match refusal.filter(|_| answers.is_empty()) {
+        Some(words) => Err(Unanswered::Refused(words)),
+        None if answers.is_empty() && !in_time => Err(Unanswered::Silence),
+        None => Ok(answers),
     }
 }
 

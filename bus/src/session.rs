@@ -142,6 +142,14 @@ impl SessionOptions {
         Ok(endpoints(&self.to_config()?, "connect/endpoints"))
     }
 
+    /// The endpoints that it listens on.
+    ///
+    /// # Errors
+    /// As [`Self::to_config`].
+    pub fn listens_on(&self) -> Result<Vec<String>, BusError> {
+        Ok(endpoints(&self.to_config()?, "listen/endpoints"))
+    }
+
     /// What an opening session may have to wait for, in words: "a router or peer at tcp/127.0.0.1:7447".
     ///
     /// # Errors

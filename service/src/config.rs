@@ -176,6 +176,11 @@ impl Settings {
     pub(crate) fn check_other(&self) -> Result<(), String> {
         let Some(other) = &self.pair.other else { return Ok(()) };
         // Addresses that cannot be read are reported elsewhere.
+        if self.zenoh.session.listens_on().unwrap_or_default().contains(other) {
+            return Err(format!(
+                "is {other:?}, where this instance listens: give the address of the other one"
+            ));
+        }
         if self.zenoh.session.connects_to().unwrap_or_default().contains(other) {
             return Err(format!(
                 "is {other:?}, which this instance connects to: only one of the two may connect"

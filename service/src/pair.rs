@@ -290,9 +290,11 @@ impl Pair {
     }
 }
 
-/// Of the units that an instance takes.
+/// Of the units that an instance takes, in whatever order they are named.
 fn group(settings: &Settings) -> String {
-    Digest::of(settings.units.join("\n").as_bytes()).to_string().chars().take(8).collect()
+    let units: BTreeSet<&str> = settings.units.iter().map(String::as_str).collect();
+    let units: Vec<_> = units.into_iter().collect();
+    Digest::of(units.join("\n").as_bytes()).to_string().chars().take(8).collect()
 }
 
 #[cfg(test)]
@@ -306,7 +308,7 @@ mod tests {
 
     use super::*;
     use crate::control::revision::Calibrations;
-    use crate::receive::intake::OutletMaker;
+    use crate::receive::intake::{Answers, OutletMaker};
 
     fn other() -> Member {
         let group = Pair::new(&Settings::default(), "me".to_owned(), 2, Vec::new()).me.group;
@@ -398,14 +400,25 @@ mod tests {
     fn what_is_asked_while_nobody_publishes_any_more_waits_for_the_takeover() {
         let (pair, intake, _) = beside_another();
         let unit = UnitId::new("U").unwrap();
-        assert!(!intake.answers_for(&unit), "the other does");
+        assert_eq!(intake.answers_for(&unit), Answers::Elsewhere);
         pair.go("other");
         std::thread::scope(|scope| {
             let answers = scope.spawn(|| intake.answers_for(&unit));
             // However long that is, the answer is the same; it is long enough for one that does not wait.
             std::thread::sleep(Duration::from_millis(30));
             intake.with(&unit, |actor| actor.speak(Instant::now(), Duration::ZERO)).unwrap();
-            assert!(answers.join().unwrap());
+            assert_eq!(answers.join().unwrap(), Answers::Here);
+        });
+        // Before the watch has looked, a process that was stopped speaks as far as its units know.
+        pair.come(other());
+        std::thread::sleep(pair.takeover * 2);
+        std::thread::scope(|scope| {
+            let answers = scope.spawn(|| intake.answers_for(&unit));
+            std::thread::sleep(Duration::from_millis(30));
+            intake.with(&unit, |actor| actor.follow(Instant::now(), Footing::All)).unwrap();
+            pair.look(Instant::now());
+            pair.told();
+            assert_eq!(answers.join().unwrap(), Answers::Unknown, "no word of what is not done is worse");
         });
     }
 }

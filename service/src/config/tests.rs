@@ -161,6 +161,7 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         "max_units = -1",
         "[pair]\nother = \"a:70000\"",
         "[pair]\nother = \"a:7\"\n[zenoh]\nconnect = [\"tcp/a:7\"]",
+        "[pair]\nother = \"a:7\"\n[zenoh]\nlisten = [\"tcp/a:7\"]",
         "pairing_window_ms = 0",
         "temperature_delay_ms = \"5\"",
         "tail_flush_ms = 9",

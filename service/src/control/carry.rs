@@ -1,29 +1,39 @@
-//! Histories and documents of the instance that speaks, written down here too: a state folder that was looked after by a standby is
-//! as complete as the other's.
+//! Histories and documents of the other instance, written down here too: a state folder that was looked after by a standby is as
+//! complete as the other's.
+//!
+//! One rule says which set is the last good one: the last that is written down. What the instance that speaks has accepted last is
+//! therefore written last in both audit files, once more where something older was copied behind it. What the other one had accepted
+//! while the two were apart comes before it, so that no number is used twice and nothing is gone without a word
+//! (`Store::set_aside`).
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::SystemTime;
+use std::sync::Arc;
 
 use isotherm_correction::operation::Command;
+use isotherm_correction::units::Span;
 use isotherm_protocol::control::Order;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, CommandRecord, FirstTick, Source};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::key::{self, UnitId};
-use isotherm_protocol::overlay::base_of;
+use isotherm_protocol::overlay::{Candidate, base_of};
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 
+use super::change::Change;
 use super::command::{PRE_LAUNCH_ENDED, PreLaunchRun, order_of, words};
+use super::document::Document;
 use super::manager::Worker;
 use super::request::reply;
-use super::revision::Record;
+use super::revision::{Record, Revision};
 use crate::control::store::StoreError;
 
 /// What another instance has written down of a unit.
 #[derive(Debug, Clone)]
 pub(crate) struct Carried {
     pub(crate) unit: UnitId,
+    /// Whether that one speaks for the unit, so that it holds here; else this one does, and takes in what was accepted there.
+    pub(crate) holds: bool,
     /// Oldest first.
     pub(crate) entries: Vec<AuditEntry>,
     /// Documents and overlays, by their digests.
@@ -53,11 +63,10 @@ impl Worker {
         held(self.store.document(digest)) || held(self.store.overlay(digest))
     }
 
-    /// Writes down what is not here yet, and has the unit's plan be what it says; nothing of a unit that this instance speaks for. Whether it is
-    /// all written down.
+    /// Writes down what is not here yet, and has the unit's plan be what holds there. Whether it is all written down.
     pub(super) fn carry(&mut self, carried: &Carried) -> bool {
-        let Carried { unit, entries, kept } = carried;
-        if self.intake.speaks_for(unit) {
+        let Carried { unit, holds, entries, kept } = carried;
+        if self.intake.speaks_for(unit) == *holds {
             return false;
         }
         let done = kept.values().try_for_each(|bytes| {
@@ -68,16 +77,32 @@ impl Worker {
             };
             put.map(drop)
         });
-        let done = done.and_then(|()| self.carry_entries(unit, entries));
-        match done {
-            Ok(0) => return true,
-            Ok(count) => {
-                tracing::debug!(%unit, count, "entries of the other instance's audit file are copied");
-            }
+        let count = match done.and_then(|()| self.carry_entries(carried)) {
+            Ok(count) => count,
             Err(error) => {
-                tracing::error!(%unit, "the other instance's history is not copied: {error}");
+                // Tried again until it is done: told once.
+                if self.uncopied.insert(unit.clone()) {
+                    tracing::error!(%unit, "the other instance's history is not copied: {error}");
+                }
                 return false;
             }
+        };
+        self.uncopied.remove(unit);
+        if count == 0 {
+            return true;
+        }
+        tracing::debug!(%unit, count, "entries of the other instance's audit file are copied");
+        if let Some((_, set)) = self.store.set_aside().find(|(of, _)| *of == unit) {
+            tracing::error!("{}", self.aside(unit, set));
+        }
+        self.say_again(unit);
+        if !holds {
+            return true;
+        }
+        if is_forgotten(entries) {
+            self.let_go(unit);
+            tracing::info!(%unit, "forgotten, as the other instance was told to");
+            return true;
         }
         let before = self.records.get(unit);
         let (accepted, refused) = before.map(|record| (record.accepted, record.refused)).unwrap_or_default();
@@ -96,22 +121,56 @@ impl Worker {
         self.intake.plan_again(unit, plan);
     }
 
-    fn carry_entries(&mut self, unit: &UnitId, entries: &[AuditEntry]) -> Result<usize, StoreError> {
+    fn carry_entries(&mut self, carried: &Carried) -> Result<usize, StoreError> {
+        let Carried { unit, holds, entries, .. } = carried;
+        let own = if *holds { Vec::new() } else { self.store.history(Some(unit), usize::MAX)? };
+        let holding = if *holds { entries } else { &own };
+        let begin = holding.iter().rposition(is_forget).map_or(0, |place| place + 1);
+        let accepted = |entry: &&AuditEntry| matches!(entry.event, AuditEvent::Accepted(_));
+        let last = holding.iter().skip(begin).rfind(accepted);
+        if !holds && last.is_none() {
+            // Nothing to put them before.
+            return Ok(0);
+        }
         let mut fresh = Vec::new();
-        for entry in entries {
+        for entry in entries.iter().filter(|entry| is_copied(&entry.event, *holds)) {
             if !self.store.has_written(unit, entry)? && !self.knows(unit, &entry.event) {
                 fresh.push(entry);
             }
         }
-        // What holds there holds here, whatever was accepted here before.
-        let last = entries.iter().rfind(|entry| matches!(entry.event, AuditEvent::Accepted(_)));
-        if let Some((entry, AuditEvent::Accepted(accepted))) = last.map(|entry| (entry, &entry.event)) {
-            let good = self.store.last_good(unit);
-            let same =
-                good.is_some_and(|good| (good.revision, good.digest) == (accepted.revision, accepted.digest));
-            let comes = fresh.iter().any(|fresh| matches!(fresh.event, AuditEvent::Accepted(_)));
-            if !same && !comes {
-                fresh.push(entry);
+        if let Some((entry, AuditEvent::Accepted(set))) = last.map(|entry| (entry, &entry.event)) {
+            let written = fresh.iter().copied().rfind(accepted);
+            let is_last = match written.map(|entry| &entry.event) {
+                Some(AuditEvent::Accepted(written)) => is_same(written, set),
+                _ => self
+                    .store
+                    .last_good(unit)
+                    .is_some_and(|good| (good.revision, good.digest) == (set.revision, set.digest)),
+            };
+            if !is_last {
+                // With its first tick: one that waited for its own does not wait again.
+                let of_set = |other: &&AuditEntry| match &other.event {
+                    AuditEvent::InForce(first) => first.revision == set.revision,
+                    _ => std::ptr::eq(*other, entry),
+                };
+                let again: Vec<_> =
+                    holding.iter().skip_while(|other| !std::ptr::eq(*other, entry)).filter(of_set).collect();
+                fresh.retain(|entry| !again.iter().any(|again| std::ptr::eq(*again, *entry)));
+                fresh.extend(again);
+            }
+        }
+        if *holds {
+            let mut intent = self.store.intent(unit).cloned().unwrap_or_default();
+            fresh.iter().filter_map(|entry| command(entry)).for_each(|record| intent.note(record));
+            for is_of_kind in [is_of_state, is_of_rest] {
+                let of_kind = |entry: &&AuditEntry| {
+                    command(entry).and_then(|it| it.order.as_ref()).is_some_and(is_of_kind)
+                };
+                let wanted = entries.iter().skip(begin).rfind(of_kind);
+                let mut then = intent.clone();
+                wanted.and_then(command).into_iter().for_each(|record| then.note(record));
+                fresh.extend(wanted.filter(|_| then != intent));
+                intent = then;
             }
         }
         for entry in &fresh {
@@ -142,54 +201,88 @@ impl Worker {
         self.unclaimed = others;
         let mine: Vec<(UnitId, FirstTick)> = mine;
         for (_, first) in mine {
-            self.note(Some(unit), "", AuditEvent::InForce(first), "the first tick");
+            // What this one computed before it was in step with the other was published by nobody.
+            if self.store.by_revision(unit, first.revision).is_some_and(|set| !set.in_force) {
+                self.note(Some(unit), "", AuditEvent::InForce(first), "the first tick");
+            }
         }
     }
 
-    /// What another instance was ordered, and this one goes on with: written down where that one's history did not come in time.
-    pub(super) fn note_followed(&mut self, unit: &UnitId, entry: &JournalEntry) {
+    /// What another instance was ordered, and this one goes on with: written down where that one's history did not come in time. What
+    /// cannot be written is in force all the same, and is tried again.
+    pub(super) fn note_followed(&mut self, unit: &UnitId, entry: Box<JournalEntry>) {
+        let Err(error) = self.write_followed(unit, &entry) else { return };
+        if let JournalEvent::Changed { revision, at, slew_ns, document: Some(text), .. } = &entry.event {
+            tracing::error!(%unit, revision = revision.counter, "the calibration in force is not in the audit file: {error}");
+            let mut record = self.records.get(unit).cloned().unwrap_or_default();
+            if let Ok(candidate) = Candidate::parse(text, None, None) {
+                let document = Arc::new(Document::of(candidate, None, text.as_bytes()));
+                let next = Arc::new(Revision::new(revision.counter, document, &Source::Bus));
+                record.plan.change(Change { next, at: *at, slew: Span::from_ns(*slew_ns) });
+                self.plan_again(unit, record);
+            }
+        } else {
+            tracing::error!(%unit, "a command of another instance is not in the audit file: {error}");
+        }
+        self.followed.push((unit.clone(), entry));
+    }
+
+    /// Tries to write down what could not be.
+    pub(super) fn retry_followed(&mut self) {
+        for (unit, entry) in std::mem::take(&mut self.followed) {
+            // One behind the other.
+            let waits = self.followed.iter().any(|(of, _)| *of == unit);
+            if waits || self.write_followed(&unit, &entry).is_err() {
+                self.followed.push((unit, entry));
+            }
+        }
+    }
+
+    fn write_followed(&mut self, unit: &UnitId, entry: &JournalEntry) -> Result<(), StoreError> {
         let (revision, at, slew_ns, document, source) = match &entry.event {
             JournalEvent::Changed { revision, at, slew_ns, document: Some(document), source, .. } => {
                 (revision, at, slew_ns, document, source)
             }
             JournalEvent::Commanded { command, words, .. } => {
-                return self.note_commanded(unit, command, words, &entry.instance);
+                return self.write_commanded(unit, command, words, &entry.instance);
             }
-            _ => return,
+            _ => return Ok(()),
         };
-        if revision.counter <= self.store.highest_revision(unit) {
-            return;
+        let good = self.store.last_good(unit).map(|good| good.revision);
+        if revision.counter <= good.unwrap_or_else(|| self.store.highest_revision(unit)) {
+            return Ok(());
         }
-        let base = self.in_force(unit).and_then(|active| active.document.digest());
-        let stored = self.store.put_document(document.as_bytes()).and_then(|digest| {
-            let accepted = Acceptance {
-                revision: revision.counter,
-                digest,
-                overlay: None,
-                source: Source::Bus,
-                base,
-                changed: vec![format!(
-                    "from the journal of instance {}, which had it from: {source}",
-                    entry.instance
-                )],
-                schedule: *at,
-                slew_ms: u64::try_from(slew_ns / 1_000_000).unwrap_or(0),
-            };
-            self.store.append(SystemTime::now(), Some(unit), "", AuditEvent::Accepted(accepted))
-        });
-        if let Err(error) = stored {
-            tracing::error!(%unit, revision = revision.counter, "the calibration in force is not in the audit file: \
-                {error}");
-            return;
-        }
+        let base = self.store.last_good(unit).map(|good| good.digest);
+        let digest = self.store.put_document(document.as_bytes())?;
+        let accepted = Acceptance {
+            revision: revision.counter,
+            digest,
+            overlay: None,
+            source: Source::Bus,
+            base,
+            changed: vec![format!(
+                "from the journal of instance {}, which had it from: {source}",
+                entry.instance
+            )],
+            schedule: *at,
+            slew_ms: u64::try_from(slew_ns / 1_000_000).unwrap_or(0),
+        };
+        self.append(Some(unit), "", AuditEvent::Accepted(accepted))?;
         self.plan_again(unit, self.restored(unit));
+        Ok(())
     }
 
     /// A command that led to a state, unless it is the last that is written down.
-    fn note_commanded(&mut self, unit: &UnitId, command: &Command, state: &str, instance: &str) {
+    fn write_commanded(
+        &mut self,
+        unit: &UnitId,
+        command: &Command,
+        state: &str,
+        instance: &str,
+    ) -> Result<(), StoreError> {
         let last = self.store.last_command(unit);
         if last.is_some_and(|last| last.state_after == state && last.command.starts_with(command.name())) {
-            return;
+            return Ok(());
         }
         let state_before = last.map_or_else(String::new, |last| last.state_after.clone());
         let order = order_of(command);
@@ -202,7 +295,7 @@ impl Worker {
             last_sequence: None,
             order,
         };
-        self.note(Some(unit), "", AuditEvent::Command(record), "a command of another instance");
+        self.append(Some(unit), "", AuditEvent::Command(record))
     }
 
     /// A query on `isotherm/*/kept/*`: a document or an overlay by its digest; none is no answer.
@@ -229,9 +322,49 @@ fn running(before: Option<PreLaunchRun>, entries: &[AuditEntry]) -> Option<PreLa
     })
 }
 
+/// Whether an entry is copied: what a folder holds is each instance's own; of one that does not speak, what it accepted.
+fn is_copied(event: &AuditEvent, holds: bool) -> bool {
+    match event {
+        AuditEvent::CarriedFile(_) => false,
+        AuditEvent::Accepted(_) | AuditEvent::InForce(_) | AuditEvent::Withdrawn(_) => true,
+        _ => holds,
+    }
+}
+
+fn is_same(one: &Acceptance, other: &Acceptance) -> bool {
+    (one.revision, one.digest) == (other.revision, other.digest)
+}
+
+/// The command of an entry that was carried out.
+fn command(entry: &AuditEntry) -> Option<&CommandRecord> {
+    match &entry.event {
+        AuditEvent::Command(record) if record.accepted => Some(record),
+        _ => None,
+    }
+}
+
+fn is_of_state(order: &Order) -> bool {
+    matches!(order, Order::Standby | Order::Run { .. })
+}
+
+fn is_of_rest(order: &Order) -> bool {
+    matches!(order, Order::Rest(_) | Order::EndRest)
+}
+
+fn is_forget(entry: &AuditEntry) -> bool {
+    command(entry).is_some_and(|record| record.order == Some(Order::Forget))
+}
+
+/// Whether the unit was forgotten, and given nothing since.
+fn is_forgotten(entries: &[AuditEntry]) -> bool {
+    let given =
+        |entry: &&AuditEntry| matches!(entry.event, AuditEvent::Accepted(_)) || command(entry).is_some();
+    entries.iter().rfind(given).is_some_and(is_forget)
+}
+
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::time::SystemTime;
 
     use isotherm_protocol::control::Schedule;
 
@@ -241,33 +374,139 @@ mod tests {
     use crate::control::store::{Opened, Store};
     use crate::receive::intake::Intake;
 
-    #[test]
-    fn a_swap_that_was_taken_from_the_journal_is_not_written_down_again() {
-        let (settings, unit) = (Settings::default(), UnitId::new("U").unwrap());
+    fn unit() -> UnitId {
+        UnitId::new("U").unwrap()
+    }
+
+    fn worker() -> Worker {
+        let settings = Settings::default();
         let outlets = Box::new(|_: &_| Err("there is none".into()));
         let intake = Arc::new(Intake::new(settings.clone(), Calibrations::default(), outlets));
-        let mut worker = Worker::new(&settings, intake, Store::in_memory(), &Opened::default());
-        let digests = ["one", "other"].map(|text| worker.store.put_document(text.as_bytes()).unwrap());
-        let accepted = |digest, changed: &[&str]| {
-            let changed = changed.iter().map(|it| (*it).to_owned()).collect();
-            AuditEvent::Accepted(Acceptance {
-                revision: 6,
-                digest,
-                overlay: None,
-                source: Source::Bus,
-                base: None,
-                changed,
-                schedule: Schedule::NextTick,
-                slew_ms: 0,
-            })
-        };
-        worker.append(Some(&unit), "root", accepted(digests[0], &[])).unwrap();
-        let mut carried = |digest| {
-            let (time, event) = (SystemTime::UNIX_EPOCH.into(), accepted(digest, &["from the journal"]));
-            let entry =
-                AuditEntry { number: 1, time, unit: Some(unit.to_string()), by: String::new(), event };
-            worker.carry_entries(&unit, &[entry]).unwrap()
-        };
-        assert_eq!(digests.map(&mut carried), [0, 1], "what holds there holds here");
+        Worker::new(&settings, intake, Store::in_memory(), &Opened::default())
+    }
+
+    /// A set, of which the text says which it is.
+    fn accepted(worker: &mut Worker, (revision, text): (u64, &str)) -> AuditEvent {
+        AuditEvent::Accepted(Acceptance {
+            revision,
+            digest: worker.store.put_document(text.as_bytes()).unwrap(),
+            overlay: None,
+            source: Source::Bus,
+            base: None,
+            changed: Vec::new(),
+            schedule: Schedule::NextTick,
+            slew_ms: 0,
+        })
+    }
+
+    fn ordered(order: Order) -> AuditEvent {
+        AuditEvent::Command(CommandRecord {
+            command: words(&order),
+            accepted: true,
+            reason: None,
+            state_before: String::new(),
+            state_after: String::new(),
+            last_sequence: None,
+            order: Some(order),
+        })
+    }
+
+    /// What another instance has written down.
+    fn theirs(holds: bool, events: Vec<AuditEvent>) -> Carried {
+        let entries = (1..).zip(events).map(|(number, event)| {
+            let time = SystemTime::UNIX_EPOCH.into();
+            AuditEntry { number, time, unit: Some("U".to_owned()), by: String::new(), event }
+        });
+        Carried { unit: unit(), holds, entries: entries.collect(), kept: BTreeMap::new() }
+    }
+
+    #[test]
+    fn a_swap_that_was_taken_from_the_journal_is_not_written_down_again() {
+        let mut worker = worker();
+        let event = accepted(&mut worker, (6, "one"));
+        worker.append(Some(&unit()), "root", event).unwrap();
+        let counts = ["one", "other"].map(|text| {
+            let carried = theirs(true, vec![accepted(&mut worker, (6, text))]);
+            worker.carry_entries(&carried).unwrap()
+        });
+        assert_eq!(counts, [0, 1], "what holds there holds here");
+    }
+
+    /// Own sets, those of the other instance, what is written down then, and what is set aside; for a standby, and for one that speaks.
+    #[test]
+    fn the_set_that_the_speaking_instance_accepted_last_is_written_last() {
+        type Sets<'s> = &'s [(u64, &'s str)];
+        let cases: [(bool, Sets<'_>, Sets<'_>, Sets<'_>, Option<u64>); 7] = [
+            (true, &[(1, "a")], &[(1, "a"), (2, "b")], &[(1, "a"), (2, "b")], None),
+            (
+                true,
+                &[(1, "a"), (2, "c")],
+                &[(1, "a"), (2, "b"), (3, "d"), (2, "c")],
+                &[(1, "a"), (2, "c"), (2, "b"), (3, "d"), (2, "c")],
+                Some(3),
+            ),
+            (
+                true,
+                &[(1, "a"), (2, "b"), (3, "d")],
+                &[(1, "a")],
+                &[(1, "a"), (2, "b"), (3, "d"), (1, "a")],
+                Some(3),
+            ),
+            (true, &[(1, "a"), (2, "b")], &[(1, "a"), (2, "c")], &[(1, "a"), (2, "b"), (2, "c")], Some(2)),
+            (
+                false,
+                &[(1, "a")],
+                &[(1, "a"), (2, "b"), (3, "d")],
+                &[(1, "a"), (2, "b"), (3, "d"), (1, "a")],
+                Some(3),
+            ),
+            (false, &[(1, "a"), (2, "b")], &[(1, "a")], &[(1, "a"), (2, "b")], None),
+            (false, &[], &[(1, "a")], &[], None),
+        ];
+        for (holds, own, other, written, aside) in cases {
+            let mut worker = worker();
+            for set in own {
+                let event = accepted(&mut worker, *set);
+                worker.append(Some(&unit()), "", event).unwrap();
+            }
+            let events = other.iter().map(|set| accepted(&mut worker, *set)).collect();
+            let carried = theirs(holds, events);
+            worker.carry_entries(&carried).unwrap();
+            assert_eq!(worker.carry_entries(&carried).unwrap(), 0, "once");
+            let mut sets: Vec<_> =
+                worker.store.good_sets(&unit()).map(|set| (set.revision, set.digest)).collect();
+            sets.reverse();
+            let written = written.iter().map(|(revision, text)| (*revision, Digest::of(text.as_bytes())));
+            assert_eq!(sets, written.collect::<Vec<_>>(), "{own:?}, {other:?}");
+            assert_eq!(
+                worker.store.set_aside().next().map(|(_, set)| set.revision),
+                aside,
+                "{own:?}, {other:?}"
+            );
+            let next = worker.store.highest_revision(&unit()) + 1;
+            let event = accepted(&mut worker, (next, "next"));
+            worker.append(Some(&unit()), "", event).unwrap();
+            assert_eq!(worker.store.set_aside().count(), 0);
+        }
+    }
+
+    #[test]
+    fn the_state_that_was_ordered_last_where_the_unit_is_published_holds() {
+        let (mut worker, run) = (worker(), Order::Run { reversal: None });
+        let orders = [run.clone(), Order::Standby];
+        for order in [Order::Standby, run.clone(), Order::Standby] {
+            worker.append(Some(&unit()), "", ordered(order)).unwrap();
+        }
+        worker.carry_entries(&theirs(true, orders.map(ordered).into())).unwrap();
+        assert_eq!(worker.store.intent(&unit()).unwrap().state, Some(Order::Standby));
+        let carried = theirs(true, vec![ordered(Order::Standby), ordered(run.clone())]);
+        worker.carry_entries(&carried).unwrap();
+        assert_eq!(worker.store.intent(&unit()).unwrap().state, Some(run));
+        assert_eq!(worker.carry_entries(&carried).unwrap(), 0);
+        worker.carry_entries(&theirs(false, vec![ordered(Order::Forget)])).unwrap();
+        assert!(worker.store.intent(&unit()).unwrap().state.is_some(), "orders there are none here");
+        let forget = theirs(true, vec![ordered(Order::Forget)]);
+        assert!(is_forgotten(&forget.entries) && worker.carry_entries(&forget).unwrap() == 1);
+        assert_eq!(worker.store.forgotten().collect::<Vec<_>>(), [&unit()]);
     }
 }

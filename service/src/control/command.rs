@@ -98,11 +98,18 @@ impl Worker {
         // Written down first: what is forgotten must not come back with a restart.
         let written = self.append(Some(unit), by, AuditEvent::Command(record));
         written.map_err(|error| error.to_string())?;
-        self.records.remove(unit);
-        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
-        self.intake.forget(unit);
+        self.intake.tell_end(unit);
+        self.let_go(unit);
         tracing::info!(%unit, by, "forgotten");
         Ok(())
+    }
+
+    /// Has nothing of a unit any more.
+    pub(super) fn let_go(&mut self, unit: &UnitId) {
+        self.records.remove(unit);
+        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
+        self.followed.retain(|(concerned, _)| concerned != unit);
+        self.intake.forget(unit);
     }
 
     /// Hands a command to the unit.

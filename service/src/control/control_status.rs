@@ -4,6 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use isotherm_document::few;
 use isotherm_protocol::escape::shown;
+use isotherm_protocol::history::GoodSet;
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::service_status::{
     BadDocument, FolderState, FolderStatus, MAX_BAD_DOCUMENTS, ServiceStatus, StoreStatus,
 };
@@ -17,6 +19,12 @@ pub(crate) const STATE_FOLDER: &str = "state_folder";
 pub(crate) const OLDER: &str = "older_calibration";
 /// Kind of the fault of units whose calibration would be refused today.
 pub(crate) const UNTRUSTED: &str = "untrusted_calibration";
+/// Kind of the fault of units whose calibration in force is not in the audit file.
+pub(crate) const NOT_IN_FILE: &str = "unwritten_calibration";
+/// Kind of the fault of units whose history at the other instance could not be copied.
+const UNCOPIED: &str = "uncopied_history";
+/// Kind of the fault of units whose calibration that was accepted last does not hold, for an instance published without it.
+const SET_ASIDE: &str = "set_aside_calibration";
 /// Kind of the fault of documents that are good and could not be written down.
 pub(crate) const UNWRITTEN: &str = "unwritten_documents";
 
@@ -65,6 +73,18 @@ impl Worker {
         }
     }
 
+    /// That a set was accepted and does not hold, and how it is put in force.
+    pub(super) fn aside(&self, unit: &UnitId, set: &GoodSet) -> String {
+        let holds = self.store.last_good(unit).map_or(0, |good| good.revision);
+        let document = self.store.document_name(&set.digest, || "DOCUMENT".to_owned());
+        format!(
+            "unit {unit}: revision {} (sha256 {}) was accepted, but an instance that did not have it published: revision \
+             {holds} is in force; to put the other one in force: isotherm swap {unit} {document}",
+            set.revision,
+            set.digest.to_string().get(..16).unwrap_or_default(),
+        )
+    }
+
     /// What is wrong until somebody does something about it.
     fn faults(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
@@ -90,6 +110,23 @@ impl Worker {
                 few(&untrusted)
             );
             add(UNTRUSTED, untrusted.len(), words);
+        }
+        if let Some((unit, _)) = self.followed.first() {
+            let words = format!(
+                "unit {unit}: the calibration or command in force is not in the audit file, and a restart forgets it; it is \
+                 tried again: make room on the disk"
+            );
+            add(NOT_IN_FILE, self.followed.len(), words);
+        }
+        if let Some(unit) = self.uncopied.first() {
+            let words = format!(
+                "unit {unit}: the history of the other instance is not copied; it is tried again: make room on the disk"
+            );
+            add(UNCOPIED, self.uncopied.len(), words);
+        }
+        let mut aside = self.store.set_aside();
+        if let Some((unit, set)) = aside.next() {
+            add(SET_ASIDE, 1 + aside.count(), self.aside(unit, set));
         }
         let unwritten = self.folder.unwritten();
         if let Some(first) = unwritten.first() {

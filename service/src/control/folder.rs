@@ -5,7 +5,8 @@
 //! touched, renamed, moved away and back, or left over of two rivals says nothing new, and what came in over the bus since
 //! then stays in force. A text that is put back after another one was taken is something new, as any other text is. What
 //! was refused was never said, so that a mistake that is taken back changes nothing. What the folder said last stands in
-//! the audit file (`Store::said_by_folder`), so that all of this holds over a restart too.
+//! the audit file (`Store::said_by_folder`), so that all of this holds over a restart too. Of a pair each instance has a folder of its
+//! own: what the other's said is none of it, and what is new here waits until this instance publishes.
 //!
 //! A refused document is told at every start for as long as it is there. A unit that has a calibration is not given it by
 //! a restart, though it would pass now: the restart may only have forgotten the temperature that spoke against it.
@@ -26,6 +27,7 @@ use super::file::Read;
 use super::manager::Worker;
 use super::request::Request;
 use crate::control::watch::{FolderEvent, read_document};
+use crate::receive::intake::Answers;
 use isotherm_document::unplaced;
 
 /// Why an overlay in the folder is not taken.
@@ -62,6 +64,8 @@ struct File {
     rival: bool,
     /// Whether that is only because it could not be written down: it is tried again.
     unwritten: bool,
+    /// Whether its content is new and left to the instance that publishes: taken when this one does.
+    left: bool,
 }
 
 impl Folder {
@@ -84,6 +88,12 @@ impl Folder {
     pub(super) fn unwritten(&self) -> Vec<PathBuf> {
         let unwritten = self.files.iter().filter(|(_, file)| file.unwritten);
         unwritten.map(|(path, _)| path.clone()).collect()
+    }
+
+    /// Files whose documents are left to the instance that publishes their unit.
+    fn left(&self) -> Vec<(PathBuf, Option<UnitId>)> {
+        let left = self.files.iter().filter(|(_, file)| file.left);
+        left.map(|(path, file)| (path.clone(), file.unit.clone())).collect()
     }
 
     /// Enters that the document of a file could not be written down; of a name that is no file's, nothing.
@@ -190,7 +200,7 @@ impl Worker {
     pub(super) fn take_file(&mut self, path: &Path, read: &Read, at_start: bool) -> bool {
         let file = self.folder.files.get_mut(path);
         let unit = file.and_then(|file| {
-            file.unwritten = false;
+            (file.unwritten, file.left) = (false, false);
             file.unit.clone()
         });
         let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
@@ -201,19 +211,61 @@ impl Worker {
         let named = self.folder.files.get(path).and_then(|file| file.unit.clone());
         if let Some((words, _)) = named.as_ref().and_then(|unit| self.intake.is_not_taken(unit)) {
             tracing::info!("{} is left alone: {words}", path.display());
+            self.settle(path, Vec::new());
             return true;
         }
-        if named.is_some_and(|unit| !self.intake.speaks_for(&unit)) {
+        if let Some(unit) = named.filter(|unit| self.intake.answers_for(unit) != Answers::Here) {
             tracing::info!("{} is left to the instance that publishes its unit", path.display());
+            self.settle(path, Vec::new());
+            self.leave(&unit, path, read.digest, at_start);
             return true;
         }
         let problems = self.swap_file(path, read, at_start);
         let good = problems.is_empty();
-        if let Some(file) = self.folder.files.get_mut(path) {
-            file.problems = problems;
-            file.rival = false;
-        }
+        self.settle(path, problems);
         good
+    }
+
+    /// Enters what was found wrong with a file that is the only one of its unit.
+    fn settle(&mut self, path: &Path, problems: Vec<Problem>) {
+        if let Some(file) = self.folder.files.get_mut(path) {
+            (file.problems, file.rival) = (problems, false);
+        }
+    }
+
+    /// Leaves a file to the instance that publishes its unit. What is new in it is taken when this one publishes; what was there when
+    /// this folder was first read is noted, so that a restart does not take it for a change.
+    fn leave(&mut self, unit: &UnitId, path: &Path, digest: Digest, at_start: bool) {
+        let source = known_source(path, at_start);
+        let was_seen = source.file().and_then(|path| self.store.seen_in_folder(path)).is_some();
+        let is_said = self.store.said_by_folder(unit) == Some(digest);
+        if is_said {
+            return;
+        }
+        if at_start && !was_seen {
+            self.note_said(unit, &source, digest);
+        } else if let Some(file) = self.folder.files.get_mut(path) {
+            file.left = true;
+        }
+    }
+
+    /// Notes what this folder says for a unit, where another instance's folder said something else behind it: the file has not changed.
+    pub(super) fn say_again(&mut self, unit: &UnitId) {
+        let [path] = &*self.folder.naming(unit) else { return };
+        let file = self.folder.files.get(path).filter(|file| file.problems.is_empty() && !file.left);
+        let Some(digest) = file.and_then(|file| file.digest) else { return };
+        if self.store.said_by_folder(unit) != Some(digest) {
+            self.note_said(unit, &known_source(path, false), digest);
+        }
+    }
+
+    /// Writes down what a file holds: not to be taken for a change later, when something else may be in force.
+    fn note_said(&mut self, unit: &UnitId, source: &Source, digest: Digest) {
+        let Some(path) = source.file() else { return };
+        let event = AuditEvent::CarriedFile(CarriedFile { path: path.to_owned(), digest, refused: false });
+        if let Err(error) = self.append(Some(unit), "", event) {
+            tracing::error!("that {path} was read is not in the audit file: {error}");
+        }
     }
 
     /// Takes the document of a file through the path of every swap; what was wrong with it.
@@ -252,14 +304,8 @@ impl Worker {
             return told_again(&request, self.decide(&request, bytes, found).problems);
         }
         let reply = self.swap(&request, bytes, found);
-        let Request { name, source, .. } = request;
-        if let (SwapOutcome::Unchanged, Some(path)) = (reply.outcome, source.file()) {
-            // Not to be taken for a change later, when something else may be in force.
-            let event =
-                AuditEvent::CarriedFile(CarriedFile { path: path.to_owned(), digest, refused: false });
-            if let Err(error) = self.append(known.as_ref(), "", event) {
-                tracing::error!("that {name} was read is not in the audit file: {error}");
-            }
+        if let (SwapOutcome::Unchanged, Some(unit)) = (reply.outcome, &known) {
+            self.note_said(unit, &request.source, digest);
         }
         reply.problems
     }
@@ -312,13 +358,15 @@ impl Worker {
     /// Judges the documents again that are not taken: what spoke against them may have passed.
     pub(super) fn judge_bad_again(&mut self) {
         let bad: Vec<_> = self.folder.bad().map(|(path, _)| path.to_owned()).collect();
-        for path in bad {
+        let left = self.folder.left().into_iter().map(|(path, _)| path);
+        for path in bad.into_iter().chain(left) {
             self.take_again(&path);
         }
     }
 
-    /// Tries the documents again that could not be written down, now and then: a disk that was full may have room again.
-    pub(super) fn retry_unwritten(&mut self, now: Instant) {
+    /// Tries the documents again, now and then, that could not be written down, as a disk that was full may have room again; and those
+    /// that were left to another instance, once this one publishes.
+    pub(super) fn retry_files(&mut self, now: Instant) {
         if now < self.next_retry {
             return;
         }
@@ -328,6 +376,11 @@ impl Worker {
             self.take_again(&path);
         }
         self.retrying = false;
+        for (path, unit) in self.folder.left() {
+            if unit.is_none_or(|unit| self.intake.speaks_for(&unit)) {
+                self.take_again(&path);
+            }
+        }
     }
 }
 
@@ -350,4 +403,86 @@ fn told_again(request: &Request, mut problems: Vec<Problem>) -> Vec<Problem> {
 fn known_source(path: &Path, at_start: bool) -> Source {
     let path = shown(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display());
     if at_start { Source::Start { path } } else { Source::Folder { path } }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use isotherm_protocol::control::Schedule;
+    use isotherm_protocol::history::{Acceptance, AuditEntry};
+    use isotherm_protocol::pair::{Member, Mode};
+
+    use super::*;
+    use crate::config::Settings;
+    use crate::control::Carried;
+    use crate::control::revision::Calibrations;
+    use crate::control::store::{Opened, Store};
+    use crate::pair::Pair;
+    use crate::receive::intake::Intake;
+
+    /// Beside an instance that publishes, or alone.
+    fn intake(settings: &Settings, is_alone: bool) -> Arc<Intake> {
+        let outlets = Box::new(|_: &_| Err("there is none".into()));
+        let intake = Intake::new(settings.clone(), Calibrations::default(), outlets);
+        if is_alone {
+            return Arc::new(intake);
+        }
+        let group = Pair::new(settings, "me".to_owned(), 2, Vec::new()).me().group.clone();
+        let (instance, name) = ("other".to_owned(), "other".to_owned());
+        let other = Member { instance, name, mode: Mode::Standby, priority: 0, started_unix_ms: 1, group };
+        Arc::new(intake.paired_with(Arc::new(Pair::new(settings, "me".to_owned(), 2, vec![other]))))
+    }
+
+    #[test]
+    fn of_a_standby_s_folder_what_is_new_is_taken_when_it_publishes_and_nothing_else_is() {
+        let (folder, unit) = (tempfile::tempdir().unwrap(), UnitId::new("ZLG-0001").unwrap());
+        let file = folder.path().join("unit.toml");
+        let settings = Settings { calibrations: Some(folder.path().to_owned()), ..Settings::default() };
+        let text = |bias: &str| {
+            include_str!("../../../config/calibration/ZLG-0001.toml")
+                .replace("[0.41, ", &format!("[{bias}, "))
+        };
+        let changed = |text: String| {
+            std::fs::write(&file, &text).unwrap();
+            FolderEvent::Changed { file: file.clone(), bytes: text.into_bytes() }
+        };
+        let (old, theirs, new) = (text("0.41"), text("0.5"), text("0.6"));
+        std::fs::write(&file, &old).unwrap();
+        let mut worker =
+            Worker::new(&settings, intake(&settings, false), Store::in_memory(), &Opened::default());
+        assert_eq!(worker.read_folder().unwrap().1, 0);
+        worker.folder_event(changed(old.replace("smoothing_s", "smoothign_s")));
+        assert_eq!(worker.folder.bad().count(), 1);
+        worker.folder_event(changed(old.clone()));
+        assert_eq!(worker.folder.bad().count(), 0, "mended");
+        // A swap by a file of the other instance's folder.
+        let event = AuditEvent::Accepted(Acceptance {
+            revision: 2,
+            digest: worker.store.put_document(theirs.as_bytes()).unwrap(),
+            overlay: None,
+            source: Source::Folder { path: "/elsewhere/unit.toml".to_owned() },
+            base: None,
+            changed: Vec::new(),
+            schedule: Schedule::NextTick,
+            slew_ms: 0,
+        });
+        let (time, by) = (std::time::SystemTime::UNIX_EPOCH.into(), String::new());
+        let entries = vec![AuditEntry { number: 1, time, unit: Some(unit.to_string()), by, event }];
+        assert!(worker.carry(&Carried { unit: unit.clone(), holds: true, entries, kept: BTreeMap::new() }));
+        let revision = |worker: &Worker| worker.records[&unit].last().unwrap().number.counter;
+        // Alone, with the folder as it was: after a restart, too.
+        let mut worker = Worker::new(&settings, intake(&settings, true), worker.store, &Opened::default());
+        worker.restore();
+        worker.read_folder().unwrap();
+        assert_eq!(revision(&worker), 2, "this file has not changed");
+        worker.intake = intake(&settings, false);
+        worker.folder_event(changed(new));
+        worker.judge_bad_again();
+        worker.retry_files(worker.next_retry);
+        assert_eq!(revision(&worker), 2, "left to the other instance");
+        worker.intake = intake(&settings, true);
+        worker.retry_files(worker.next_retry);
+        assert_eq!(revision(&worker), 3);
+    }
 }

@@ -4,7 +4,7 @@
 //! and only then touches a unit, for as long as a pointer takes. Receive threads ask and go on: where too much is waiting the
 //! asker is told so.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -13,6 +13,7 @@ use std::time::{Duration, Instant, SystemTime};
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::history::{AuditEvent, FirstTick};
+use isotherm_protocol::journal::JournalEntry;
 use isotherm_protocol::key::UnitId;
 
 use super::compressed::Compressed;
@@ -98,6 +99,10 @@ pub(crate) struct Worker {
     pub(super) group: Option<Vec<(Request, Decision)>>,
     /// First ticks that another instance is to write down, and has not yet.
     pub(super) unclaimed: Vec<(UnitId, FirstTick)>,
+    /// What other instances were ordered and this one goes on with, and could not write down.
+    pub(super) followed: Vec<(UnitId, Box<JournalEntry>)>,
+    /// Units whose history at the other instance could not be copied.
+    pub(super) uncopied: BTreeSet<UnitId>,
     /// Files whose documents could not be written down, and why.
     pub(super) unwritten: Vec<(String, Problem)>,
     /// When such a file is tried again.
@@ -128,6 +133,8 @@ impl Worker {
             losses: losses(opened),
             group: None,
             unclaimed: Vec::new(),
+            followed: Vec::new(),
+            uncopied: BTreeSet::new(),
             unwritten: Vec::new(),
             next_retry: Instant::now(),
             retrying: false,
@@ -153,10 +160,11 @@ impl Worker {
             // Unwind safety: what is kept is changed only after everything that could go wrong has gone well.
             let work = AssertUnwindSafe(|| {
                 self.keep_store();
+                self.retry_followed();
                 if let Some(message) = message {
                     self.take(message);
                 }
-                self.retry_unwritten(Instant::now());
+                self.retry_files(Instant::now());
             });
             if catch_unwind(work).is_err() {
                 tracing::error!(
@@ -251,7 +259,7 @@ impl Worker {
             // Where another instance speaks, that one stores the result.
             Notice::PreLaunch(end) if self.intake.speaks_for(unit) => self.pre_launch_ended(unit, &end),
             Notice::PreLaunch(_) => {}
-            Notice::Followed(entry) => self.note_followed(unit, &entry),
+            Notice::Followed(entry) => self.note_followed(unit, entry),
             Notice::Speaks => self.claim(unit),
         }
     }

@@ -1,5 +1,7 @@
 //! A request: a swap as somebody asks for it; and queries and puts from the bus, with their replies.
 
+use std::collections::BTreeSet;
+
 use isotherm_protocol::control::{CommandOrder, SwapOptions, SwapReply};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::Source;
@@ -13,6 +15,7 @@ use zenoh::sample::{Sample, SampleKind};
 
 use super::manager::Worker;
 use super::queue::{Asked, Origin};
+use crate::receive::intake::Answers;
 
 /// What stands before the name of a certificate in the audit file.
 const CERTIFIED: &str = "CN=";
@@ -78,7 +81,7 @@ impl Worker {
         let options = SwapOptions::parse(query.parameters().as_str()).map_err(|error| error.to_string())?;
         let by = self.by(key, origin, options.by.clone())?;
         // The instance that speaks answers.
-        if self.intake.answers_for(&unit) {
+        if self.is_ours(&unit)? {
             let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
             let reply = self.bus_swap(unit, &bytes, SwapOptions { by, ..options });
             reply_json(query, key, &reply)?;
@@ -103,8 +106,10 @@ impl Worker {
             }
             return;
         }
-        if !self.intake.answers_for(&unit) {
-            return;
+        match self.is_ours(&unit) {
+            Ok(true) => {}
+            Ok(false) => return,
+            Err(words) => return tracing::warn!("a document is ignored: {words}"),
         }
         let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
         let options = String::from_utf8(attachment).map_err(|error| error.to_string());
@@ -172,7 +177,7 @@ impl Worker {
         let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
         let order = CommandOrder::read(&payload)?;
         let order = CommandOrder { by: self.by(key, origin, order.by)?, ..order };
-        if self.intake.answers_for(&unit) {
+        if self.is_ours(&unit)? {
             let reply = self.command(&unit, &order);
             let reply =
                 reply.ok_or_else(|| format!("unit {unit} has not appeared: nothing was received from it"))?;
@@ -181,14 +186,33 @@ impl Worker {
         Ok(())
     }
 
-    /// A query on `imu/*/history`.
+    /// Whether a swap or a command of a unit is for this instance to do.
+    fn is_ours(&self, unit: &UnitId) -> Result<bool, String> {
+        match self.intake.answers_for(unit) {
+            Answers::Here => Ok(true),
+            Answers::Elsewhere => Ok(false),
+            Answers::Unknown => Err(format!(
+                "unit {unit}: it is being found out which instance publishes it: nothing was done, try again"
+            )),
+        }
+    }
+
+    /// A query on `imu/*/history`. Of what is forgotten every instance knows: who speaks for it, nobody can say.
     fn answer_history(&self, query: &Query) -> Result<(), String> {
-        let (limit, after) = part_of_history(query.parameters().as_str())?;
+        let PartOfHistory { limit, after, instance } = PartOfHistory::parse(query.parameters().as_str())?;
+        let is_this = instance.as_ref().map(|instance| instance == self.intake.instance());
+        if is_this == Some(false) {
+            return Ok(());
+        }
+        let forgotten: BTreeSet<_> =
+            self.store.forgotten().filter(|unit| !self.records.contains_key(*unit)).collect();
         let one = one_unit(query.key_expr().as_str(), Asked::History).ok();
-        let units = one.map_or_else(|| self.records.keys().cloned().collect(), |unit| vec![unit]);
+        let all = || self.records.keys().chain(forgotten.iter().copied()).cloned().collect();
+        let units = one.map_or_else(all, |unit| vec![unit]);
         for unit in units {
             let key = key::history(&unit);
-            if is_asked(query, &key) && self.intake.speaks_for(&unit) {
+            let answers = is_this.is_some() || forgotten.contains(&unit) || self.intake.speaks_for(&unit);
+            if is_asked(query, &key) && answers {
                 let read = self.store.history_after(after, Some(&unit), limit);
                 let told = read.map_err(|error| format!("the history cannot be read: {error}"));
                 if let Err(words) = told.and_then(|entries| reply_json(query, &key, &entries)) {
@@ -231,20 +255,33 @@ fn refuse(query: &Query, words: &str) {
     }
 }
 
-/// Reads `limit=20;after=1000`: how many entries, and above which number.
-fn part_of_history(parameters: &str) -> Result<(usize, u64), String> {
-    let (mut limit, mut after) = (HISTORY_ENTRIES, 0);
-    for parameter in parameters.split(';').filter(|parameter| !parameter.is_empty()) {
-        let value = |name| parameter.strip_prefix(name).and_then(|value| value.parse::<u64>().ok());
-        if let Some(number) = value("after=") {
-            after = number;
-        } else if let Some(number) = value("limit=").filter(|number| *number > 0) {
-            limit = usize::try_from(number).unwrap_or(usize::MAX);
-        } else {
-            return Err(format!(
-                "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an entry"
-            ));
+/// What of a history is asked for.
+struct PartOfHistory {
+    limit: usize,
+    /// Entries above this number.
+    after: u64,
+    /// Of this instance, though another one speaks.
+    instance: Option<String>,
+}
+
+impl PartOfHistory {
+    /// Reads `limit=20;after=1000;instance=0badcafe`.
+    fn parse(parameters: &str) -> Result<Self, String> {
+        let mut part = Self { limit: HISTORY_ENTRIES, after: 0, instance: None };
+        for parameter in parameters.split(';').filter(|parameter| !parameter.is_empty()) {
+            let value = |name| parameter.strip_prefix(name).and_then(|value| value.parse::<u64>().ok());
+            if let Some(number) = value("after=") {
+                part.after = number;
+            } else if let Some(number) = value("limit=").filter(|number| *number > 0) {
+                part.limit = usize::try_from(number).unwrap_or(usize::MAX);
+            } else if let Some(instance) = parameter.strip_prefix("instance=") {
+                part.instance = Some(instance.to_owned());
+            } else {
+                return Err(format!(
+                    "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an entry"
+                ));
+            }
         }
+        Ok(part)
     }
-    Ok((limit, after))
 }

@@ -28,6 +28,8 @@ const NEXT_MEMORY: Duration = Duration::from_millis(500);
 /// How long after an entry of the journal histories are asked for: by then what follows from it is in the audit file, as a rule; and
 /// once more, for the first tick of a calibration.
 const DELAYS: [Duration; 2] = [Duration::from_millis(200), Duration::from_millis(1500)];
+/// How long until what could not be written down is asked for again: a disk that was full may have room again.
+const AGAIN: Duration = Duration::from_secs(2);
 /// The parameter that says which instance asks for a memory.
 pub(crate) const ASKS: &str = "instance";
 /// Most entries of a history that are asked for.
@@ -99,7 +101,8 @@ impl Asker {
     async fn ask_records(self, mut questions: UnboundedReceiver<Option<UnitId>>) {
         let mut copied = Copied::default();
         if self.pair.is_opening() {
-            self.records(None, &mut copied).await;
+            // What fails is asked for again when the other instance is introduced.
+            let _ = self.records(None, &mut copied).await;
             let spoken = self.spoken().await;
             self.pair.opened(&self.intake, &spoken);
         }
@@ -123,10 +126,12 @@ impl Asker {
                         .map(|(unit, _)| unit.clone())
                         .collect();
                     for unit in ripe {
-                        if let Some(at) = due.get_mut(&unit) {
-                            at.retain(|at| *at > now);
+                        let done = self.records(unit.clone(), &mut copied).await;
+                        let at = due.entry(unit).or_default();
+                        at.retain(|at| *at > now);
+                        if !done && at.is_empty() {
+                            at.push(Instant::now() + AGAIN);
                         }
-                        self.records(unit, &mut copied).await;
                     }
                     due.retain(|_, at| !at.is_empty());
                 }
@@ -199,18 +204,51 @@ impl Asker {
         }
     }
 
-    /// Has histories and documents written down here too: what came since it was done last.
-    async fn records(&self, unit: Option<UnitId>, copied: &mut Copied) {
+    /// Has histories and documents written down here too: what came since it was done last. Of units that this instance speaks for, what
+    /// others have accepted without it. Whether all of it is written down.
+    async fn records(&self, unit: Option<UnitId>, copied: &mut Copied) -> bool {
         let others = self.pair.others();
-        if others.is_empty() {
+        let speaks = |unit: &UnitId| self.intake.with(unit, |actor| actor.speaks()) == Some(true);
+        if others.is_empty() || unit.as_ref().is_some_and(speaks) {
             // When one comes, all is asked for.
-            return;
+            return true;
         }
+        let instances: Vec<_> = others.iter().map(|other| other.instance.clone()).collect();
         copied.of(others);
         let selector = unit.as_ref().map_or(key::ALL_HISTORY.to_owned(), key::history);
         let after = copied.after(unit.as_ref());
         let samples = self.ask(&format!("{selector}?limit={ENTRIES};after={after}")).await;
-        let mut all = Some(after);
+        let (mut done, last) = self.take_histories(samples, true, &mut copied.units).await;
+        if unit.is_some() {
+            return done;
+        }
+        copied.all = last.map_or(copied.all, |last| copied.all.max(last));
+        let spoken = self.intake.each_unit(|actor| actor.speaks());
+        if !(self.pair.speaks_first() || spoken.contains(&true)) {
+            return done;
+        }
+        for instance in instances {
+            let after = copied.below.get(&instance).copied().unwrap_or(0);
+            let samples =
+                self.ask(&format!("{selector}?limit={ENTRIES};after={after};instance={instance}")).await;
+            let (all, last) = self.take_histories(samples, false, &mut BTreeMap::new()).await;
+            done &= all;
+            if let Some(last) = last {
+                copied.below.insert(instance, after.max(last));
+            }
+        }
+        done
+    }
+
+    /// Has histories written down, of those who speak (`holds`) or of others. Whether all is done that is to be, and the number of the
+    /// last entry where nothing before it was left out.
+    async fn take_histories(
+        &self,
+        samples: Vec<Sample>,
+        holds: bool,
+        units: &mut BTreeMap<UnitId, u64>,
+    ) -> (bool, Option<u64>) {
+        let (mut done, mut newest) = (true, Some(0));
         for sample in samples {
             let serial = key::parse_history(sample.key_expr().as_str());
             let Some(unit) = serial.and_then(|serial| UnitId::new(serial).ok()) else { continue };
@@ -221,20 +259,22 @@ impl Asker {
                 continue;
             };
             let Some(last) = entries.last().map(|entry| entry.number) else { continue };
-            let done = !self.intake.speaks_for(&unit) && self.copy(unit.clone(), entries).await;
-            all = all.filter(|_| done).map(|all| all.max(last));
-            if done {
-                copied.units.insert(unit, last);
+            let is_due = self.intake.speaks_for(&unit) != holds;
+            if is_due
+                && self.copy(Carried { unit: unit.clone(), holds, entries, kept: BTreeMap::new() }).await
+            {
+                newest = newest.map(|newest| newest.max(last));
+                units.insert(unit, last);
+            } else {
+                newest = None;
+                done &= !is_due;
             }
         }
-        if unit.is_none() {
-            copied.all = all.unwrap_or(copied.all);
-        }
+        (done, newest)
     }
 
     /// Has entries of a unit written down here, with the documents that they name; whether they are.
-    async fn copy(&self, unit: UnitId, entries: Vec<AuditEntry>) -> bool {
-        let mut carried = Carried { unit, entries, kept: BTreeMap::new() };
+    async fn copy(&self, mut carried: Carried) -> bool {
         // A document may lie under an overlay: that is known when the overlay is there.
         for _ in 0..2 {
             let (answer, lacking) = oneshot::channel();
@@ -261,6 +301,8 @@ struct Copied {
     /// Of all units.
     all: u64,
     units: BTreeMap<UnitId, u64>,
+    /// Of what instances have accepted that do not speak.
+    below: BTreeMap<String, u64>,
 }
 
 impl Copied {

@@ -166,8 +166,11 @@ impl Work {
     /// An entry of another instance's journal. Who speaks takes nothing of one that is none of the pair.
     fn entry(&self, entry: JournalEntry) {
         let Ok(unit) = UnitId::new(&entry.unit) else { return };
-        let is_written_down =
-            matches!(entry.event, JournalEvent::Changed { .. } | JournalEvent::Commanded { .. });
+        // One that ends may have been forgotten.
+        let is_written_down = matches!(
+            entry.event,
+            JournalEvent::Changed { .. } | JournalEvent::Commanded { .. } | JournalEvent::Ended
+        );
         let standing = self.pair.standing();
         let is_member = self.pair.is_there(&entry.instance);
         self.intake.with(&unit, |actor| {

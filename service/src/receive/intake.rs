@@ -4,6 +4,8 @@ mod appear;
 mod paired;
 mod units;
 
+pub(crate) use paired::Answers;
+
 use std::any::Any;
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -45,8 +45,10 @@ struct Seen {
 #[derive(Debug, Default)]
 struct OfUnit {
     highest_revision: u64,
-    /// In the order of their revisions.
+    /// In the order in which they were written down: the last one holds.
     sets: VecDeque<GoodSet>,
+    /// Of two instances that were apart, each may accept sets: the newest of those that do not hold, until one with a higher number does.
+    set_aside: Option<GoodSet>,
     /// What the watched folder said for it last and was taken.
     folder: Option<Digest>,
     /// What an operator wants of it.
@@ -75,14 +77,7 @@ impl Index {
                 }
                 of_unit.lost = of_unit.lost.filter(|lost| *lost > accepted.revision);
                 of_unit.highest_revision = of_unit.highest_revision.max(accepted.revision);
-                if of_unit.sets.is_empty() {
-                    // Mostly the only one.
-                    of_unit.sets.reserve_exact(1);
-                }
-                of_unit.sets.push_back(GoodSet::new(accepted, entry.time));
-                if of_unit.sets.len() > MAX_SETS {
-                    of_unit.sets.pop_front();
-                }
+                of_unit.hold(GoodSet::new(accepted, entry.time));
             }
             AuditEvent::InForce(first) => {
                 let Some(of_unit) = unit.map(|unit| self.units.entry(unit).or_default()) else { return };
@@ -96,6 +91,7 @@ impl Index {
             AuditEvent::Withdrawn(withdrawal) => {
                 if let Some(of_unit) = unit.and_then(|unit| self.units.get_mut(&unit)) {
                     of_unit.sets.retain(|set| set.revision != withdrawal.revision);
+                    of_unit.set_aside.take_if(|set| set.revision == withdrawal.revision);
                     of_unit.lost = of_unit.lost.filter(|lost| *lost != withdrawal.revision);
                 }
             }
@@ -229,8 +225,17 @@ impl Store {
 
     /// Units that were ever given a calibration or a command.
     pub(crate) fn units(&self) -> impl Iterator<Item = &UnitId> {
-        let forgotten = |of_unit: &OfUnit| of_unit.sets.is_empty() && of_unit.intent.is_empty();
-        self.index.units.iter().filter(move |(_, of_unit)| !forgotten(of_unit)).map(|(unit, _)| unit)
+        self.index.units.iter().filter(|(_, of_unit)| !of_unit.is_forgotten()).map(|(unit, _)| unit)
+    }
+
+    /// Units of which nothing holds any more.
+    pub(crate) fn forgotten(&self) -> impl Iterator<Item = &UnitId> {
+        self.index.units.iter().filter(|(_, of_unit)| of_unit.is_forgotten()).map(|(unit, _)| unit)
+    }
+
+    /// Units whose newest accepted set does not hold, because an instance of the pair published without it; with that set.
+    pub(crate) fn set_aside(&self) -> impl Iterator<Item = (&UnitId, &GoodSet)> {
+        self.index.units.iter().filter_map(|(unit, of_unit)| Some((unit, of_unit.set_aside.as_ref()?)))
     }
 
     /// The calibration that was accepted last for a unit and not withdrawn: what a restart begins with. It may not have come
@@ -281,6 +286,11 @@ impl Store {
         self.index.units.get(unit).map_or(0, |of_unit| of_unit.highest_revision).max(self.index.floor)
     }
 
+    /// Digest of what was last seen in a file of the watched folder, taken or refused.
+    pub(crate) fn seen_in_folder(&self, path: &str) -> Option<Digest> {
+        self.index.files.get(path).map(|seen| seen.digest)
+    }
+
     /// Digest of what was last refused in a file of the watched folder, where nothing else was seen in it since.
     pub(crate) fn refused_in_folder(&self, path: &str) -> Option<Digest> {
         self.index.files.get(path).filter(|seen| seen.refused).map(|seen| seen.digest)
@@ -305,17 +315,39 @@ impl Seen {
 }
 
 impl OfUnit {
+    fn is_forgotten(&self) -> bool {
+        self.sets.is_empty() && self.intent.is_empty()
+    }
+
     /// What was carried over says more than the end of the file before it, which may be damaged.
     fn carry(&mut self, carried: &CarriedUnit) {
         self.highest_revision = self.highest_revision.max(carried.highest_revision);
         let first = carried.sets.first().map_or(0, |set| set.revision);
         self.sets.retain(|set| set.revision < first);
-        self.sets.extend(carried.sets.iter().cloned());
+        self.set_aside = None;
+        carried.sets.iter().for_each(|set| self.hold(set.clone()));
         let from_folder = carried.sets.iter().rfind(|set| set.source.file().is_some());
         self.folder = from_folder.map(|set| set.digest).or(self.folder);
         self.lost = None;
         if !carried.intent.is_empty() {
             self.intent = carried.intent.clone();
+        }
+    }
+
+    /// Takes in what holds from here on.
+    fn hold(&mut self, set: GoodSet) {
+        let is_aside = |other: &&GoodSet| {
+            other.revision > set.revision || (other.revision == set.revision && !other.corrects_as(&set))
+        };
+        let aside = self.set_aside.iter().chain(self.sets.back()).filter(is_aside);
+        self.set_aside = aside.max_by_key(|other| other.revision).cloned();
+        if self.sets.is_empty() {
+            // Mostly the only one.
+            self.sets.reserve_exact(1);
+        }
+        self.sets.push_back(set);
+        if self.sets.len() > MAX_SETS {
+            self.sets.pop_front();
         }
     }
 

@@ -15,6 +15,17 @@ use crate::receive::fault::{FaultKind, standing};
 const LONGEST_DOUBT: Duration = Duration::from_millis(500);
 const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
 
+/// Which instance does what is asked for of a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answers {
+    /// This one.
+    Here,
+    /// Another one, which is asked too.
+    Elsewhere,
+    /// It was not known when this one was asked: maybe none.
+    Unknown,
+}
+
 impl Intake {
     /// Has units be silent while another instance speaks for them.
     pub(crate) fn paired_with(self, pair: Arc<Pair>) -> Self {
@@ -40,19 +51,35 @@ impl Intake {
         self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
     }
 
-    /// The same; waits where it is being found out, and where the instance that spoke is gone and this one is about to.
-    pub(crate) fn answers_for(&self, unit: &UnitId) -> bool {
+    /// The same; waits where it is being found out, where this process stood still and the units do not know it yet, and where the
+    /// instance that spoke is gone and this one is about to.
+    pub(crate) fn answers_for(&self, unit: &UnitId) -> Answers {
         let since = Instant::now();
-        let is_alone = || self.pair.as_ref().is_some_and(|pair| pair.standing().alone_since.is_some());
+        let pair = self.pair.as_ref();
+        let stood_still = || pair.is_some_and(|pair| pair.has_stood_still(Instant::now()).is_some());
+        let is_alone = || pair.is_some_and(|pair| pair.standing().alone_since.is_some());
         let is_open = || {
             let [doubts, speaks] =
                 self.with(unit, |actor| [actor.doubts(), actor.speaks()]).unwrap_or([false, true]);
-            doubts || (!speaks && is_alone())
+            stood_still() || doubts || (!speaks && is_alone())
         };
+        let mut was_open = false;
         while since.elapsed() < LONGEST_DOUBT && is_open() {
+            was_open = true;
             std::thread::sleep(DOUBT_INTERVAL);
         }
-        self.speaks_for(unit)
+        match self.speaks_for(unit) {
+            true if !stood_still() => Answers::Here,
+            false if !was_open => Answers::Elsewhere,
+            _ => Answers::Unknown,
+        }
+    }
+
+    /// A unit is forgotten: the journal says so of one that has not appeared, too, so that other instances ask for its history.
+    pub(crate) fn tell_end(&self, unit: &UnitId) {
+        if let Some(journal) = self.journal.as_ref().filter(|_| !self.has(unit)) {
+            journal.tell_end(unit);
+        }
     }
 
     /// This instance's name for itself: its Zenoh id as text.

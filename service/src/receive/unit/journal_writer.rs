@@ -26,6 +26,27 @@ pub struct Journal {
     pub outlet: Arc<JournalOutlet>,
 }
 
+impl Journal {
+    /// Says that nothing is done any more to a unit that has not appeared.
+    pub(crate) fn tell_end(&self, unit: &UnitId) {
+        let (number, heard, event) = (0, Default::default(), JournalEvent::Ended);
+        let entry = JournalEntry {
+            unit: unit.to_string(),
+            instance: self.instance.to_string(),
+            number,
+            heard,
+            event,
+        };
+        if let Err(error) = self.publish(unit, &entry) {
+            tracing::warn!(%unit, "journal ({}): {}", entry.event.name(), isotherm_bus::words(&error));
+        }
+    }
+
+    fn publish(&self, unit: &UnitId, entry: &JournalEntry) -> Result<(), zenoh::Error> {
+        split(entry).into_iter().try_for_each(|part| (self.outlet)(unit, codec::encode(&part)?))
+    }
+}
+
 impl std::fmt::Debug for Journal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Journal").field("instance", &self.instance).finish_non_exhaustive()
@@ -86,12 +107,17 @@ impl UnitActor {
     /// Tells what was ordered here, though another instance may have begun to speak since the order was taken: that one does it too. What
     /// a unit is given when it appears is none of this.
     pub(super) fn journal_order(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
-        if self.speaks() || self.stream.heard().iter().any(|heard| heard.frames > 0) {
+        let has_heard = self.stream.heard().iter().any(|heard| heard.frames > 0);
+        if has_heard {
+            let event = event(&self.stream);
+            self.note_own(event.clone());
+            self.write_entry(|_| event);
+        } else if self.speaks() {
             self.write_entry(event);
         }
     }
 
-    fn write_entry(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
+    pub(super) fn write_entry(&mut self, event: impl FnOnce(&UnitStream) -> JournalEvent) {
         let Some(journal) = self.journal_writer.journal.clone() else { return };
         self.journal_writer.number += 1;
         self.tell_entry(&self.entry(&journal.instance, event(&self.stream)));
@@ -105,9 +131,7 @@ impl UnitActor {
 
     fn tell_entry(&mut self, entry: &JournalEntry) {
         let Some(journal) = &self.journal_writer.journal else { return };
-        let publish = |part| (journal.outlet)(self.stream.id(), codec::encode(&part)?);
-        let published = split(entry).into_iter().try_for_each(publish);
-        if let Err(error) = published {
+        if let Err(error) = journal.publish(self.stream.id(), entry) {
             self.fault(FaultKind::JournalUnpublished, 1, || {
                 format!(
                     "journal, entry {} ({}): {}",

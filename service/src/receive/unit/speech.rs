@@ -6,9 +6,11 @@
 mod following;
 mod heard;
 mod kept;
+mod own;
 
 use std::time::{Duration, Instant};
 
+use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::Input;
 use isotherm_protocol::pair::{Role, UnitRole};
 
@@ -82,6 +84,8 @@ pub(super) struct Speech {
     two_told: bool,
     /// The journal has to say what the stream knows: another instance's said it until now.
     memory_due: bool,
+    /// What was ordered here a moment ago, and when: another instance's memory may not have it yet.
+    own: Vec<(Instant, JournalEvent)>,
     /// When the last other instance was lost.
     lost_at: Option<Instant>,
     /// The connection to the producer may have gone with the other instance: gyro ticks may be missing here that it has.
@@ -186,6 +190,7 @@ impl UnitActor {
             tracing::info!(unit = %self.stream.id(), revision = self.stream.revision().counter, "in step with the \
                 publishing instance");
         }
+        self.do_own_again();
         let counters = self.counters();
         self.arrivals.go_on_from(now, &counters);
         self.status_due = true;
@@ -195,6 +200,7 @@ impl UnitActor {
     /// Looks at the unit as the clock goes on.
     pub(crate) fn watch_speech(&mut self, now: Instant, standing: &Standing) -> Wants {
         let mut wants = Wants::default();
+        self.give_up_own(now);
         let lost_at = standing.alone_since.filter(|_| standing.deserted);
         if lost_at.is_some() && std::mem::replace(&mut self.speech.lost_at, lost_at) != lost_at {
             self.speech.uncertain = true;
@@ -266,6 +272,7 @@ impl UnitActor {
         if let Some(rebuilt) = follower.finish(&mut self.stream) {
             kept.replace(rebuilt.frames, Some(rebuilt.before), now);
             self.stream = rebuilt.stream;
+            self.do_own_again();
         }
         self.publish_kept(kept.due(now, overlap));
         if !doubt {

@@ -91,6 +91,9 @@ impl UnitActor {
 
     /// Takes an entry of another instance's journal, or its memory.
     pub(crate) fn hear_journal(&mut self, entry: JournalEntry, now: Instant, standing: &Standing) {
+        if matches!(entry.event, JournalEvent::Commanded { accepted: true, .. }) {
+            self.is_commanded_elsewhere();
+        }
         // Another instance speaks too, and goes before this one.
         if matches!(entry.event, JournalEvent::Memory { .. }) && standing.yields && self.speaks() {
             let footing = if self.does_as(&entry.event) { Footing::All } else { Footing::Nothing };
@@ -182,6 +185,6 @@ impl UnitActor {
 }
 
 /// Whether an event gave the unit that revision.
-fn is_of(event: &JournalEvent, given: Revision) -> bool {
+pub(super) fn is_of(event: &JournalEvent, given: Revision) -> bool {
     matches!(event, JournalEvent::Changed { revision, .. } if *revision == given)
 }

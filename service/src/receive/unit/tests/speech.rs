@@ -1,6 +1,6 @@
 //! Who has lost the other instance does not say what that one may contradict.
 
-use isotherm_protocol::journal::JournalEntry;
+use isotherm_protocol::journal::{Joiner, JournalEntry};
 
 use super::*;
 
@@ -175,4 +175,55 @@ fn what_the_other_was_ordered_holds_for_one_that_has_just_yielded_too() {
     // By the clock of this machine: frames are kept with the time at which they were computed.
     assert!(actor.watch_speech(Instant::now() + TAKEOVER * 2, &standing).spoke);
     assert_eq!(sink.sequences(), (0..35).collect::<Vec<_>>());
+}
+
+/// One that was stopped for a moment takes orders before the memory comes that the other instance gave out meanwhile.
+#[test]
+fn what_was_ordered_here_holds_though_the_memory_of_the_other_instance_is_older() {
+    for (commanded_there, told) in [
+        (false, vec!["commanded", "changed", "commanded", "changed"]),
+        (true, vec!["commanded", "changed", "changed"]),
+    ] {
+        let (mut other, ..) = deserted();
+        other.journal_to(Journal { instance: "other".into(), outlet: Arc::new(|_, _| Ok(())) });
+        let (mut actor, _, start) = deserted();
+        let names = Arc::new(Mutex::new(Vec::new()));
+        let (noting, joiner) = (Arc::clone(&names), Mutex::new(Joiner::new()));
+        let outlet = Arc::new(move |_: &UnitId, frame: Vec<u8>| {
+            let entry = joiner.lock().unwrap().join(decode(&frame)?)?;
+            noting.lock().unwrap().extend(entry.map(|entry| entry.event.name()));
+            Ok(())
+        });
+        actor.journal_to(Journal { instance: "this".into(), outlet });
+        names.lock().unwrap().clear();
+        actor.command(&Command::Standby).unwrap();
+        actor.change(document(7));
+        let standing = Standing { yields: true, alone_since: None, deserted: false, ..lost(start) };
+        if commanded_there {
+            let (unit, instance) = (actor.id().to_string(), "other".to_owned());
+            let words = State::RunningWithoutReversal.to_string();
+            let event =
+                JournalEvent::Commanded { command: Command::Run { reversal: None }, accepted: true, words };
+            let entry = JournalEntry { unit, instance, number: 0, heard: actor.stream.heard(), event };
+            actor.hear_journal(entry, start + ms(20), &standing);
+            names.lock().unwrap().retain(|name| *name != "commanded");
+            names.lock().unwrap().insert(0, "commanded");
+        }
+        actor.hear_journal(other.memory("other"), start + ms(20), &standing);
+        assert!(!actor.speaks());
+        assert_eq!(actor.stream.unit().state() != State::Standby, commanded_there);
+        assert_eq!(actor.highest_revision(), 7);
+        assert_eq!(*names.lock().unwrap(), told);
+    }
+}
+
+/// A change to a document with its text, from the next tick on.
+fn document(counter: u64) -> Change {
+    let text = include_str!("../../../../../config/calibration/example-full.toml");
+    let parsed = Document::parse(text, None).unwrap();
+    let digest = Digest(parsed.digest);
+    let label = Label::of(&parsed.document, digest, "");
+    let compiled = Compiled::new(Arc::new(parsed.calibration), label, Compressed::new(text.as_bytes()));
+    let next = Arc::new(Given::new(counter, Arc::new(compiled), &isotherm_protocol::history::Source::Bus));
+    Change { next, at: Schedule::NextTick, slew: Span::ZERO }
 }
