@@ -228,6 +228,11 @@ fn without_a_place_whole_turns_hold_the_earth_off() {
         // The gyros are some degrees from their reference: 40 ppm/°C.
         assert!((weight - gyro.scale).abs() < 5e-4, "{weight}");
     }
+    // Each mounting has another share of the Earth in its bias, and a rest all of what is across the table's axis.
+    for found in made.gyros.iter().flatten() {
+        let [asymmetry, sigma] = found.asymmetry.unwrap();
+        assert!(asymmetry.abs() < 3.0 * sigma && sigma < 1e-5 && !found.widened, "{asymmetry} {sigma}");
+    }
 }
 
 /// The only finding that something is refused for.
