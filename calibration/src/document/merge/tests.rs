@@ -2,6 +2,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Curve, GyroOutput, Shape, StatedTerm};
 
 use super::*;
+use crate::document::reweigh;
 use crate::report::Sigmas;
 
 fn named(name: &str, change: impl FnOnce(&mut Document)) -> Written {
@@ -204,6 +205,34 @@ fn what_a_parts_own_base_never_had_is_a_conflict() {
         assert_eq!(merge(&base, &[part(other)], &take("part.toml")).unwrap().gone, gone);
     }
     insta::assert_snapshot!(told.join("\n"));
+}
+
+#[test]
+fn a_bias_goes_with_the_weight_that_is_taken() {
+    let base = named("base.toml", bias(100.0));
+    let weight = base.document.gyro.sensor[0].increment_weight_rad_per_rad.unwrap();
+    let heavier = |document: &mut Document| {
+        bias(100.0)(document);
+        reweigh(&mut document.gyro.sensor[0], 1.01 * weight);
+    };
+    let before = |document: &mut Document| {
+        heavier(document);
+        bias(100.0)(document);
+    };
+    let thermal = named("thermal.toml", bias(200.0));
+    for (rates, others, wanted) in [
+        (named("rates.toml", heavier), Some(&thermal), 202.0),
+        (named("rates.toml", heavier), None, 101.0),
+        // A part that took the bias as it was.
+        (named("rates.toml", before), None, 101.0),
+    ] {
+        let parts: Vec<Written> = others.into_iter().cloned().chain([rates]).collect();
+        let merged = merge(&base, &parts, &[]).unwrap();
+        let gyro = &merged.written.document.gyro.sensor[0];
+        let value = gyro.terms.curve(Feature::One).unwrap().shape().at(20.0).unwrap();
+        assert!((value / wanted - 1.0).abs() < 1e-9, "{value}");
+        assert_eq!((merged.notes.len(), merged.warnings.len()), (1, 0), "{:?}", merged.notes);
+    }
 }
 
 #[test]
