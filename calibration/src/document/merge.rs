@@ -80,11 +80,13 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
         gone: Vec::new(),
         warnings: Vec::new(),
         conflicts: Vec::new(),
+        foreign: BTreeMap::new(),
     };
     for (group, keys) in &groups {
         merging.decide(group, keys);
     }
     merging.filters();
+    merging.foreign();
     let Merging { from, gone, warnings, conflicts, .. } = merging;
     if !conflicts.is_empty() {
         return Err(Error::Refused(conflicts));
@@ -131,6 +133,8 @@ struct Merging<'a> {
     gone: Vec<(String, String)>,
     warnings: Vec<String>,
     conflicts: Vec<String>,
+    /// What is taken of parts that were made from documents that are not there.
+    foreign: BTreeMap<&'a str, Vec<&'a str>>,
 }
 
 impl<'a> Merging<'a> {
@@ -142,8 +146,11 @@ impl<'a> Merging<'a> {
         for part in self.parts {
             let lacks = |key: &&str| base.sections.contains_key(*key) && !part.sections.contains_key(*key);
             let gone: Vec<&str> = keys.iter().copied().filter(lacks).collect();
-            let made: Vec<&str> = keys.iter().copied().filter(|key| part.has_made(base, key)).collect();
+            let made: Vec<&'a str> = keys.iter().copied().filter(|key| part.has_made(base, key)).collect();
             let open = |key: &&str| !self.take.iter().any(|take| covers(&take.key, key));
+            if part.made_from() != Some("") && !self.is_known(part) {
+                self.foreign.entry(part.name()).or_default().extend(made.iter().copied().filter(open));
+            }
             let never: Vec<&str> = gone.iter().copied().filter(open).collect();
             if made.is_empty() {
                 let lacks = format!("{} lacks {}: kept as in {}", part.name(), gone.join(", "), base.name());
@@ -195,6 +202,28 @@ impl<'a> Merging<'a> {
     fn is_known(&self, part: &Part<'_>) -> bool {
         let mut all = self.parts.iter().chain([self.base]);
         part.made_from().is_none_or(|digest| all.any(|one| digest_of(one.written) == digest))
+    }
+
+    /// A part states what its own base did, too: where that is not there, it cannot be told from what the part has made. It takes back what
+    /// the base has made beside it where both were made from one document, and is told of where it may have been made from a later one.
+    fn foreign(&mut self) {
+        for part in self.parts {
+            let Some([first, others @ ..]) = self.foreign.get(part.name()).map(Vec::as_slice) else {
+                continue;
+            };
+            let (name, base) = (part.name(), self.base.name());
+            let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+            if part.made_from() == self.base.made_from() {
+                self.conflicts.push(format!(
+                    "{name} was made from the document that {base} was made from, and may have {first}{more} from there: give that \
+                     document first, then {base} and {name}, or choose with --take {first}={name}"
+                ));
+            } else {
+                self.warnings.push(format!(
+                    "{name} was made from a document that is not given, and may have {first}{more} from there: give that document, too"
+                ));
+            }
+        }
     }
 
     /// Terms of Ṫ, T̈ and lags hold with the filter that they were fitted with, and with no other.

@@ -208,6 +208,27 @@ fn what_a_parts_own_base_never_had_is_a_conflict() {
 }
 
 #[test]
+fn a_part_of_a_document_that_is_not_given_takes_nothing_back_without_a_word() {
+    let of = |name: &str, value: f64, digest: &str| {
+        named(name, |document| {
+            bias(value)(document);
+            let details = toml::Table::from_iter([(BASE.to_owned(), digest.into())]);
+            document.origin.get_or_insert_default().details = Some(details);
+        })
+    };
+    let [rates, positions] =
+        [of("rates.toml", 7.0, "0123456789abcdef"), of("positions.toml", 8.0, "0123456789abcdef")];
+    let Err(Error::Refused(told)) = merge(&rates, std::slice::from_ref(&positions), &[]) else {
+        panic!("a conflict")
+    };
+    let later = of("later.toml", 9.0, "00000000000000ff");
+    let warned = merge(&rates, &[later], &[]).unwrap().warnings;
+    insta::assert_snapshot!([told, warned].concat().join("\n"));
+    let take = [Take { key: "gyro.sensor.x".into(), from: "rates.toml".into() }];
+    assert!(merge(&rates, &[positions], &take).is_ok());
+}
+
+#[test]
 fn a_bias_goes_with_the_weight_that_is_taken() {
     let base = named("base.toml", bias(100.0));
     let weight = base.document.gyro.sensor[0].increment_weight_rad_per_rad.unwrap();
