@@ -176,7 +176,7 @@ impl<'a> Merging<'a> {
                     None => continue,
                     own => own,
                 },
-                None => Some(first).filter(|(_, value)| said.iter().all(|(_, other)| other == value)),
+                None => Some(first).filter(|first| said.iter().all(|other| agree(key, first, other))),
             };
             match decided {
                 None => self.conflicts.push(conflict(key, &said)),
@@ -244,7 +244,7 @@ impl<'a> Merging<'a> {
 
 impl<'a> Part<'a> {
     fn of(written: &'a Written, base: &Written) -> Result<Self, Error> {
-        let mut of_base = sections(tree(&weights::with(&base.document, &written.document))?);
+        let mut of_base = weights::stated(&base.document, &written.document)?;
         of_base.retain(|key, _| is_bias(&group(key)));
         Ok(Self { written, sections: sections(tree(&written.document)?), of_base })
     }
@@ -298,6 +298,15 @@ fn covers(choice: &str, key: &str) -> bool {
 /// Whether what is replaced together are curves over temperature.
 fn are_curves(group: &str) -> bool {
     is_bias(group) || group.ends_with(" output")
+}
+
+/// Whether two parts say the same of a key; of a bias, with the increment weights of one of them.
+fn agree(key: &str, (one, value): &Said<'_>, (other, its): &Said<'_>) -> bool {
+    let states = |of: &Part<'_>, weights: &Part<'_>, value: Option<&Value>| {
+        let stated = weights::stated(&of.written.document, &weights.written.document);
+        stated.is_ok_and(|sections| sections.get(key) == value)
+    };
+    value == its || (is_bias(&group(key)) && (states(one, other, *its) || states(other, one, *value)))
 }
 
 /// Whether what is replaced together is the bias of a gyro.

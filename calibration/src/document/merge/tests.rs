@@ -241,8 +241,13 @@ fn a_bias_goes_with_the_weight_that_is_taken() {
         bias(100.0)(document);
     };
     let thermal = named("thermal.toml", bias(200.0));
+    let of_thermal = |document: &mut Document| {
+        bias(200.0)(document);
+        reweigh(&mut document.gyro.sensor[0], 1.01 * weight);
+    };
     for (rates, others, wanted) in [
         (named("rates.toml", heavier), Some(&thermal), 202.0),
+        (named("rates.toml", of_thermal), Some(&thermal), 202.0),
         (named("rates.toml", heavier), None, 101.0),
         // A part that took the bias as it was.
         (named("rates.toml", before), None, 101.0),

@@ -6,13 +6,17 @@ use isotherm_protocol::document::Document;
 use toml::Value;
 
 use super::Part;
-use super::sections::{group, sections};
+use super::sections::{Sections, group, sections};
 use crate::document::show::terms::tree;
 use crate::document::{reweigh, tidy, weight};
 use crate::error::Error;
 
-/// A document with the increment weights of another one of the same gyros.
-pub(super) fn with(document: &Document, other: &Document) -> Document {
+/// The sections of a document with the increment weights of another one of the same gyros.
+pub(super) fn stated(document: &Document, other: &Document) -> Result<Sections, Error> {
+    Ok(sections(tree(&with(document, other))?))
+}
+
+fn with(document: &Document, other: &Document) -> Document {
     let mut document = document.clone();
     for (gyro, other) in document.gyro.sensor.iter_mut().zip(&other.gyro.sensor) {
         if let Some(new) = weight(other) {
@@ -33,7 +37,7 @@ pub(super) fn rescaled<'a>(
     for part in parts {
         let (name, old) = (part.name(), &part.written.document);
         let new = with(old, merged);
-        let sections = sections(tree(&new)?);
+        let sections = stated(old, merged)?;
         let taken = from.iter().filter(|(_, from)| from.name() == name);
         let other = taken.filter_map(|(key, _)| Some((*key, sections.get(*key)?)));
         let other: BTreeMap<_, _> =
