@@ -15,7 +15,8 @@ mod provenance;
 pub mod show;
 mod written;
 
-use isotherm_protocol::document::{AccelSensor, Curve, Document, Shape};
+use isotherm_correction::thermal::{GYRO_TERMS, Makes};
+use isotherm_protocol::document::{AccelSensor, Curve, Document, GyroSensor, Shape, StatedTerm};
 
 pub use fitted::{About, Fitted};
 pub(crate) use fitted::{by_name, rows};
@@ -43,6 +44,36 @@ pub fn accelerometers(document: &Document) -> &[AccelSensor] {
 /// A curve that has one value everywhere.
 pub(crate) fn constant(value: f64) -> Curve {
     Curve::new(Shape::Constant { value: tidy(value) })
+}
+
+/// The increment weight of a gyro, in the unit of its readings.
+pub(crate) fn weight(gyro: &GyroSensor) -> Option<f64> {
+    gyro.increment_weight_arcsec_per_count.or(gyro.increment_weight_rad_per_rad)
+}
+
+/// Gives a gyro another increment weight. All terms of its bias Ω grow alike, and so does all that it reads, K·P − Ω (models §2): where it
+/// read nothing it still does.
+pub(crate) fn reweigh(gyro: &mut GyroSensor, new: f64) {
+    let old = [&mut gyro.increment_weight_arcsec_per_count, &mut gyro.increment_weight_rad_per_rad];
+    let Some(old) = old.into_iter().find_map(Option::as_mut) else { return };
+    let factor = new / std::mem::replace(old, new);
+    if factor.to_bits() == 1.0_f64.to_bits() {
+        return;
+    }
+    let is_bias =
+        |feature| GYRO_TERMS.iter().any(|term| term.feature == feature && term.makes == Makes::Bias);
+    let times = |curve: &Curve| {
+        let new = Curve::new(curve.shape().scaled(1.0, factor, 0.0)).in_unit(curve.unit());
+        curve.argument().map_or(new.clone(), |argument| new.over(argument))
+    };
+    let terms: Vec<StatedTerm> = gyro.terms.iter().filter(|term| is_bias(term.feature)).cloned().collect();
+    gyro.terms.retain(|feature| !is_bias(feature));
+    for term in terms {
+        let (coefficient, braking) = (times(&term.coefficient), term.braking.as_ref().map(times));
+        gyro.put(StatedTerm { coefficient, braking, ..term });
+    }
+    let trend = gyro.trend.iter_mut().flat_map(|trend| &mut trend.coefficients_deg_per_h);
+    trend.for_each(|coefficient| *coefficient *= factor);
 }
 
 /// The scale factor that a document states of an accelerometer at a temperature (°C); 1 where it states none there.

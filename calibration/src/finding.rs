@@ -210,8 +210,8 @@ pub enum Kind {
     Worse { axis: usize },
     /// The table was at several temperatures, and the steps of one of them (°C) do not tell weights and axes of all gyros.
     #[error(
-        "the steps at {} °C do not turn about three axes: no change over temperature is fitted, and all temperatures count \
-         as one",
+        "the steps at {} °C do not turn about three axes: no change over temperature is fitted, and but for the bias all \
+         temperatures count as one",
         fixed(*.deg_c, 1)
     )]
     NotEachTemperature { deg_c: f64 },

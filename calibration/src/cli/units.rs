@@ -147,11 +147,18 @@ impl<'a> Logs<'a> {
         }
         match self.judge.iter().find(|judge| logs.iter().any(|log| are_one_log(log, judge))) {
             None => Ok(()),
-            Some(judge) => Err(Error::Usage(format!(
-                "--judge {}: the document is fitted to the same part of it: give another log, or another part \
-                 (--duration, --judge-start)",
-                judge.display()
-            ))),
+            Some(judge) => {
+                // Where judging logs are read like the others, there is no other part of them.
+                let part = if std::ptr::eq(self.reading, self.judging) {
+                    ""
+                } else {
+                    ", or another part (--duration, --judge-start)"
+                };
+                Err(Error::Usage(format!(
+                    "--judge {}: the document is fitted to the same part of it: give another log{part}",
+                    judge.display()
+                )))
+            }
         }
     }
 

@@ -5,12 +5,16 @@
 //! factor and bias of an accelerometer; the axes of a kind) are replaced together: a lag that takes the place of K1 takes
 //! K1 away, and that is told. Where two parts have made the same otherwise, neither is taken: the keys are told, and the
 //! user decides.
+//!
+//! A gyro's bias holds with the increment weight that it was fitted with: where another part gives the weight, it is multiplied by the
+//! ratio of both, and so is that of the base before a part is compared with it.
 
 mod check;
 mod origin;
 pub(crate) mod sections;
 #[cfg(test)]
 mod tests;
+mod weights;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -47,6 +51,8 @@ pub struct Merged {
     pub gone: Vec<(String, String)>,
     /// What is to be looked at.
     pub warnings: Vec<String>,
+    /// What was done besides, in sentences.
+    pub notes: Vec<String>,
 }
 
 /// Puts parts together.
@@ -57,8 +63,8 @@ pub struct Merged {
 pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged, Error> {
     same_unit(base, parts)?;
     check(base, parts, take)?;
-    let (whole, written) = (Part::of(base)?, parts);
-    let parts = parts.iter().map(Part::of).collect::<Result<Vec<_>, _>>()?;
+    let (whole, written) = (Part::of(base, base)?, parts);
+    let parts = parts.iter().map(|part| Part::of(part, base)).collect::<Result<Vec<_>, _>>()?;
     let keys: BTreeSet<&str> =
         parts.iter().chain([&whole]).flat_map(|part| part.sections.keys()).map(String::as_str).collect();
     chosen(take, &keys)?;
@@ -74,11 +80,13 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
         gone: Vec::new(),
         warnings: Vec::new(),
         conflicts: Vec::new(),
+        foreign: BTreeMap::new(),
     };
     for (group, keys) in &groups {
         merging.decide(group, keys);
     }
     merging.filters();
+    merging.foreign();
     let Merging { from, gone, warnings, conflicts, .. } = merging;
     if !conflicts.is_empty() {
         return Err(Error::Refused(conflicts));
@@ -95,16 +103,24 @@ pub fn merge(base: &Written, parts: &[Written], take: &[Take]) -> Result<Merged,
         put(&mut tree, key, from.get(key).and_then(|part| part.sections.get(key).cloned()));
     }
     let words = |found: Vec<Problem>| Error::Document(found.iter().map(ToString::to_string).collect());
-    let mut document = Document::parse(&tree.to_string(), None).map_err(words)?.document;
+    let parse = |tree: &toml::Table| Document::parse(&tree.to_string(), None).map_err(words);
+    let all: Vec<&Part<'_>> = parts.iter().chain([&whole]).collect();
+    let (biases, notes) = weights::rescaled(&all, &from, &parse(&tree)?.document)?;
+    for (key, value) in biases {
+        put(&mut tree, key, Some(value));
+    }
+    let mut document = parse(&tree)?.document;
     let taken = from.into_iter().map(|(key, part)| (key.to_owned(), part.name().to_owned())).collect();
     document.origin = Some(origin::origin(base, written, &taken)?);
-    Ok(Merged { written: Written::of(&document)?, taken: taken.into_iter().collect(), gone, warnings })
+    Ok(Merged { written: Written::of(&document)?, taken: taken.into_iter().collect(), gone, warnings, notes })
 }
 
 /// A document with its sections.
 struct Part<'a> {
     written: &'a Written,
     sections: Sections,
+    /// Biases of the base with the increment weights of this document.
+    of_base: Sections,
 }
 
 /// What has been decided so far.
@@ -117,6 +133,8 @@ struct Merging<'a> {
     gone: Vec<(String, String)>,
     warnings: Vec<String>,
     conflicts: Vec<String>,
+    /// What is taken of parts that were made from documents that are not there.
+    foreign: BTreeMap<&'a str, Vec<&'a str>>,
 }
 
 impl<'a> Merging<'a> {
@@ -128,8 +146,11 @@ impl<'a> Merging<'a> {
         for part in self.parts {
             let lacks = |key: &&str| base.sections.contains_key(*key) && !part.sections.contains_key(*key);
             let gone: Vec<&str> = keys.iter().copied().filter(lacks).collect();
-            let made: Vec<&str> = keys.iter().copied().filter(|key| part.has_made(base, key)).collect();
+            let made: Vec<&'a str> = keys.iter().copied().filter(|key| part.has_made(base, key)).collect();
             let open = |key: &&str| !self.take.iter().any(|take| covers(&take.key, key));
+            if part.made_from() != Some("") && !self.is_known(part) {
+                self.foreign.entry(part.name()).or_default().extend(made.iter().copied().filter(open));
+            }
             let never: Vec<&str> = gone.iter().copied().filter(open).collect();
             if made.is_empty() {
                 let lacks = format!("{} lacks {}: kept as in {}", part.name(), gone.join(", "), base.name());
@@ -155,7 +176,7 @@ impl<'a> Merging<'a> {
                     None => continue,
                     own => own,
                 },
-                None => Some(first).filter(|(_, value)| said.iter().all(|(_, other)| other == value)),
+                None => Some(first).filter(|first| said.iter().all(|other| agree(key, first, other))),
             };
             match decided {
                 None => self.conflicts.push(conflict(key, &said)),
@@ -183,6 +204,28 @@ impl<'a> Merging<'a> {
         part.made_from().is_none_or(|digest| all.any(|one| digest_of(one.written) == digest))
     }
 
+    /// A part states what its own base did, too: where that is not there, it cannot be told from what the part has made. It takes back what
+    /// the base has made beside it where both were made from one document, and is told of where it may have been made from a later one.
+    fn foreign(&mut self) {
+        for part in self.parts {
+            let Some([first, others @ ..]) = self.foreign.get(part.name()).map(Vec::as_slice) else {
+                continue;
+            };
+            let (name, base) = (part.name(), self.base.name());
+            let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+            if part.made_from() == self.base.made_from() {
+                self.conflicts.push(format!(
+                    "{name} was made from the document that {base} was made from, and may have {first}{more} from there: give that \
+                     document first, then {base} and {name}, or choose with --take {first}={name}"
+                ));
+            } else {
+                self.warnings.push(format!(
+                    "{name} was made from a document that is not given, and may have {first}{more} from there: give that document, too"
+                ));
+            }
+        }
+    }
+
     /// Terms of Ṫ, T̈ and lags hold with the filter that they were fitted with, and with no other.
     fn filters(&mut self) {
         let Some(chosen) = self.from.get("temperature.filter") else { return };
@@ -200,8 +243,10 @@ impl<'a> Merging<'a> {
 }
 
 impl<'a> Part<'a> {
-    fn of(written: &'a Written) -> Result<Self, Error> {
-        Ok(Self { written, sections: sections(tree(&written.document)?) })
+    fn of(written: &'a Written, base: &Written) -> Result<Self, Error> {
+        let mut of_base = weights::stated(&base.document, &written.document)?;
+        of_base.retain(|key, _| is_bias(&group(key)));
+        Ok(Self { written, sections: sections(tree(&written.document)?), of_base })
     }
 
     fn name(&self) -> &'a str {
@@ -216,7 +261,7 @@ impl<'a> Part<'a> {
     /// document does, and thermometers and their filter by what its log happens to be, which no static term rests on.
     fn has_made(&self, base: &Self, key: &str) -> bool {
         let (before, value) = (base.sections.get(key), self.sections.get(key));
-        if value.is_none() || value == before {
+        if value.is_none() || value == before || value == self.of_base.get(key) {
             return false;
         }
         if self.made_from() != Some("") {
@@ -252,7 +297,21 @@ fn covers(choice: &str, key: &str) -> bool {
 
 /// Whether what is replaced together are curves over temperature.
 fn are_curves(group: &str) -> bool {
-    group.ends_with(" bias") || group.ends_with(" output")
+    is_bias(group) || group.ends_with(" output")
+}
+
+/// Whether two parts say the same of a key; of a bias, with the increment weights of one of them.
+fn agree(key: &str, (one, value): &Said<'_>, (other, its): &Said<'_>) -> bool {
+    let states = |of: &Part<'_>, weights: &Part<'_>, value: Option<&Value>| {
+        let stated = weights::stated(&of.written.document, &weights.written.document);
+        stated.is_ok_and(|sections| sections.get(key) == value)
+    };
+    value == its || (is_bias(&group(key)) && (states(one, other, *its) || states(other, one, *value)))
+}
+
+/// Whether what is replaced together is the bias of a gyro.
+fn is_bias(group: &str) -> bool {
+    group.ends_with(" bias")
 }
 
 /// What is in the way. Of two curves over temperature, made each as a whole, none adds to the other.
@@ -281,6 +340,7 @@ impl Merged {
             format!("{} sections of {} documents, no conflict{gone}", self.taken.len(), documents.len());
         let mut sheet = Report::saying(format!("Merge of {name}"), name, words);
         sheet.warnings.clone_from(&self.warnings);
+        sheet.notes.clone_from(&self.notes);
         let row = |(key, from): &(String, String)| vec![key.clone(), from.clone()];
         sheet.table("Taken", ["section", "from"], self.taken.iter().map(row));
         let heading = "Left out, because the part does without";

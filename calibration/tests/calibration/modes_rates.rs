@@ -289,7 +289,8 @@ fn rates_are_judged_on_steps_that_the_fit_has_not_seen() {
     // One axis short.
     let short =
         ["rates", &seen, "--judge", &judged, "--axis", "z", "--rates", "36,-36,108,-108", "--remove-mean"];
-    insta::assert_snapshot!(worse + &told(folder.path(), &short));
+    let same = ["rates", &seen, "--judge", &seen, "--axis", "z", "--axis", "z", "--rates", "36,-36,108,-108"];
+    insta::assert_snapshot!(worse + &told(folder.path(), &short) + &told(folder.path(), &same));
 }
 
 #[test]

@@ -2,6 +2,7 @@ use isotherm_correction::thermal::Feature;
 use isotherm_protocol::document::{Curve, GyroOutput, Shape, StatedTerm};
 
 use super::*;
+use crate::document::reweigh;
 use crate::report::Sigmas;
 
 fn named(name: &str, change: impl FnOnce(&mut Document)) -> Written {
@@ -204,6 +205,60 @@ fn what_a_parts_own_base_never_had_is_a_conflict() {
         assert_eq!(merge(&base, &[part(other)], &take("part.toml")).unwrap().gone, gone);
     }
     insta::assert_snapshot!(told.join("\n"));
+}
+
+#[test]
+fn a_part_of_a_document_that_is_not_given_takes_nothing_back_without_a_word() {
+    let of = |name: &str, value: f64, digest: &str| {
+        named(name, |document| {
+            bias(value)(document);
+            let details = toml::Table::from_iter([(BASE.to_owned(), digest.into())]);
+            document.origin.get_or_insert_default().details = Some(details);
+        })
+    };
+    let [rates, positions] =
+        [of("rates.toml", 7.0, "0123456789abcdef"), of("positions.toml", 8.0, "0123456789abcdef")];
+    let Err(Error::Refused(told)) = merge(&rates, std::slice::from_ref(&positions), &[]) else {
+        panic!("a conflict")
+    };
+    let later = of("later.toml", 9.0, "00000000000000ff");
+    let warned = merge(&rates, &[later], &[]).unwrap().warnings;
+    insta::assert_snapshot!([told, warned].concat().join("\n"));
+    let take = [Take { key: "gyro.sensor.x".into(), from: "rates.toml".into() }];
+    assert!(merge(&rates, &[positions], &take).is_ok());
+}
+
+#[test]
+fn a_bias_goes_with_the_weight_that_is_taken() {
+    let base = named("base.toml", bias(100.0));
+    let weight = base.document.gyro.sensor[0].increment_weight_rad_per_rad.unwrap();
+    let heavier = |document: &mut Document| {
+        bias(100.0)(document);
+        reweigh(&mut document.gyro.sensor[0], 1.01 * weight);
+    };
+    let before = |document: &mut Document| {
+        heavier(document);
+        bias(100.0)(document);
+    };
+    let thermal = named("thermal.toml", bias(200.0));
+    let of_thermal = |document: &mut Document| {
+        bias(200.0)(document);
+        reweigh(&mut document.gyro.sensor[0], 1.01 * weight);
+    };
+    for (rates, others, wanted) in [
+        (named("rates.toml", heavier), Some(&thermal), 202.0),
+        (named("rates.toml", of_thermal), Some(&thermal), 202.0),
+        (named("rates.toml", heavier), None, 101.0),
+        // A part that took the bias as it was.
+        (named("rates.toml", before), None, 101.0),
+    ] {
+        let parts: Vec<Written> = others.into_iter().cloned().chain([rates]).collect();
+        let merged = merge(&base, &parts, &[]).unwrap();
+        let gyro = &merged.written.document.gyro.sensor[0];
+        let value = gyro.terms.curve(Feature::One).unwrap().shape().at(20.0).unwrap();
+        assert!((value / wanted - 1.0).abs() < 1e-9, "{value}");
+        assert_eq!((merged.notes.len(), merged.warnings.len()), (1, 0), "{:?}", merged.notes);
+    }
 }
 
 #[test]

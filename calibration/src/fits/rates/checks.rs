@@ -167,6 +167,8 @@ fn largest(count: usize, value: impl Fn(usize) -> f64) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use nalgebra::DMatrix;
 
     use super::*;
@@ -232,6 +234,7 @@ mod tests {
             axis_sigma: [f64::NAN; 3],
             asymmetry: None,
             bias: [0.0, 1.0],
+            bias_of: BTreeMap::new(),
             covariance: DMatrix::identity(2, 2),
             left: vec![left, -left],
             chi_square: 1e9,

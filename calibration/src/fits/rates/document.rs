@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::fit::Made;
 use super::model::GyroRates;
-use crate::document::{by_name, constant, rows, tidy};
+use crate::document::{by_name, constant, reweigh, rows, tidy, weight};
 use crate::finding::Kind;
 use crate::numbers::unit;
 use crate::report::Sigmas;
@@ -26,8 +26,9 @@ pub fn fitted(
         let Ok(found) = found else { continue };
         let gain = found.gain[0];
         if let Some(own) = document.gyro.sensor.get_mut(sensor) {
-            let weights = [&mut own.increment_weight_arcsec_per_count, &mut own.increment_weight_rad_per_rad];
-            weights.into_iter().flatten().for_each(|weight| *weight = tidy(*weight / gain));
+            if let Some(old) = weight(own) {
+                reweigh(own, tidy(old / gain));
+            }
             if let Some([change, _]) = found.weight_asymmetry_ppm() {
                 let old = own.terms.curve(Feature::RateMagnitude).map(|asymmetry| asymmetry.plus(change));
                 own.set(Feature::RateMagnitude, old.unwrap_or_else(|| constant(change)));

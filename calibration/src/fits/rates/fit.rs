@@ -1,5 +1,7 @@
 //! The whole procedure: bin, find the steps, fit, write, judge.
 
+use std::collections::BTreeMap;
+
 use isotherm_correction::earth::Place;
 use isotherm_protocol::document::Document;
 
@@ -7,9 +9,9 @@ use super::attitude;
 use super::checks::{no_result, one_way};
 use super::document;
 use super::matching::Matched;
-use super::measure::{carry_earth, first_gains, points, white};
+use super::measure::{carry_earth, first_gains, group, points, white};
 use super::model::{GyroRates, solve};
-use super::over_temperature::OverTemperature;
+use super::over_temperature::{OverTemperature, levels_of};
 use super::read::{Turned, read, whole_turns};
 use super::steps::Step;
 use crate::axes::{AXES, main_axis};
@@ -17,7 +19,7 @@ use crate::document::Written;
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fits::modes::document::{row, widened};
-use crate::numbers::{Size, hull, median};
+use crate::numbers::{hull, mean, median};
 use crate::report::{Verdict, beside, of_logs};
 use crate::runs::Run;
 use crate::runs::table::{Rows, Table};
@@ -80,32 +82,33 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     let mut runs = read_all(wanted, &mut warnings)?;
     let mut judging = runs.split_off(wanted.runs.len());
     let sensors = wanted.base.gyro.sensor.len();
-    let mut walk = vec![0.0; sensors];
+    // Of each gyro, its white noise and what it shows of a rate.
+    let mut shows = vec![(0.0, [0.0; 3]); sensors];
     let mut axes: Vec<[f64; 3]> = (0..sensors).map(|sensor| row(wanted.base, sensor, f64::NAN)).collect();
     let mut gains = first_gains(&runs, &axes);
-    let mut biases = vec![0.0; sensors];
     let mut gyros = Vec::new();
     for _ in 0..ROUNDS {
-        carry_earth(&mut runs, &axes, &gains, &biases);
-        for (sensor, walk) in walk.iter_mut().enumerate() {
-            *walk = white(wanted.base, &runs, sensor, axes[sensor].map(|x| x * gains[sensor]));
+        carry_earth(&mut runs, &axes, &gains, &gyros);
+        for (sensor, (walk, gain)) in shows.iter_mut().enumerate() {
+            *gain = axes[sensor].map(|x| x * gains[sensor]);
+            *walk = white(wanted.base, &runs, sensor, *gain);
         }
         gyros = (0..sensors)
             .map(|sensor| {
-                solve(&points(wanted, &runs, sensor, walk[sensor]), row(wanted.base, sensor, f64::NAN))
+                solve(&points(wanted, &runs, sensor, shows[sensor]), row(wanted.base, sensor, f64::NAN))
             })
             .collect();
         for (sensor, found) in gyros.iter().enumerate() {
             if let Ok(found) = found {
                 gains[sensor] = found.gain[0];
-                biases[sensor] = found.bias[0] * found.gain[0].abs();
                 if let Some(axis) = found.axis {
                     axes[sensor] = axis;
                 }
             }
         }
     }
-    let over_temperature = match OverTemperature::of(wanted, &runs, &walk) {
+    carry_earth(&mut judging, &axes, &gains, &gyros);
+    let over_temperature = match OverTemperature::of(wanted, &runs, &shows) {
         Ok(found) => found,
         Err(deg_c) => {
             warnings.push(Kind::NotEachTemperature { deg_c }.into());
@@ -114,7 +117,7 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     };
     if let Some(over) = &over_temperature {
         for (sensor, found) in gyros.iter_mut().enumerate() {
-            let points = over.at_reference(wanted, &runs, sensor, &walk);
+            let points = over.at_reference(wanted, &runs, sensor, shows[sensor]);
             *found = solve(&points, row(wanted.base, sensor, f64::NAN));
         }
     }
@@ -137,7 +140,6 @@ pub fn make(wanted: &Wanted<'_>) -> Result<Made, Error> {
     }
     let temperatures: Vec<f64> = runs.iter().filter_map(|run| run.binned.temperature_deg_c).collect();
     let axes_deg_c = runs.iter().find_map(|run| run.binned.axes_deg_c);
-    carry_earth(&mut judging, &axes, &gains, &biases);
     let judged = steps_of(&judging);
     runs.extend(judging);
     warnings.extend(attitude::doubts(wanted.place, &runs, (&axes, &gains)));
@@ -182,6 +184,8 @@ fn read_all(wanted: &Wanted<'_>, warnings: &mut Vec<Finding>) -> Result<Vec<Turn
             warnings.push(Kind::ShortSteps { rates }.into());
         }
     }
+    let levels = levels_of(wanted.base, &runs).map_or_else(|| vec![0; runs.len()], |(level_of, _)| level_of);
+    group(&mut runs, &levels, wanted.place.is_empty());
     Ok(runs)
 }
 
@@ -266,12 +270,16 @@ impl Made {
 }
 
 /// Before and after by case axis, of the steps that were fitted and of those that were not, which decide where there are any; the
-/// bias is not what rates are about, so means are taken off.
+/// bias is not what rates are about, so the mean of each group of steps that have one bias is taken off.
 fn verdicts(steps: &[Matched], judged: &[Matched]) -> Vec<Verdict> {
     let of = |steps: &[Matched], axis: usize, sample: usize| -> Vec<f64> {
-        let errors: Vec<f64> = steps.iter().map(|one| one.error[sample][axis]).collect();
-        let mean = Size::of(&errors).mean;
-        errors.iter().map(|error| error - mean).collect()
+        let mut of_group: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for one in steps {
+            of_group.entry(one.group).or_default().push(one.error[sample][axis]);
+        }
+        let means: BTreeMap<usize, f64> =
+            of_group.into_iter().map(|(group, errors)| (group, mean(&errors))).collect();
+        steps.iter().map(|one| one.error[sample][axis] - means[&one.group]).collect()
     };
     AXES
         .iter()

@@ -28,11 +28,13 @@ pub struct Matched {
     pub rate: [f64; 3],
     /// Mean corrected rate less that, along the case axes, before and after (°/h).
     pub error: [[f64; 3]; 2],
+    /// Number of the group of steps that have one bias.
+    pub group: usize,
 }
 
 impl Matched {
     pub(super) fn new(step: Step, plateau: Plateau) -> Self {
-        Self { rate: step.rate_deg_per_h(), error: [[0.0; 3]; 2], step, plateau }
+        Self { rate: step.rate_deg_per_h(), error: [[0.0; 3]; 2], group: 0, step, plateau }
     }
 }
 

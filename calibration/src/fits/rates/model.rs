@@ -6,14 +6,17 @@
 //! u = h·ω + c·|h·ω|/|h| + b
 //! ```
 //!
-//! h = C·`K_old`/K: its direction is the input axis, its length says the weight; c the asymmetry, b what is left of the bias.
+//! h = C·`K_old`/K: its direction is the input axis, its length says the weight; c the asymmetry, b what is left of the bias, of each
+//! group of steps for itself: temperature changes it, and the Earth's share along the table where that is not taken off.
+
+use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use crate::finding::Kind;
 use crate::lsq::linear::{self, Linear, Weak};
-use crate::numbers::{dot, norm, real};
+use crate::numbers::{dot, norm, once_each, real};
 
 /// Smallest share of the largest singular value that carries information: steps are hardly exact to more digits.
 const SINGULAR: f64 = 1e-7;
@@ -34,6 +37,8 @@ pub struct Point {
     pub shown: f64,
     /// Standard deviation of that (°/h).
     pub sigma: f64,
+    /// Number of the group of steps that have one bias.
+    pub group: usize,
 }
 
 /// What was found of one gyro.
@@ -47,8 +52,10 @@ pub struct GyroRates {
     pub axis_sigma: [f64; 3],
     /// Scale factor with positive input less that with negative, in shares of their mean, and its standard error.
     pub asymmetry: Option<[f64; 2]>,
-    /// What is left of the bias (°/h), and its standard error.
+    /// What is left of the bias (°/h), in the mean of the groups of steps, and its standard error.
     pub bias: [f64; 2],
+    /// The same by group.
+    pub bias_of: BTreeMap<usize, f64>,
     /// Covariance of h (3), c where it was fitted, and b.
     pub covariance: DMatrix<f64>,
     /// What the fit leaves of each step (°/h).
@@ -62,6 +69,11 @@ pub struct GyroRates {
 }
 
 impl GyroRates {
+    /// What is left of the bias in a group of steps, as the gyro shows it (°/h); the mean of all where it has none of that group.
+    pub fn shown_bias(&self, group: usize) -> f64 {
+        self.bias_of.get(&group).unwrap_or(&self.bias[0]) * self.gain[0].abs()
+    }
+
     /// The asymmetry of the weight that takes that of the scale factor away (ppm), and its standard error, where it is none by accident:
     /// half of it, the other way round (models §2).
     pub fn weight_asymmetry_ppm(&self) -> Option<[f64; 2]> {
@@ -101,14 +113,19 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     }
     let both =
         [1.0, -1.0].into_iter().all(|sign| points.iter().any(|point| sign * along(point) > 0.2 * most));
-    let build = |asymmetry: bool| {
-        let width = columns(&points[0]).len() + 1 + usize::from(asymmetry);
+    let groups = once_each(points.iter().map(|point| point.group));
+    let build = |asymmetry: bool, others: &[usize]| {
+        let width = columns(&points[0]).len() + 1 + usize::from(asymmetry) + others.len();
         let row = |point: &Point| {
             let mut row = columns(point);
             if asymmetry {
                 row.push(along(point).abs());
             }
+            // The mean of the groups, and how far the others are from it: the first one makes up for them.
             row.push(1.0);
+            let share =
+                |group: &usize| f64::from(point.group == *group) - f64::from(point.group == groups[0]);
+            row.extend(others.iter().map(share));
             row
         };
         let rows: Vec<Vec<f64>> = points.iter().map(row).collect();
@@ -116,10 +133,14 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     };
     let y = DVector::from_iterator(points.len(), points.iter().map(|point| point.shown / point.sigma));
     let found = |x: DMatrix<f64>| linear::solve(&x, &y, Weak::Refuse(SINGULAR)).ok();
-    let wide = Some(build(true)).filter(|x| both && x.nrows() > x.ncols()).and_then(found);
-    let asymmetric = wide.is_some();
-    let narrow = || Some(build(false)).and_then(found);
-    let found = wide.or_else(narrow).ok_or(Kind::FewSteps { steps: points.len() })?;
+    // Groups of too few steps share one bias.
+    let forms = [&groups[1..], &[]].map(|others| [(true, others), (false, others)]);
+    let fit = |(asymmetry, others): (bool, &'_ [usize])| {
+        let x = Some(build(asymmetry, others)).filter(|x| !asymmetry || (both && x.nrows() > x.ncols()))?;
+        Some((asymmetry, others.len(), found(x)?))
+    };
+    let best = forms.into_iter().flatten().find_map(fit);
+    let (asymmetric, others, found) = best.ok_or(Kind::FewSteps { steps: points.len() })?;
     let Linear { coefficients: beta, inverse: mut covariance, residual: left, .. } = found;
     let mut freedom = real(points.len() - beta.len());
     let (chi_square, limit) = if freedom > 0.0 {
@@ -130,10 +151,16 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
     let widened = chi_square > limit;
     if widened {
         let along: Vec<f64> = points.iter().map(|point| along(point) / point.sigma).collect();
-        (covariance, freedom) =
-            wide_enough(&build(asymmetric), covariance, &left, (&along, chi_square, freedom));
+        (covariance, freedom) = wide_enough(
+            &build(asymmetric, &groups[1..=others]),
+            covariance,
+            &left,
+            (&along, chi_square, freedom),
+        );
     }
-    let last = beta.len() - 1;
+    let last = beta.len() - 1 - others;
+    let apart: Vec<f64> = beta.iter().skip(last + 1).copied().collect();
+    let first = -apart.iter().sum::<f64>();
     let (gain, gain_sigma, axis, axis_sigma) = if spans {
         let h = [beta[0], beta[1], beta[2]];
         let sign = if dot(h, old) < 0.0 { -1.0 } else { 1.0 };
@@ -158,8 +185,13 @@ pub fn solve(points: &[Point], old: [f64; 3]) -> Result<GyroRates, Kind> {
         axis_sigma,
         asymmetry: asymmetric.then(|| [2.0 * beta[place] / gain, 2.0 * sigma(place) / gain.abs()]),
         bias: [beta[last] / gain.abs(), sigma(last) / gain.abs()],
+        bias_of: groups
+            .into_iter()
+            .zip(std::iter::once(first).chain(apart))
+            .map(|(group, apart)| (group, (beta[last] + apart) / gain.abs()))
+            .collect(),
         left: left.iter().zip(points).map(|(left, point)| left * point.sigma / gain.abs()).collect(),
-        covariance,
+        covariance: covariance.view((0, 0), (last + 1, last + 1)).into_owned(),
         chi_square,
         widened,
         freedom,
@@ -232,7 +264,7 @@ mod tests {
         for _ in 0..200 {
             let point = |(axis, rate): ([f64; 3], f64)| {
                 let shown = dot([1.0, 1e-3, 0.0], axis) * rate * (1.0 + 500e-6 * noise()) + noise();
-                Point { rate: axis.map(|along| along * rate), shown, sigma: 1.0 }
+                Point { rate: axis.map(|along| along * rate), shown, sigma: 1.0, group: 0 }
             };
             let steps = AXES.into_iter().flat_map(|axis| rates.map(|rate| (axis, rate)));
             let found = solve(&steps.map(point).collect::<Vec<_>>(), AXES[0]).unwrap();

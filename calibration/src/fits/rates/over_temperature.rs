@@ -78,20 +78,28 @@ fn channels(base: &Document) -> Vec<String> {
     once_each(base.gyro.sensor.iter().filter_map(|sensor| sensor.channel.clone()))
 }
 
+/// The number of each run's temperature, and these temperatures (°C), where the gyros' axes follow any.
+pub(super) fn levels_of(base: &Document, runs: &[Turned]) -> Option<(Vec<usize>, Vec<f64>)> {
+    let channels = channels(base);
+    let of_run = |run: &Turned| -> Option<f64> {
+        let of = |name: &String| run.binned.channels_deg_c.get(name).copied();
+        let all: Option<Vec<f64>> = channels.iter().map(of).collect();
+        all.filter(|all| !all.is_empty()).map(|all| mean(&all))
+    };
+    Some(levels(&runs.iter().map(of_run).collect::<Option<Vec<f64>>>()?))
+}
+
 impl OverTemperature {
     /// From the runs and the true rates of their steps; `None` with one temperature.
     ///
     /// # Errors
     /// The first temperature (°C) that does not tell weights and axes of all gyros by itself.
-    pub(super) fn of(wanted: &Wanted<'_>, runs: &[Turned], walk: &[f64]) -> Result<Option<Self>, f64> {
-        let channels = channels(wanted.base);
-        let of_run = |run: &Turned| -> Option<f64> {
-            let of = |name: &String| run.binned.channels_deg_c.get(name).copied();
-            let all: Option<Vec<f64>> = channels.iter().map(of).collect();
-            all.filter(|all| !all.is_empty()).map(|all| mean(&all))
-        };
-        let Some(deg_c) = runs.iter().map(of_run).collect::<Option<Vec<f64>>>() else { return Ok(None) };
-        let (level_of, levels_deg_c) = levels(&deg_c);
+    pub(super) fn of(
+        wanted: &Wanted<'_>,
+        runs: &[Turned],
+        shows: &[(f64, [f64; 3])],
+    ) -> Result<Option<Self>, f64> {
+        let Some((level_of, levels_deg_c)) = levels_of(wanted.base, runs) else { return Ok(None) };
         if levels_deg_c.len() < 2 {
             return Ok(None);
         }
@@ -99,10 +107,10 @@ impl OverTemperature {
         for (number, deg_c) in levels_deg_c.iter().enumerate() {
             let own: Vec<usize> = (0..runs.len()).filter(|run| level_of[*run] == number).collect();
             let gyro = |sensor: usize| {
-                let all = points(wanted, own.iter().map(|run| &runs[*run]), sensor, walk[sensor]);
+                let all = points(wanted, own.iter().map(|run| &runs[*run]), sensor, shows[sensor]);
                 solve(&all, row(wanted.base, sensor, f64::NAN)).ok().filter(|found| found.axis.is_some())
             };
-            let gyros: Option<Vec<GyroRates>> = (0..walk.len()).map(gyro).collect();
+            let gyros: Option<Vec<GyroRates>> = (0..shows.len()).map(gyro).collect();
             let Some(gyros) = gyros else { return Err(*deg_c) };
             let own_deg_c = |sensor: &isotherm_protocol::document::GyroSensor| {
                 let channel = sensor.channel.as_ref();
@@ -120,8 +128,9 @@ impl OverTemperature {
         let stated = wanted.base.gyro.orientation.thermal.as_ref().map(|thermal| thermal.reference_deg_c);
         let reference_deg_c = stated.unwrap_or_else(|| reference(ends[0], ends[1]));
         let line = |sensor: usize| line(&found, sensor, reference_deg_c);
-        let lines: Option<Vec<Line>> = (0..walk.len()).map(line).collect();
+        let lines: Option<Vec<Line>> = (0..shows.len()).map(line).collect();
         let Some(lines) = lines else { return Ok(None) };
+        let channels = channels(wanted.base);
         Ok(Some(Self { channels, reference_deg_c, levels: found, lines, level_of }))
     }
 
@@ -131,7 +140,7 @@ impl OverTemperature {
         wanted: &Wanted<'_>,
         runs: &[Turned],
         sensor: usize,
-        walk: &[f64],
+        shows: (f64, [f64; 3]),
     ) -> Vec<Point> {
         let line = &self.lines[sensor];
         let of_run = |run: usize| {
@@ -139,7 +148,7 @@ impl OverTemperature {
             let scale = 1.0 + 1e-6 * line.scale_at(level.own_deg_c[sensor] - self.reference_deg_c);
             let away = level.deg_c - self.reference_deg_c;
             let turned = line.slope.map(|slope| slope * away);
-            points(wanted, [&runs[run]], sensor, walk[sensor]).into_iter().map(move |point| {
+            points(wanted, [&runs[run]], sensor, shows).into_iter().map(move |point| {
                 // A larger scale factor shows as a smaller gain.
                 let by_axis = dot(turned, point.rate);
                 Point { shown: point.shown * scale - line.gain * by_axis, ..point }

@@ -7,7 +7,7 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::thermal::Feature;
 use isotherm_log::offline::unit_id;
 use isotherm_log::text::LogEvent;
-use isotherm_protocol::document::{Document, GyroOutput, Temperature};
+use isotherm_protocol::document::{Document, GyroOutput, GyroSensor, Temperature, Trend};
 use isotherm_simulator::chamber::Profile;
 use isotherm_simulator::instrument::Gyros;
 use isotherm_simulator::motion::Path;
@@ -16,7 +16,7 @@ use isotherm_simulator::{Scenario, Simulation};
 
 use super::fit::{Made, Wanted, make};
 use super::steps::{Step, listed};
-use crate::document::plain;
+use crate::document::{constant, plain};
 use crate::error::Error;
 use crate::finding::{Finding, Kind};
 use crate::fixture;
@@ -107,9 +107,11 @@ fn made(runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
 }
 
 fn made_from(base: &Document, runs: &[Run], steps: &[Step], place: &[Place]) -> Result<Made, Error> {
-    let given =
-        Wanted { runs, judge: &[], steps, scale_known: true, base, place, table_ppm: 0.0, with_bias: false };
-    make(&given)
+    make(&wanted(base, runs, steps, place))
+}
+
+fn wanted<'a>(base: &'a Document, runs: &'a [Run], steps: &'a [Step], place: &'a [Place]) -> Wanted<'a> {
+    Wanted { runs, judge: &[], steps, scale_known: true, base, place, table_ppm: 0.0, with_bias: false }
 }
 
 /// Three runs, one about each axis.
@@ -186,6 +188,35 @@ fn the_written_document_takes_the_errors_away_the_asymmetry_too() {
 }
 
 #[test]
+fn a_new_weight_takes_the_old_bias_with_it() {
+    let runs = [0, 1, 2]
+        .map(|axis: usize| run(500 + u64::try_from(axis).unwrap(), AXES[axis], |reading| 0.9 * reading));
+    let written = |bias: f64, with_bias: bool| {
+        let mut base = base();
+        for gyro in &mut base.gyro.sensor {
+            gyro.set(Feature::One, constant(bias));
+            gyro.trend = Some(Trend { coefficients_deg_per_h: vec![bias], interval_h: [0.0, 1.0] });
+        }
+        let (steps, place) = (steps(3), place());
+        let wanted = Wanted { with_bias, ..wanted(&base, &runs, &steps, &place) };
+        make(&wanted).unwrap().written.document.gyro.sensor.remove(0)
+    };
+    let of = |gyro: &GyroSensor| {
+        let bias = gyro.terms.curve(Feature::One).unwrap().shape().at(25.0).unwrap();
+        [bias, gyro.trend.as_ref().unwrap().coefficients_deg_per_h[0]]
+    };
+    let gyro = written(900.0, false);
+    let weight = gyro.increment_weight_rad_per_rad.unwrap();
+    assert!(
+        of(&gyro).iter().all(|bias| (bias / (900.0 * weight) - 1.0).abs() < 1e-9) && weight > 1.1,
+        "{gyro:?}"
+    );
+    // What is found is the same whatever stood there.
+    let [one, other] = [0.0, 450.0].map(|bias| of(&written(bias, true)).iter().sum::<f64>());
+    assert!((one - other).abs() < 1e-3, "{one} {other}");
+}
+
+#[test]
 fn a_bent_gyro_is_told_from_noise() {
     let bend = |reading: f64| reading * (1.0 + 3e-5 * reading * reading);
     let runs = [0, 1, 2].map(|axis: usize| run(800 + u64::try_from(axis).unwrap(), AXES[axis], bend));
@@ -227,6 +258,11 @@ fn without_a_place_whole_turns_hold_the_earth_off() {
         let weight = 1.0 / found.as_ref().unwrap().gain[0];
         // The gyros are some degrees from their reference: 40 ppm/°C.
         assert!((weight - gyro.scale).abs() < 5e-4, "{weight}");
+    }
+    // Each mounting has another share of the Earth in its bias, and a rest all of what is across the table's axis.
+    for found in made.gyros.iter().flatten() {
+        let [asymmetry, sigma] = found.asymmetry.unwrap();
+        assert!(asymmetry.abs() < 3.0 * sigma && sigma < 1e-5 && !found.widened, "{asymmetry} {sigma}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Runs at several temperatures.
 
 use isotherm_correction::thermal::Feature;
-use isotherm_protocol::document::Document;
+use isotherm_protocol::document::{Document, Terms};
 use isotherm_simulator::Scenario;
 use isotherm_simulator::instrument::Gyros;
 
@@ -33,7 +33,8 @@ fn warm_base() -> Document {
     let mut document = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     document.accel = None;
     document.gyro.orientation.thermal = None;
-    document.gyro.sensor.iter_mut().for_each(|gyro| gyro.set(Feature::Reading, None));
+    // Nor of its bias: each temperature has its own.
+    document.gyro.sensor.iter_mut().for_each(|gyro| gyro.terms = Terms::default());
     document
 }
 
@@ -54,6 +55,7 @@ fn several_temperatures_give_the_slopes_of_axes_and_weights() {
     let made = made_from(&warm_base(), &runs, &steps, &place()).unwrap();
     let over = made.over_temperature.as_ref().unwrap();
     assert_eq!(over.levels.len(), 3);
+    assert!(made.gyros.iter().flatten().all(|found| !found.widened), "{:?}", made.report().warnings);
     let scenario = at(0, 20.0);
     let Gyros::Mems(gyros) = &scenario.instrument.gyros else { panic!() };
     let truth = &scenario.instrument.gyro_orientation;
@@ -101,4 +103,5 @@ fn a_temperature_that_does_not_tell_all_axes_is_told_and_counts_with_the_others(
     assert!(made.over_temperature.is_none());
     let told = made.warnings.iter().any(|found| matches!(found.kind, Kind::NotEachTemperature { .. }));
     assert!(told, "{:?}", made.warnings);
+    assert!(made.gyros.iter().flatten().all(|found| found.bias_of.len() == 2), "each its own bias");
 }
