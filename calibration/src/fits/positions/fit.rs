@@ -187,7 +187,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
     let (mut reasons, mut unclear) = (Vec::new(), Vec::new());
     for (run, track) in tracks.iter().enumerate() {
         if let Some(times) = &settings.times {
-            match times.poses(track, run, &settings.plan) {
+            match times.poses((track, run), &settings.plan, &settings.limits) {
                 Ok(poses) => found.extend(poses),
                 Err(words) => reasons.extend(words),
             }
