@@ -19,7 +19,7 @@ use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::{far, frozen, judging, quiet};
 use crate::numbers::{Size, dot, is_white, norm, real};
 use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, counted, short, six};
-use crate::runs::swapped::{Shown, by_curves, force_at_rest, moved};
+use crate::runs::swapped::{Shown, at_opposite_latitude, by_curves, force_at_rest, moved};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
 use coverage::Coverage;
 pub use runs::JudgedLog;
@@ -210,14 +210,16 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
 /// Columns that look swapped, where the attitude is known.
 fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
     let sizes = |column: fn(&Table, usize) -> &[f64]| [0, 1, 2].map(|axis| Size::of(column(means, axis)));
-    let kinds = [
-        (["gyros", "°/h"], sizes(Table::rate), rest.rate_deg_per_h),
-        (["accelerometers", "m/s²"], sizes(Table::force), place.and_then(force_at_rest)),
-    ];
-    let looks = |(of, sizes, stated): ([&'static str; 2], [Size; 3], Option<[f64; 3]>)| {
-        Some(format!("{name}: {}", Shown::of(of, sizes, stated?).swapped()?))
-    };
-    kinds.into_iter().filter_map(looks).collect()
+    let (rates, forces) = (sizes(Table::rate), sizes(Table::force));
+    let force = place.and_then(force_at_rest);
+    let measured = forces.iter().all(|size| size.count > 0).then(|| forces.map(|size| size.mean));
+    let opposite = rest.rate_deg_per_h.zip(force.or(measured));
+    let opposite = opposite.map(|(earth, force)| at_opposite_latitude(earth, force));
+    let gyros =
+        rest.rate_deg_per_h.map(|earth| Shown::of(["gyros", "°/h"], rates, earth).or_opposite(opposite));
+    let accels = force.map(|force| Shown::of(["accelerometers", "m/s²"], forces, force));
+    let looks = [gyros, accels].into_iter().flatten().filter_map(|shown| shown.swapped());
+    looks.map(|looks| format!("{name}: {looks}")).collect()
 }
 
 /// The curves of the three axes of a kind.
