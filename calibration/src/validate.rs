@@ -18,8 +18,8 @@ use crate::error::Error;
 use crate::fits::thermal::Stand;
 use crate::fits::thermal::checks::{far, frozen, judging, quiet};
 use crate::numbers::{Size, dot, is_white, norm, real};
-use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, short, six};
-use crate::runs::swapped::{Shown, by_curves, force_at_rest, moved};
+use crate::report::{Curve, FLAT, Report, Rest, SAME_SHARE, Verdict, counted, short, six};
+use crate::runs::swapped::{Shown, at_opposite_latitude, by_curves, force_at_rest, moved};
 use crate::runs::table::{Rows, Table, earth_rate, is_one_g, usual_window_s};
 use coverage::Coverage;
 pub use runs::JudgedLog;
@@ -39,11 +39,13 @@ const WINDOW_S: f64 = 10.0;
 const SAME: f64 = 1e-9;
 /// Share of the deviation of the most lively axis below which a sensor is dead: what is left comes through the axes.
 const DEAD: f64 = 1e-3;
+/// Fewest windows that judge: less their mean, fewer say nothing.
+const FEWEST_WINDOWS: usize = 3;
 /// Share of windows that should be whole.
 const WHOLE: f64 = 0.9;
 /// Least part of the Earth's rate that is told of what is left, and what else there may be beside it.
 const EARTH_LEFT: [f64; 2] = [0.5, 0.1];
-/// Largest range of a mean rate of a unit that counts as being at rest (°/h): 5 °/s.
+/// Largest mean rate, and range of mean rates, of a unit that counts as being at rest (°/h): 5 °/s.
 const REST_RATE_DEG_PER_H: f64 = 18_000.0;
 /// Largest angle between mean specific forces of a unit that counts as being at rest (sine).
 const REST_TILT: f64 = 0.035;
@@ -77,16 +79,15 @@ pub fn validate(written: &Written, logs: &[JudgedLog], wanted: Wanted) -> Result
     }
     let longest_s = readings.iter().map(|(_, length_s, _)| *length_s).fold(0.0, f64::max);
     let window_s = wanted.window_s.unwrap_or_else(|| usual_window_s(longest_s, WINDOW_S));
-    for (log, (faults, _, left_out)) in logs.iter().zip(readings) {
+    for (log, (faults, length_s, left_out)) in logs.iter().zip(readings) {
         let run = &log.run.without(left_out);
         let documents = [written.loaded.clone(), bare.clone()];
         let rows = Rows::mostly_valid(window_s);
         let seen = |tick: &_, unit: &_| coverage.count(tick, unit);
         let tables = Table::together_seen(run, &documents, rows, seen)?;
         let [after, nominal] = <[Table; 2]>::try_from(tables).unwrap_or_default();
-        if (0..3).all(|axis| Size::of(after.rate(axis)).count == 0) {
-            let nothing = nothing_valid(&run.name, name, &after);
-            return Err(Error::Refused([vec![nothing], after.troubles, faults].concat()));
+        if let Some(reason) = no_windows(&run.name, name, (&after, length_s)) {
+            return Err(Error::Refused([vec![reason], after.troubles, faults].concat()));
         }
         if let Some(reason) = at_rest(&run.name, &after) {
             return Err(Error::Refused([vec![reason], faults].concat()));
@@ -148,22 +149,34 @@ pub fn validate(written: &Written, logs: &[JudgedLog], wanted: Wanted) -> Result
     Ok(report)
 }
 
-/// That no window has a rate, and why.
-fn nothing_valid(run: &str, document: &str, table: &Table) -> String {
+/// Why a run of such a length (s) cannot judge: too few windows, or none with a rate.
+fn no_windows(run: &str, document: &str, (table, length_s): (&Table, f64)) -> Option<String> {
+    let (count, window_s) = (table.len(), six(table.window_s));
     let good_s: f64 = table.taken_s[0].iter().sum();
-    if good_s > 0.0 {
-        format!(
-            "{run}: no window of {} s is complete, though {} s of rates are valid: look for gaps and flags with \
-             isotherm-replay correct, or choose a shorter --window",
-            six(table.window_s),
-            short(good_s)
-        )
-    } else {
-        format!(
-            "{run}: {document} gives no valid rate for any gyro tick: check that it is the document of this unit, and the \
-             mapping"
-        )
+    if count < FEWEST_WINDOWS {
+        return Some(format!(
+            "{run}: {} s long, {} of {window_s} s, at least {FEWEST_WINDOWS} are needed to judge: give a longer log, or --window {} \
+             or less",
+            six(length_s),
+            counted(count, "window", "windows"),
+            short(0.33 * length_s)
+        ));
     }
+    let is_empty = (0..3).all(|axis| Size::of(table.rate(axis)).count == 0);
+    is_empty.then(|| {
+        if good_s > 0.0 {
+            format!(
+                "{run}: no window of {window_s} s is complete, though {} s of rates are valid: look for gaps and flags with \
+                 isotherm-replay correct, or choose a shorter --window",
+                short(good_s)
+            )
+        } else {
+            format!(
+                "{run}: {document} gives no valid rate for any gyro tick: check that it is the document of this unit, \
+                 and the mapping"
+            )
+        }
+    })
 }
 
 /// What a run's curves show of sensors that do not work, and of gaps.
@@ -197,14 +210,16 @@ fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
 /// Columns that look swapped, where the attitude is known.
 fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place>)) -> Vec<String> {
     let sizes = |column: fn(&Table, usize) -> &[f64]| [0, 1, 2].map(|axis| Size::of(column(means, axis)));
-    let kinds = [
-        (["gyros", "°/h"], sizes(Table::rate), rest.rate_deg_per_h),
-        (["accelerometers", "m/s²"], sizes(Table::force), place.and_then(force_at_rest)),
-    ];
-    let looks = |(of, sizes, stated): ([&'static str; 2], [Size; 3], Option<[f64; 3]>)| {
-        Some(format!("{name}: {}", Shown::of(of, sizes, stated?).swapped()?))
-    };
-    kinds.into_iter().filter_map(looks).collect()
+    let (rates, forces) = (sizes(Table::rate), sizes(Table::force));
+    let force = place.and_then(force_at_rest);
+    let measured = forces.iter().all(|size| size.count > 0).then(|| forces.map(|size| size.mean));
+    let opposite = rest.rate_deg_per_h.zip(force.or(measured));
+    let opposite = opposite.map(|(earth, force)| at_opposite_latitude(earth, force));
+    let gyros =
+        rest.rate_deg_per_h.map(|earth| Shown::of(["gyros", "°/h"], rates, earth).or_opposite(opposite));
+    let accels = force.map(|force| Shown::of(["accelerometers", "m/s²"], forces, force));
+    let looks = [gyros, accels].into_iter().flatten().filter_map(|shown| shown.swapped());
+    looks.map(|looks| format!("{name}: {looks}")).collect()
 }
 
 /// The curves of the three axes of a kind.
@@ -252,11 +267,17 @@ fn at_rest(name: &str, means: &Table) -> Option<String> {
         ))
     };
     for (axis, of) in AXES.into_iter().enumerate() {
-        let range = Size::of(means.rate(axis)).peak_to_peak;
+        let Size { mean, peak_to_peak: range, .. } = Size::of(means.rate(axis));
         if range > REST_RATE_DEG_PER_H {
             return refuse(format!(
                 "the mean rate about {of} covers {} °/s, at most 5 °/s are drift",
                 short(range / 3600.0)
+            ));
+        }
+        if mean.abs() > REST_RATE_DEG_PER_H {
+            return refuse(format!(
+                "the mean rate about {of} is {} °/s, at most ±5 °/s are bias",
+                short(mean / 3600.0)
             ));
         }
     }

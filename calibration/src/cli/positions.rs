@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::fits::positions::bare::of_run;
 use crate::fits::positions::budget::Budget;
 use crate::fits::positions::document::{complete, range};
-use crate::fits::positions::fit::{Analysis, Settings, analyse, positions};
+use crate::fits::positions::fit::{Analysis, Found, Settings, analyse, positions};
 use crate::fits::positions::judged::{Judgement, judge};
 use crate::fits::positions::plan::Plan;
 use crate::fits::positions::pose::Pose;
@@ -22,7 +22,7 @@ use crate::fits::positions::still::StillLimits;
 use crate::fits::positions::times::Times;
 use crate::fits::positions::track::Track;
 use crate::limits::{above_0, from_0};
-use crate::numbers::ARCSEC_PER_RAD;
+use crate::numbers::{ARCSEC_PER_RAD, dot};
 use crate::report::Report;
 use crate::runs::Run;
 
@@ -128,12 +128,13 @@ impl PositionsArgs {
         let document = complete(&base.document, &analysis, settings.gravity);
         let before = Written::of(&before(&base.document, &analysis, settings.gravity, work.base.is_some()))?;
         let after = Written::of(&document)?;
-        let inside = judged(settings, &analysis, &analysis.poses, runs, [&before, &after])?;
+        let known = Found { poses: analysis.poses.clone(), ..Found::default() };
+        let inside = judged(settings, &analysis, known, runs, [&before, &after])?;
         let mut outside = None;
         if !work.judges.is_empty() {
             let unseen = tracks_of(&work.judges, base)?;
-            let (poses, _) = positions(&unseen, settings).map_err(Error::Refused)?;
-            outside = Some(judged(settings, &analysis, &poses, &work.judges, [&before, &after])?);
+            let found = positions(&unseen, settings).map_err(Error::Refused)?;
+            outside = Some(judged(settings, &analysis, found, &work.judges, [&before, &after])?);
         }
         let [names, outside_names] = [runs, &work.judges]
             .map(|runs| -> Vec<String> { runs.iter().map(|run| run.name.clone()).collect() });
@@ -163,15 +164,30 @@ fn tracks_of(runs: &[Run], written: &Written) -> Result<Vec<Track>, Error> {
     runs.iter().map(|run| Track::of(run, &written.loaded)).collect()
 }
 
-/// Poses of runs, before and after.
+/// Poses of runs, before and after; those that may be other positions are taken for the ones that they fit better.
 fn judged(
     settings: &Settings,
     analysis: &Analysis,
-    poses: &[(Pose, usize)],
+    mut found: Found,
     runs: &[Run],
     [before, after]: [&Written; 2],
 ) -> Result<Vec<Judgement>, Error> {
     let (before, after) = (tracks_of(runs, before)?, tracks_of(runs, after)?);
     let errors = analysis.fit.stand.map(|(error, _)| error);
-    Ok(judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels))
+    let of = |poses: &[(Pose, usize)]| {
+        judge(&settings.plan, errors, settings.gravity, poses, [&before, &after], &analysis.channels)
+    };
+    let left = |judged: &[Judgement]| -> f64 {
+        judged.iter().map(|judgement| dot(judgement.error[1], judgement.error[1])).sum()
+    };
+    let mut judged = of(&found.poses);
+    for mut other in found.others {
+        let mut poses = found.poses.clone();
+        other.swap(poses.iter_mut().map(|(_, position)| position));
+        let otherwise = of(&poses);
+        if left(&otherwise) < left(&judged) {
+            (judged, found.poses) = (otherwise, poses);
+        }
+    }
+    Ok(judged)
 }

@@ -41,7 +41,7 @@ pub(super) struct Reading {
     /// Column mapping of a text log (TOML) (default: LOG with .mapping.toml); examples: config/mappings
     #[arg(long, short, value_name = "FILE")]
     pub(super) mapping: Option<PathBuf>,
-    /// Unit serial, if a recording has several; text log: the serial to assign (default: the document's)
+    /// Unit serial, if the recordings have several; text log: the serial to assign (default: the document's)
     #[arg(long, short, value_name = "SERIAL")]
     pub(super) unit: Option<String>,
     #[command(flatten)]
@@ -112,19 +112,14 @@ impl Reading {
             return Err(Error::Usage(words));
         }
         let mut of_units: BTreeMap<UnitId, Vec<PathBuf>> = BTreeMap::new();
-        match given {
-            Some(unit) => drop(of_units.insert(unit, files.clone())),
-            None => {
-                for file in files {
-                    let mut log = LogFiles::Recordings(vec![file.clone()]).open(&Part::default())?;
-                    let (units, cut) = units_of(&mut log)?;
-                    if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
-                        return Err(Error::refused(format!("no raw readings can be read: {cut}")));
-                    }
-                    for unit in units {
-                        of_units.entry(unit).or_default().push(file.clone());
-                    }
-                }
+        for file in files {
+            let mut log = LogFiles::Recordings(vec![file.clone()]).open(&Part::default())?;
+            let (units, cut) = units_of(&mut log)?;
+            if let (true, Some(cut)) = (units.is_empty(), cut.words()) {
+                return Err(Error::refused(format!("no raw readings can be read: {cut}")));
+            }
+            for unit in units.into_iter().filter(|unit| given.as_ref().is_none_or(|given| given == unit)) {
+                of_units.entry(unit).or_default().push(file.clone());
             }
         }
         let of_unit = |(unit, own): (UnitId, Vec<PathBuf>)| {

@@ -169,12 +169,12 @@ impl<'a> Logs<'a> {
         if let Some(document) = self.document.filter(|_| folder.is_none()) {
             let base = Written::read(document)?;
             let unit = base.loaded.unit.clone();
-            let (runs, others) = Self::of_document(self.runs(Some(&unit))?, &unit)?;
+            let (runs, others) = self.of_document(self.runs(Some(&unit))?, &unit)?;
             let judges = match self.judges(Some(&unit))? {
-                Some(judges) => Self::of_document(judges, &unit)?.0,
+                Some(judges) => self.of_document(judges, &unit)?.0,
                 None => Vec::new(),
             };
-            let mut work = Work::new(Some(base), runs, judges);
+            let mut work = self.warned(&unit, Work::new(Some(base), runs, judges))?;
             if !others.is_empty() {
                 work.warnings.push(format!(
                     "the logs also have unit {}, which is left out: the document is of {unit}. For all units give a folder \
@@ -186,7 +186,7 @@ impl<'a> Logs<'a> {
         }
         let of_units = self.runs(self.unnamed.as_ref())?;
         if of_units.is_empty() {
-            return Err(Error::refused(NOTHING));
+            return Err(self.nothing()?);
         }
         let mut documents = folder.map(of_folder).transpose()?;
         let mut judging = self.judges(of_units.keys().next())?.unwrap_or_default();
@@ -205,7 +205,7 @@ impl<'a> Logs<'a> {
             if unjudged && !several {
                 return Err(Error::refused(format!("--judge: the logs have nothing of unit {unit}")));
             }
-            let mut work = Work::new(base, runs, judges);
+            let mut work = self.warned(unit, Work::new(base, runs, judges))?;
             if unjudged {
                 work.warnings.push(format!(
                     "the logs of --judge have nothing of unit {unit}: it is fitted, but judged in sample only"
@@ -218,6 +218,29 @@ impl<'a> Logs<'a> {
             (unit, work)
         });
         Ok(units.collect())
+    }
+
+    /// That there is nothing to do, and why.
+    fn nothing(&self) -> Result<Error, Error> {
+        let words = |unit| format!("the logs have no raw readings of unit {unit} (--unit)");
+        Ok(Error::refused(self.reading.serial()?.map_or_else(|| NOTHING.to_owned(), words)))
+    }
+
+    /// The work, with a warning that logs have nothing of the unit that was asked for.
+    fn warned(&self, unit: &UnitId, mut work: Work) -> Result<Work, Error> {
+        let used: Vec<&PathBuf> = work.runs.iter().chain(&work.judges).flat_map(Run::logs).collect();
+        let without: Vec<String> = self
+            .files
+            .iter()
+            .chain(self.judge)
+            .filter(|log| !used.contains(log))
+            .map(|log| log.display().to_string())
+            .collect();
+        if self.reading.serial()?.is_some() && !without.is_empty() {
+            work.warnings
+                .push(format!("left out, with nothing of unit {unit} (--unit): {}", without.join(", ")));
+        }
+        Ok(work)
     }
 
     fn runs(&self, fallback: Option<&UnitId>) -> Result<Runs, Error> {
@@ -235,12 +258,12 @@ impl<'a> Logs<'a> {
     }
 
     /// The runs of the unit that a document is of, and the other units that there are.
-    fn of_document(mut runs: Runs, unit: &UnitId) -> Result<(Vec<Run>, Vec<String>), Error> {
+    fn of_document(&self, mut runs: Runs, unit: &UnitId) -> Result<(Vec<Run>, Vec<String>), Error> {
         let own = runs.remove(unit);
         let others: Vec<String> = runs.keys().map(ToString::to_string).collect();
         match own {
             Some(own) => Ok((own, others)),
-            None if others.is_empty() => Err(Error::refused(NOTHING)),
+            None if others.is_empty() => Err(self.nothing()?),
             None => Err(Error::refused(format!(
                 "the logs are of unit {}, the document is of {unit}: give the document of that unit; if the serial has \
                  changed, change unit in the document",

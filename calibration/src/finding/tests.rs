@@ -1,5 +1,5 @@
 use super::*;
-use crate::runs::swapped::{Looks, Shown};
+use crate::runs::swapped::{Fits, Looks, Shown};
 
 fn examples() -> Vec<Finding> {
     let plateau = |from: f64, rate: [f64; 3]| Plateau {
@@ -14,9 +14,10 @@ fn examples() -> Vec<Finding> {
         measure: "m/s²",
         mean: [0.1, 9.8, 0.02],
         stated: [9.8, 0.1, 0.0],
+        opposite: None,
         deviation: 0.01,
     };
-    let looks = |order| Box::new(Looks { shown, order });
+    let looks = |fits| Box::new(Looks { shown, fits });
     let stated = (36.0, [0.0, 1.0, 0.0]);
     let shown = || vec![("y".to_owned(), 0.02), ("x".to_owned(), 36.0)];
     let stray = Kind::OtherPlateaus { stated: 1, turning: 2, found: found() };
@@ -64,8 +65,8 @@ fn examples() -> Vec<Finding> {
         Kind::OneWay { axes: vec![0, 2] }.into(),
         Kind::NoAttitude.into(),
         Kind::ShortSteps { rates: vec![1.0, -1.0, 1.0] }.into(),
-        Kind::Gravity { looks: looks(Some([1, 0, 2])), rest: None, others: vec![1, 2] }.in_log(0),
-        Kind::Gravity { looks: looks(None), rest: Some((window_s, 3)), others: vec![1] }.in_log(0),
+        Kind::Gravity { looks: looks(Fits::Order([1, 0, 2])), rest: None, others: vec![1, 2] }.in_log(0),
+        Kind::Gravity { looks: looks(Fits::Nothing), rest: Some((window_s, 3)), others: vec![1] }.in_log(0),
         Kind::NothingTurns.of_gyro("x"),
         Kind::Across.of_gyro("x"),
         Kind::FewSteps { steps: 1 }.of_gyro("x"),

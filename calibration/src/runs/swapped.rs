@@ -6,7 +6,7 @@ use isotherm_correction::earth::{Place, Tilt};
 use isotherm_correction::units::STANDARD_GRAVITY_M_PER_S2;
 
 use crate::axes::AXES;
-use crate::numbers::{Size, norm, unit};
+use crate::numbers::{Size, dot, norm, unit};
 use crate::report::fixed;
 
 /// Orders of three axes: the swaps of two first, which need the fewest mistakes.
@@ -31,6 +31,8 @@ pub struct Shown {
     pub mean: [f64; 3],
     /// What each would show without error, in the stated attitude.
     pub stated: [f64; 3],
+    /// The same of gyros at the opposite latitude, where the vertical is known.
+    pub opposite: Option<[f64; 3]>,
     /// How far the means move over the run.
     pub deviation: f64,
 }
@@ -39,36 +41,64 @@ impl Shown {
     /// Of sensors of a kind, with the symbol of their unit of measure.
     pub fn of([kind, measure]: [&'static str; 2], sizes: [Size; 3], stated: [f64; 3]) -> Self {
         let deviation = sizes.iter().map(|size| size.deviation).fold(0.0, f64::hypot);
-        Self { kind, measure, mean: sizes.map(|size| size.mean), stated, deviation }
+        Self { kind, measure, mean: sizes.map(|size| size.mean), stated, opposite: None, deviation }
     }
 
-    /// Which axes look swapped: another order fits by far better than that of the log; `None` where none does.
+    /// The same, with what it would be at the opposite latitude.
+    pub fn or_opposite(self, opposite: Option<[f64; 3]>) -> Self {
+        Self { opposite, ..self }
+    }
+
+    /// What looks mistaken: the sign of the latitude, or the order of the axes, with which it fits by far better than as stated; `None`
+    /// where none does.
     pub fn swapped(&self) -> Option<Looks> {
-        let off = |order| self.off(order);
+        let off = |order| self.off(order, self.stated);
         let (as_logged, size) = (off(AS_LOGGED), norm(self.stated));
+        let south = |stated| self.is_away() && self.off(AS_LOGGED, stated) < LEFT * as_logged;
+        if self.opposite.is_some_and(south) {
+            return Some(Looks { shown: *self, fits: Fits::OppositeLatitude });
+        }
         let fits = |order: &[usize; 3]| off(*order) < LEFT * as_logged;
         let best =
             ORDERS.into_iter().filter(|order| self.is_away() && fits(order)).reduce(|best, order| {
                 if off(order) < 0.5 * off(best) && off(best) > 0.05 * size { order } else { best }
             })?;
-        Some(Looks { shown: *self, order: Some(best) })
+        Some(Looks { shown: *self, fits: Fits::Order(best) })
     }
 
     /// That the means are far from what they must be though no order looks right; `None` where they are near.
     pub fn far(&self) -> Option<Looks> {
-        (self.is_away() && self.swapped().is_none()).then_some(Looks { shown: *self, order: None })
+        (self.is_away() && self.swapped().is_none()).then_some(Looks { shown: *self, fits: Fits::Nothing })
     }
 
-    /// How far the means, in an order, are from what they must be.
-    fn off(&self, order: [usize; 3]) -> f64 {
-        norm([0, 1, 2].map(|axis| self.mean[order[axis]] - self.stated[axis]))
+    /// How far the means, in an order, are from what they would be.
+    fn off(&self, order: [usize; 3], stated: [f64; 3]) -> f64 {
+        norm([0, 1, 2].map(|axis| self.mean[order[axis]] - stated[axis]))
     }
 
     /// Whether that is too far; false for NaN too.
     fn is_away(&self) -> bool {
-        let off = self.off(AS_LOGGED);
+        let off = self.off(AS_LOGGED, self.stated);
         off > AWAY * norm(self.stated) && off > AWAY_DEVIATIONS * self.deviation
     }
+}
+
+/// The Earth's rate at the opposite latitude, where the specific force at rest shows the vertical, both in case axes.
+pub fn at_opposite_latitude(earth: [f64; 3], force: [f64; 3]) -> [f64; 3] {
+    let up = unit(force);
+    let along = dot(earth, up);
+    [0, 1, 2].map(|axis| earth[axis] - 2.0 * along * up[axis])
+}
+
+/// With what sensors show what they must.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fits {
+    /// In this order.
+    Order([usize; 3]),
+    /// With the other sign of the latitude.
+    OppositeLatitude,
+    /// With nothing that is known.
+    Nothing,
 }
 
 /// Sensors that do not show what they must in the stated attitude.
@@ -76,13 +106,13 @@ impl Shown {
 pub struct Looks {
     /// What they show.
     pub shown: Shown,
-    /// The order in which they fit; `None` where they fit in none.
-    pub order: Option<[usize; 3]>,
+    /// With what they would.
+    pub fits: Fits,
 }
 
 impl Display for Looks {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { shown: Shown { kind, measure, mean, stated, .. }, order } = self;
+        let Self { shown: Shown { kind, measure, mean, stated, .. }, fits } = self;
         // As many places as the largest of them needs for three digits: what is next to nothing is zero.
         let largest = mean.iter().chain(stated).map(|part| part.abs()).fold(0.0, f64::max);
         let places =
@@ -93,13 +123,16 @@ impl Display for Looks {
             list(*mean),
             list(*stated)
         );
-        match order {
-            Some(order) => write!(
+        match fits {
+            Fits::Order(order) => write!(
                 f,
                 "{kind} {} look swapped: {means}; check the columns in the mapping, and the attitude",
                 moved(*order)
             ),
-            None => write!(
+            Fits::OppositeLatitude => {
+                write!(f, "the {kind} fit the opposite latitude: {means}; check the sign of --latitude")
+            }
+            Fits::Nothing => write!(
                 f,
                 "the {kind} do not fit the attitude: {means}; check attitude, signs and unit of measure"
             ),
@@ -147,7 +180,7 @@ mod tests {
     use super::*;
 
     fn words(kind: &'static str, mean: [f64; 3], stated: [f64; 3], deviation: f64) -> String {
-        Shown { kind, measure: "m/s²", mean, stated, deviation }
+        Shown { kind, measure: "m/s²", mean, stated, opposite: None, deviation }
             .swapped()
             .map(|looks| looks.to_string())
             .unwrap_or_default()
@@ -163,6 +196,22 @@ mod tests {
             words("gyros", [-4.0, 7.5, -12.0], earth, 0.3),
         ];
         insta::assert_snapshot!(told.join("\n"));
+    }
+
+    #[test]
+    fn the_other_sign_of_the_latitude_comes_before_an_order_of_columns() {
+        let (earth, force) = ([7.3, -4.2, -12.4], [0.0, 0.0, 9.8]);
+        let of = |mean: [f64; 3]| Shown {
+            kind: "gyros",
+            measure: "°/h",
+            mean,
+            stated: earth,
+            opposite: Some(at_opposite_latitude(earth, force)),
+            deviation: 0.3,
+        };
+        insta::assert_snapshot!(of([7.2, -4.4, 12.3]).swapped().unwrap());
+        assert_eq!(of([-12.6, -4.3, 7.1]).swapped().map(|looks| looks.fits), Some(Fits::Order([2, 1, 0])));
+        assert_eq!(of([7.2, -4.4, -12.3]).swapped(), None);
     }
 
     #[test]
@@ -195,6 +244,7 @@ mod tests {
             measure: "m/s²",
             mean,
             stated: [0.1, -0.2, -9.8],
+            opposite: None,
             deviation: 0.01,
         };
         insta::assert_snapshot!(of([0.1, -0.2, 9.8]).far().unwrap());

@@ -188,6 +188,40 @@ fn poses_are_found_and_known_though_some_are_missing_and_some_repeated() {
 }
 
 #[test]
+fn logs_that_begin_elsewhere_in_the_plan_do_not_contradict_each_other() {
+    let (plan, document) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
+    let all: Vec<usize> = (0..12).collect();
+    let swapped = [&[1, 0][..], &all[2..]].concat();
+    let short = vec![1, 0, 2, 3, 4, 5, 6, 8];
+    // Half a turn away it is the plan's order: 0 to 5.
+    let far = vec![1, 0, 10, 11, 8, 9];
+    let mut told = Vec::new();
+    for (orders, plan) in [
+        (vec![all.clone(), swapped.clone()], plan.clone()),
+        (vec![all.clone(), short], plan.clone()),
+        (vec![all.clone(), far], plan.clone()),
+        (vec![swapped], plan),
+        (vec![all], Plan::six()),
+    ] {
+        let mut runs = Vec::new();
+        let mut planned = Vec::new();
+        for (index, order) in (0..).zip(&orders) {
+            let how = Stand { errors: [30.0, -20.0, 15.0].map(|error| error * ARCSEC), ..driven(60 + index) };
+            let (events, _) = stand::log(&stand::instrument(), 20.0, &Plan::twelve(), order, &how);
+            runs.push(stand::run(&format!("log {index}"), events));
+            let names = order.iter().map(|at| Plan::twelve().positions[*at].name.clone());
+            planned.extend(names.filter(|name| plan.index_of(name).is_some()));
+        }
+        let found =
+            analyse(&tracks(&runs, &document), &document.document, &settings(plan.clone(), None)).unwrap();
+        let names = found.poses.iter().map(|(_, position)| plan.positions[*position].name.clone());
+        assert_eq!(names.collect::<Vec<_>>(), planned);
+        told.push(found.warnings.join("\n"));
+    }
+    insta::assert_snapshot!(told.join("\n\n"));
+}
+
+#[test]
 fn the_document_gives_the_right_vectors_through_the_service_to_the_last_digit_that_is_stated() {
     let (plan, base) = (Plan::twelve(), Written::of(&stand::document()).unwrap());
     let instrument = stand::instrument();
@@ -306,8 +340,22 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let [start, end] = rows.rows[0].0;
     rows.rows.push(([0.5 * (start + end), end], rows.rows[0].1.clone(), None));
     told.push(analyse(&own, &document.document, &settings(plan.clone(), Some(rows))).unwrap_err().join("\n"));
+    // Times that are late: the unit turns, or where the turns are left out, it is elsewhere at the end.
+    for how in [driven(3), Stand { turn_deg_per_s: None, ..driven(3) }] {
+        let (events, held) = stand::log(&instrument, 20.0, &plan, &all, &how);
+        let mut rows = times(&plan, "room", &held);
+        rows.rows.iter_mut().for_each(|(span, ..)| *span = [span[0] + 5.0, span[1] + 4.0]);
+        let own = tracks(&[stand::run("room", events)], &document);
+        told.push(
+            analyse(&own, &document.document, &settings(plan.clone(), Some(rows))).unwrap_err().join("\n"),
+        );
+    }
     // A log without the turns, and not in the plan's order.
     let jumps = Stand { turn_deg_per_s: None, ..driven(3) };
     told.push(refused(&[0, 1, 2, 4, 5, 6, 7, 8, 9, 11], &jumps, &none));
+    // Without a document that knows 1 g, x is never up.
+    told.push(refused(&[1, 0, 2, 4, 6, 7, 8, 9, 10], &driven(3), &|track| {
+        track.force_m_per_s2.iter_mut().flatten().for_each(|force| *force *= 0.1);
+    }));
     insta::assert_snapshot!(told.join("\n\n"));
 }

@@ -166,6 +166,15 @@ fn what_cannot_be_judged_is_refused_in_words() {
         phase_deg: 0.0,
     });
     record(Path::new(&path("moving.mcap")), &moving);
+    // Two windows and none; one that turns steadily about the vertical.
+    refused(&["validate", &good, &path("moving.mcap"), "--window", "90"]);
+    refused(&["validate", &good, &path("moving.mcap"), "--window", "300"]);
+    let mut turning = fibre_optic(5, "FOG-0001", 200.0);
+    turning.motion = turning
+        .motion
+        .along(isotherm_simulator::motion::Path::ConstantRate { axis: [0.0, 0.0, 1.0], rate_deg_per_s: 6.0 });
+    record(Path::new(&path("turning.mcap")), &turning);
+    refused(&["validate", &good, &path("turning.mcap")]);
     refused(&["validate", &good, &path("moving.mcap")]);
     refused(&["validate", &good, &path("moving.mcap"), "--window", "0"]);
     refused(&["validate", &good, &path("moving.mcap"), "--latitude", "95", "--heading", "0"]);

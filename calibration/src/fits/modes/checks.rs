@@ -199,8 +199,13 @@ pub(super) fn lacks_temperatures(gathered: &Gathered) -> bool {
     [gathered.stale, gathered.warming_up].into_iter().any(|count| real(count) > UNUSABLE * there)
 }
 
-/// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h) or the direction of gravity is known.
-pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, force: Option<[f64; 3]>) -> Vec<Looks> {
+/// Columns that look swapped, signs, scales and attitudes that look wrong, where what the gyros sense of the Earth (°/h; here, and at the
+/// opposite latitude) or the direction of gravity is known.
+pub fn attitude(
+    seconds: &[Second],
+    (earth, opposite): (Option<[f64; 3]>, Option<[f64; 3]>),
+    force: Option<[f64; 3]>,
+) -> Vec<Looks> {
     let parts = || seconds.chunks(seconds.len().div_ceil(PARTS).max(1));
     let looks = |of: [&'static str; 2], triad: fn(&Second) -> [f64; 3], stated: Option<[f64; 3]>| {
         let sizes = [0, 1, 2].map(|axis| {
@@ -209,7 +214,7 @@ pub fn attitude(seconds: &[Second], earth: Option<[f64; 3]>, force: Option<[f64;
             };
             Size::of(&parts().map(mean).collect::<Vec<f64>>())
         });
-        let shown = Shown::of(of, sizes, stated?);
+        let shown = Shown::of(of, sizes, stated?).or_opposite(opposite.filter(|_| of[0] == "gyros"));
         shown.swapped().or_else(|| shown.far())
     };
     let words = [

@@ -10,7 +10,7 @@ use super::switches::Switches;
 use super::{checks, document, temperatures};
 use crate::document::gyro_name;
 use crate::error::Error;
-use crate::runs::swapped::force_at_rest;
+use crate::runs::swapped::{Fits, at_opposite_latitude, force_at_rest};
 use crate::runs::table;
 
 /// Length of a window of the residuals, in whole reversal periods (s).
@@ -67,8 +67,9 @@ pub(super) fn check(
 ) -> Result<Vec<String>, Error> {
     let names = group.map(|sensor| gyro_name(bare, sensor));
     let counts = group.map(|sensor| document::count_arcsec(bare, sensor));
-    let along = earth
-        .map(|earth| group.map(|sensor| checks::earth_along(document::row(bare, sensor, f64::NAN), earth)));
+    let rows = group.map(|sensor| document::row(bare, sensor, f64::NAN));
+    let along_rows = |earth| rows.map(|row| checks::earth_along(row, earth));
+    let along = earth.map(along_rows);
     let mut reasons = checks::behind(gathered, names, counts, along);
     if !reasons.is_empty() {
         if checks::lacks_temperatures(gathered) {
@@ -77,11 +78,12 @@ pub(super) fn check(
         return Err(Error::Refused(reasons));
     }
     let force = wanted.place.as_ref().and_then(force_at_rest);
-    let looks = checks::attitude(&gathered.seconds, along, force);
-    let rows = group.map(|sensor| document::row(bare, sensor, f64::NAN));
+    let level = earth.zip(force.or(gathered.force));
+    let opposite = level.map(|(earth, force)| along_rows(at_opposite_latitude(earth, force)));
+    let looks = checks::attitude(&gathered.seconds, (along, opposite), force);
     // Swapped columns have no vertical to speak of.
-    let level = earth.zip(force.or(gathered.force)).filter(|_| looks.iter().all(|one| one.order.is_none()));
-    let vertical = level.and_then(|of| checks::vertical(&gathered.seconds, rows, of));
+    let vertical = level.filter(|_| looks.iter().all(|one| one.fits == Fits::Nothing));
+    let vertical = vertical.and_then(|of| checks::vertical(&gathered.seconds, rows, of));
     Ok(looks.iter().map(ToString::to_string).chain(vertical).collect())
 }
 

@@ -3,17 +3,19 @@
 use isotherm_protocol::document::Document;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::faults;
 use super::fit::{Analysis, Settings};
 use super::model::{self, Degrees, Taken};
 use super::plan::Plan;
+use super::pose::Pose;
 use super::sense::of_accelerometers;
 use super::solve::Fit;
 use crate::axes::{AXES, sensor_name, several};
 use crate::document::scale_at;
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
-use crate::numbers::{ARCSEC_PER_RAD, mean, real};
-use crate::report::{counted, short};
+use crate::numbers::{ARCSEC_PER_RAD, mean, once_each, real};
+use crate::report::{counted, grouped, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
 pub const GOOD_POSITIONS: usize = 9;
@@ -57,6 +59,29 @@ pub(super) fn widening(fit: &Fit, warnings: &mut Vec<String>) -> f64 {
         counted(degrees, "degree", "degrees")
     ));
     factor
+}
+
+/// Runs whose poses were found in another order than that of the plan; a position that is taken again is none.
+pub(super) fn reordered(plan: &Plan, poses: &[(Pose, usize)], names: &[String]) -> Vec<String> {
+    const SHOWN: usize = 3;
+    let name = |position: usize| &plan.positions[position].name;
+    let told = names.iter().enumerate().filter_map(|(run, log)| {
+        let own = poses.iter().filter(|(pose, _)| pose.run == run).map(|(_, position)| *position);
+        let own = once_each(own);
+        let back = own.windows(2).filter(|pair| pair[1] < pair[0]);
+        let words: Vec<String> =
+            back.map(|pair| format!("{} after {}", name(pair[1]), name(pair[0]))).collect();
+        let more = words.len().saturating_sub(SHOWN);
+        let others = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!words.is_empty()).then(|| (log.as_str(), words[..words.len() - more].join(", ") + &others))
+    });
+    let told: Vec<(&str, String)> = told.collect();
+    let alike = grouped(&told).into_iter();
+    alike
+        .map(|(words, runs)| {
+            format!("{}: positions in another order than the plan's: {words}", faults::logs(&runs))
+        })
+        .collect()
 }
 
 /// What few, missing and repeated positions mean.

@@ -4,11 +4,12 @@ use isotherm_protocol::document::Document;
 
 use super::document::held_twice;
 use super::doubts::{
-    ACCIDENT, few, no_solution, not_as_stated, quadratic_terms, sound, spread, survival, widening,
+    ACCIDENT, excess, few, no_solution, not_as_stated, quadratic_terms, reordered, sound, spread, survival,
+    widening,
 };
 use super::faults;
 use super::hysteresis::{Return, returns};
-use super::matching::matched;
+use super::matching::{Matched, detour, matched};
 use super::model::{Degrees, Taken};
 use super::plan::Plan;
 use super::pose::{Pose, intensities};
@@ -18,7 +19,7 @@ use super::temperature::{blind, board_ratio, followed, levels, own_deg_c, refere
 use super::times::Times;
 use super::track::Track;
 use crate::document::accel_name;
-use crate::numbers::ends;
+use crate::numbers::{ends, real};
 use crate::report::counted;
 
 /// How the positions are looked at.
@@ -87,7 +88,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     if !reasons.is_empty() {
         return Err(reasons);
     }
-    let (poses, mut warnings) = positions(tracks, settings)?;
+    let Found { mut poses, mut others, mut warnings } = positions(tracks, settings)?;
     let sensors = tracks.iter().map(|track| track.outputs.len()).max().unwrap_or(0);
     let (channels, axes) = followed(document, settings, &poses, &mut warnings)?;
     let (level_of, levels_deg_c) = levels(&axes);
@@ -103,7 +104,7 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let reference = settings.reference_deg_c.unwrap_or_else(|| reference(low, high));
     let half = (0.5 * (high - low)).max(1.0);
     let scaled = |t: f64| (t - reference) / half;
-    let taken: Vec<Taken> = poses
+    let mut taken: Vec<Taken> = poses
         .iter()
         .zip(axes.iter().zip(&level_of))
         .enumerate()
@@ -127,8 +128,19 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     let guess = guesses(stand, &taken, sensors).map_err(|bad| spread(stand, &taken, (&bad, sensors)))?;
     let most = levels_deg_c.len() - 1;
     let degrees = Degrees { sensor: most.min(2), axes: most.min(1) };
+    let fit_of =
+        |taken: &[Taken]| Positions { plan: stand, taken, guess: &guess, weights: &weights, degrees }.fit();
+    let mut found = fit_of(&taken).map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
+    while let Some((better, words)) = contradicting((&found, &taken), &mut others, fit_of) {
+        warnings.push(words);
+        (taken, found) = better;
+    }
+    poses.iter_mut().zip(&taken).for_each(|((_, position), taken)| *position = taken.position);
+    let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
+    if settings.times.is_none() {
+        warnings.extend(reordered(stand, &poses, &names));
+    }
     let all = Positions { plan: stand, taken: &taken, guess: &guess, weights: &weights, degrees };
-    let found = all.fit().map_err(|why| vec![no_solution(&why, degrees, sensors)])?;
     let with_bend = Positions { degrees: Degrees { axes: 2, ..degrees }, ..all };
     let quadratic = (most >= 2).then(|| with_bend.fit().ok()).flatten().map(|quadratic| {
         let (chi_square, terms) = quadratic_terms(&quadratic);
@@ -149,7 +161,6 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     warnings.extend(not_as_stated(best, document, settings.gravity, &own));
     let of_level = (0..levels_deg_c.len()).map(|level| one_level(&all, level)).collect();
     let returns = returns(&all, &plain, &found, &levels_deg_c);
-    let names: Vec<String> = tracks.iter().map(|track| track.run.clone()).collect();
     for (sensor, kind) in returns.iter().filter_map(|back| back.finding(&names)) {
         warnings.push(kind.of(accel_name(document, sensor)).to_string());
     }
@@ -174,8 +185,72 @@ pub fn analyse(tracks: &[Track], document: &Document, settings: &Settings) -> Re
     Ok(analysis)
 }
 
-/// Poses with their positions' numbers, and what is to be said of them.
-pub type Found = (Vec<(Pose, usize)>, Vec<String>);
+/// The poses of some runs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Found {
+    /// Poses with their positions' numbers.
+    pub poses: Vec<(Pose, usize)>,
+    /// What else those of a run may be.
+    pub others: Vec<Other>,
+    /// What is to be said of them.
+    pub warnings: Vec<String>,
+}
+
+/// What the poses of a run may be as well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Other {
+    /// Name of the run.
+    run: String,
+    /// Its first pose among all.
+    from: usize,
+    /// Positions of its poses.
+    positions: Vec<usize>,
+}
+
+impl Other {
+    /// Takes the poses for these positions, and keeps those that they were taken for.
+    pub fn swap<'a>(&mut self, of_all: impl IntoIterator<Item = &'a mut usize>) {
+        let own = of_all.into_iter().skip(self.from).zip(&mut self.positions);
+        own.for_each(|(position, other)| std::mem::swap(position, other));
+    }
+}
+
+/// The run whose positions contradict those of the other runs, taken for what else they may be: the fit with that, and what is to be said.
+/// Of runs that tell it alike, the one that is then nearer to the plan's order. `None` where there is none.
+fn contradicting<E>(
+    (fit, taken): (&Fit, &[Taken]),
+    others: &mut [Other],
+    fit_of: impl Fn(&[Taken]) -> Result<Fit, E>,
+) -> Option<((Vec<Taken>, Fit), String)> {
+    let (before, degrees) = (fit.solution.chi_square, fit.solution.degrees);
+    excess(before, degrees)?;
+    let try_one = |(index, other): (usize, &Other)| {
+        let (mut other, mut taken) = (other.clone(), taken.to_vec());
+        let way = detour(other.positions.iter().copied());
+        other.swap(taken.iter_mut().map(|taken| &mut taken.position));
+        let longer = way.saturating_sub(detour(other.positions.iter().copied()));
+        Some((index, longer, fit_of(&taken).ok()?))
+    };
+    let tried: Vec<(usize, usize, Fit)> = others.iter().enumerate().filter_map(try_one).collect();
+    let least = tried.iter().map(|(.., fit)| fit.solution.chi_square).fold(f64::INFINITY, f64::min);
+    // By how much χ² differs where it is no accident, as far as the positions scatter.
+    let telling = -2.0 * libm::log(ACCIDENT) * (least / real(degrees)).max(1.0);
+    let alike = tried.into_iter().filter(|(.., fit)| fit.solution.chi_square <= least + telling);
+    let (index, _, fit) = alike.min_by_key(|(_, longer, _)| *longer)?;
+    let after = fit.solution.chi_square;
+    if after >= before - telling {
+        return None;
+    }
+    let (other, mut taken) = (others.get_mut(index)?, taken.to_vec());
+    other.swap(taken.iter_mut().map(|taken| &mut taken.position));
+    let words = format!(
+        "{}: in the order nearest to the plan's its positions contradict those of other logs (χ² {before:.0}): they are taken for those \
+         half a turn about the vertical away (χ² {after:.0} with {} of freedom)",
+        other.run,
+        counted(degrees, "degree", "degrees")
+    );
+    Some(((taken, fit), words))
+}
 
 /// The poses of all runs that are positions of the plan, with the position's number.
 ///
@@ -183,11 +258,11 @@ pub type Found = (Vec<(Pose, usize)>, Vec<String>);
 /// What is wrong with each run.
 pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<String>> {
     let mut found = Vec::new();
-    let mut warnings = Vec::new();
+    let (mut others, mut warnings) = (Vec::new(), Vec::new());
     let (mut reasons, mut unclear) = (Vec::new(), Vec::new());
     for (run, track) in tracks.iter().enumerate() {
         if let Some(times) = &settings.times {
-            match times.poses(track, run, &settings.plan) {
+            match times.poses((track, run), &settings.plan, &settings.limits) {
                 Ok(poses) => found.extend(poses),
                 Err(words) => reasons.extend(words),
             }
@@ -204,19 +279,24 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             continue;
         }
         match matched(&settings.plan, track, &poses) {
-            Ok((positions, doubt)) => {
+            Ok(Matched { labels, others: may_be, doubt }) => {
                 warnings.extend(doubt.map(|words| format!("{}: {words}", track.run)));
-                let others = positions.iter().filter(|position| position.is_none()).count();
-                if others > 0 {
+                let none = labels.iter().filter(|position| position.is_none()).count();
+                if none > 0 {
                     warnings.push(format!(
-                        "{}: {others} of {} {} no position of the plan and left out",
+                        "{}: {none} of {} {} no position of the plan and left out",
                         track.run,
                         counted(poses.len(), "still pose", "still poses"),
-                        if others == 1 { "is" } else { "are" }
+                        if none == 1 { "is" } else { "are" }
                     ));
                 }
+                others.extend(may_be.into_iter().map(|labels| Other {
+                    run: track.run.clone(),
+                    from: found.len(),
+                    positions: labels.into_iter().flatten().collect(),
+                }));
                 found.extend(
-                    poses.into_iter().zip(positions).filter_map(|(pose, position)| Some((pose, position?))),
+                    poses.into_iter().zip(labels).filter_map(|(pose, position)| Some((pose, position?))),
                 );
             }
             Err(words) => unclear.push((track.run.as_str(), words)),
@@ -239,7 +319,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
             "no position of the plan was found: is it the right --plan?".to_owned()
         });
     }
-    if reasons.is_empty() { Ok((found, warnings)) } else { Err(reasons) }
+    if reasons.is_empty() { Ok(Found { poses: found, others, warnings }) } else { Err(reasons) }
 }
 
 /// Intensities of the noise.

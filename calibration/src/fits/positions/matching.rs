@@ -1,8 +1,9 @@
 //! Which pose is which position of the plan.
 //!
 //! Directions of gravity alone do not tell: each of the twelve positions has a twin half a turn about the vertical away. The gyros
-//! do, from one pose to the next. Where they were not turned with the unit (a log of positions without the way between them), the
-//! order of the plan does, if no position is missing.
+//! do, from one pose to the next, but for where they begin: all poses of a log half a turn away fit as well. The order nearest to the
+//! plan's is taken, and the fit of all logs tells whether it is right. Where the gyros were not turned with the unit (a log of positions
+//! without the way between them), the order of the plan does, if no position is missing.
 
 use std::ops::Range;
 
@@ -11,7 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::plan::{Attitude, Plan};
 use super::pose::Pose;
 use super::track::Track;
-use crate::numbers::{ends, real};
+use crate::axes::several;
+use crate::numbers::{ends, once_each, real};
 use crate::report::{counted, fixed};
 use crate::runs::swapped::{AS_LOGGED, ORDERS, moved};
 
@@ -24,15 +26,26 @@ const AGREEMENT: f64 = 0.8;
 /// Fewest ways that tell an order of columns from chance.
 const TELLING_WAYS: usize = 3;
 
-/// Plan positions of a run's poses, `None` for one that is no position of the plan, and what is to be said of it.
-pub type Matched = (Vec<Option<usize>>, Option<String>);
+/// Plan positions of a run's poses, `None` for one that is no position of the plan.
+pub type Labels = Vec<Option<usize>>;
+
+/// What a run's poses are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matched {
+    /// Their positions.
+    pub labels: Labels,
+    /// What else the same poses may be, as far as the run by itself tells.
+    pub others: Vec<Labels>,
+    /// What is to be said of it.
+    pub doubt: Option<String>,
+}
 
 /// Finds the plan positions of a run's poses.
 ///
 /// # Errors
 /// What is wrong and what to do.
 pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, String> {
-    let directions = directions(poses)?;
+    let (directions, one_way) = directions(poses)?;
     let fits = |pose: usize, position: usize| {
         let up = plan.up(position, [0.0; 3]);
         directions[pose].angle(&Vector3::from(up)) < DIRECTION_RAD
@@ -40,6 +53,9 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
     let candidates: Vec<Vec<usize>> = (0..poses.len())
         .map(|pose| (0..plan.positions.len()).filter(|position| fits(pose, *position)).collect())
         .collect();
+    if let Some(words) = one_way.filter(|_| candidates.iter().any(Vec::is_empty)) {
+        return Err(words);
+    }
     let ways = ways(track, poses, AS_LOGGED);
     let share = agreement(&ways, &directions, AS_LOGGED);
     let swapped = if share < AGREEMENT { swapped(track, poses, (&ways, &directions)) } else { None };
@@ -60,17 +76,18 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
         .map(|hint| format!("gyros and accelerometers do not agree on the turns between the poses: {hint}"));
     let count = plan.positions.len();
     let in_order = || (0..poses.len()).all(|pose| fits(pose, pose % count));
-    let positions = if candidates.iter().all(|candidates| candidates.len() <= 1) {
-        candidates.iter().map(|candidates| candidates.first().copied()).collect()
+    let turned = if share >= AGREEMENT { followed(plan, &candidates, &ways) } else { Vec::new() };
+    let mut all = if candidates.iter().all(|candidates| candidates.len() <= 1) {
+        let direct: Labels = candidates.iter().map(|candidates| candidates.first().copied()).collect();
+        // Poses that only gravity takes for positions are left out where those of the gyros are all that there are: of twelve, six.
+        let different = |labels: &Labels| once_each(labels.iter().flatten()).len();
+        let whole = turned.into_iter().filter(|labels| different(labels) == different(&direct));
+        let whole: Vec<Labels> = whole.collect();
+        if whole.is_empty() { vec![direct] } else { whole }
     } else if share >= AGREEMENT {
-        let starts = candidates.iter().position(|candidates| !candidates.is_empty());
-        let anchors = starts.map(|start| candidates[start].clone()).unwrap_or_default();
-        let followed = anchors.into_iter().map(|anchor| follow(plan, &candidates, &ways, anchor));
-        let missing = |found: &Vec<Option<usize>>| found.iter().filter(|position| position.is_none()).count();
-        // The first of equals: the plan's order.
-        followed.min_by_key(missing).ok_or_else(|| nothing(plan, poses, &directions))?
+        turned
     } else if poses.len().is_multiple_of(count) && in_order() {
-        (0..poses.len()).map(|pose| Some(pose % count)).collect()
+        vec![(0..poses.len()).map(|pose| Some(pose % count)).collect()]
     } else {
         return Err(unclear(&format!(
             "they are not the plan's {count} positions in their order, one is missing or repeated{}. Identify the poses \
@@ -78,7 +95,31 @@ pub fn matched(plan: &Plan, track: &Track, poses: &[Pose]) -> Result<Matched, St
             unseen(plan).unwrap_or_default()
         )));
     };
-    Ok((positions, doubt))
+    if all.is_empty() {
+        return Err(nothing(plan, poses, &directions));
+    }
+    let labels = all.remove(0);
+    let are_same_poses = |other: &Labels| labels.iter().zip(other).all(|(a, b)| a.is_some() == b.is_some());
+    let others = all.into_iter().filter(are_same_poses).collect();
+    Ok(Matched { labels, others, doubt })
+}
+
+/// What poses are by the gyros, wherever they begin, with the fewest that are no position: those nearest to the plan's order first.
+fn followed(plan: &Plan, candidates: &[Vec<usize>], ways: &[Matrix3<f64>]) -> Vec<Labels> {
+    let of_pose = |(pose, own): (usize, &Vec<usize>)| own.iter().map(|at| (pose, *at)).collect::<Vec<_>>();
+    let anchors = candidates.iter().enumerate().flat_map(of_pose);
+    let mut found = once_each(anchors.map(|anchor| follow(plan, candidates, ways, anchor)));
+    let missing = |labels: &Labels| labels.iter().filter(|position| position.is_none()).count();
+    let fewest = found.iter().map(missing).min();
+    found.retain(|labels| Some(missing(labels)) == fewest);
+    found.sort_by_key(|labels| detour(labels.iter().flatten().copied()));
+    found
+}
+
+/// How far positions are apart in the plan from one to the next, together: least in the plan's order, forth or back.
+pub fn detour(positions: impl IntoIterator<Item = usize>) -> usize {
+    let positions: Vec<usize> = positions.into_iter().collect();
+    positions.windows(2).map(|pair| pair[0].abs_diff(pair[1])).sum()
 }
 
 /// An order of columns with which both agree on the turns, in words: of the gyros, or, as an error, of the accelerometers.
@@ -142,13 +183,13 @@ fn nothing(plan: &Plan, poses: &[Pose], directions: &[Vector3<f64>]) -> String {
     )
 }
 
-/// Follows the gyros from an anchor.
+/// Follows the gyros from an anchor: a pose, and the position that it is taken for.
 fn follow(
     plan: &Plan,
     candidates: &[Vec<usize>],
     ways: &[Matrix3<f64>],
-    anchor: usize,
-) -> Vec<Option<usize>> {
+    (start, anchor): (usize, usize),
+) -> Labels {
     let mut found = Vec::with_capacity(candidates.len());
     let mut last: Option<usize> = None;
     let mut turned = Matrix3::identity();
@@ -157,7 +198,7 @@ fn follow(
             turned = way * turned;
         }
         let position = match last {
-            None => candidates.contains(&anchor).then_some(anchor),
+            None => (pose == start).then_some(anchor),
             Some(from) => {
                 let away = |position: &usize| {
                     let planned = case_of(plan, *position) * case_of(plan, from).transpose();
@@ -182,14 +223,14 @@ fn angle(rotation: &Matrix3<f64>) -> f64 {
 }
 
 /// Directions of "up" in case axes: of the specific force where the document at hand knows it, else of outputs that are centred
-/// and brought to the size of one.
-fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
+/// and brought to the size of one; then with what is wrong if they are none.
+fn directions(poses: &[Pose]) -> Result<(Vec<Vector3<f64>>, Option<String>), String> {
     let known = poses.iter().all(|pose| {
         let size = Vector3::from(pose.force_m_per_s2).norm();
         (9.3..10.3).contains(&size)
     });
     if known {
-        return Ok(poses.iter().map(|pose| Vector3::from(pose.force_m_per_s2).normalize()).collect());
+        return Ok((poses.iter().map(|pose| Vector3::from(pose.force_m_per_s2).normalize()).collect(), None));
     }
     if poses.iter().any(|pose| pose.outputs.len() != 3) {
         return Err(
@@ -205,7 +246,19 @@ fn directions(poses: &[Pose]) -> Result<Vec<Vector3<f64>>, String> {
             (pose.outputs[i] - 0.5 * (low + high)) / (0.5 * (high - low))
         })
     };
-    Ok(poses.iter().map(|pose| scaled(pose).normalize()).collect())
+    let scaled: Vec<Vector3<f64>> = poses.iter().map(scaled).collect();
+    // Of one that is shown one way only, level is the other end of what it shows.
+    let has_middle = |axis: &usize| scaled.iter().any(|up| up[*axis].abs() < 0.5);
+    let one_way: Vec<usize> = (0..3).filter(|axis| !has_middle(axis)).collect();
+    let words = (!one_way.is_empty()).then(|| {
+        format!(
+            "{} {} not shown both up and down, without which a log tells no directions: give a document with nominal scale factors \
+             and axes (--calibration), or identify the poses with --times",
+            several("accelerometer", &one_way, 3),
+            if one_way.len() == 1 { "is" } else { "are" }
+        )
+    });
+    Ok((scaled.into_iter().map(|up| up.normalize()).collect(), words))
 }
 
 /// Rotations of the case from each pose to the next, with the gyros in another order: each takes a fixed vector's components before to

@@ -10,7 +10,8 @@ use clap::Args;
 
 use super::track::{Track, quantile};
 use crate::limits::{above_0, from_0};
-use crate::numbers::real;
+use crate::numbers::{norm, real};
+use crate::report::short;
 
 /// What counts as still; the defaults are those of a stand.
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
@@ -34,7 +35,7 @@ pub struct StillLimits {
 
 /// Fewest ticks of a window.
 const FEWEST_TICKS: usize = 8;
-/// Standard deviations of noise that a still rate may be away.
+/// Standard deviations of noise that a still rate or force may be away.
 const RATE_SIGMAS: f64 = 6.0;
 /// Share of the run that is taken to be still where nothing is known.
 const QUIET_SHARE: f64 = 0.2;
@@ -67,6 +68,44 @@ pub fn still(track: &Track, limits: &StillLimits, rest: Option<f64>) -> Vec<Rang
     let together = still.chunk_by(|last, tick| *tick == last + 1 && !gap(*tick));
     let intervals = together.map(|ticks| ticks[0]..ticks[0] + ticks.len());
     intervals.filter_map(|ticks| settled(track, ticks, limits)).collect()
+}
+
+/// How a unit moves in ticks that are said to be a pose, in words: by means over windows that lie within them. `rest` are the rates about
+/// the case axes at rest (°/s). `None` where it is still.
+pub fn moves(track: &Track, ticks: &Range<usize>, limits: &StillLimits, rest: [f64; 3]) -> Option<String> {
+    let half = half_window(limits.window_s, track.tick_s()).min(ticks.len().saturating_sub(1) / 2);
+    // Means over whole windows, and what noise may do to one.
+    let windows = |column: &Vec<f64>| {
+        let (mean, variance) = spread(&column[ticks.clone()], half);
+        let noise = RATE_SIGMAS * (quantile(&variance, 0.5) / real(2 * half + 1)).max(0.0).sqrt();
+        (mean[half..mean.len() - half].to_vec(), noise)
+    };
+    for (column, rest) in track.rate_deg_per_s.iter().zip(rest) {
+        let (mean, noise) = windows(column);
+        let limit = limits.rate_deg_per_s.max(noise);
+        let away = mean.into_iter().map(|rate| (rate - rest).abs()).fold(0.0, f64::max);
+        if away > limit {
+            return Some(format!(
+                "the unit turns by up to {} °/s, at most {} °/s are still (--still-rate)",
+                short(away),
+                short(limit)
+            ));
+        }
+    }
+    let [x, y, z] = track.force_m_per_s2.each_ref().map(windows);
+    let middle = [&x, &y, &z].map(|(mean, _)| quantile(mean, 0.5));
+    let noise = norm([x.1, y.1, z.1]) / norm(middle);
+    let limit_deg = (limits.rate_deg_per_s * limits.window_s).max(noise.to_degrees());
+    let away = x.0.iter().zip(&y.0).zip(&z.0);
+    let away = away.map(|((x, y), z)| norm([x - middle[0], y - middle[1], z - middle[2]]) / norm(middle));
+    let away_deg = away.fold(0.0, f64::max).to_degrees();
+    (away_deg > limit_deg).then(|| {
+        format!(
+            "the specific force turns by {} °, at most {} ° are still (--still-rate times --window)",
+            short(away_deg),
+            short(limit_deg)
+        )
+    })
 }
 
 /// The interval without the time that the unit takes to settle; `None` where what is left is too short.

@@ -6,9 +6,11 @@ use isotherm_log::file::read_small_text;
 
 use super::plan::Plan;
 use super::pose::Pose;
-use super::track::Track;
+use super::still::{StillLimits, moves};
+use super::track::{Track, quantile};
 use crate::csv;
 use crate::error::Error;
+use crate::report::{counted, six};
 
 /// Rows of the table.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -44,8 +46,13 @@ impl Times {
     /// The poses of a run, with their positions' numbers.
     ///
     /// # Errors
-    /// Rows that do not fit the run or the plan.
-    pub fn poses(&self, track: &Track, run: usize, plan: &Plan) -> Result<Vec<(Pose, usize)>, Vec<String>> {
+    /// Rows that do not fit the run or the plan, or in which the unit moves.
+    pub fn poses(
+        &self,
+        (track, run): (&Track, usize),
+        plan: &Plan,
+        limits: &StillLimits,
+    ) -> Result<Vec<(Pose, usize)>, Vec<String>> {
         let mut reasons = Vec::new();
         let mut found = Vec::new();
         let own = |log: &Option<String>| log.as_ref().is_none_or(|log| *log == track.run);
@@ -76,13 +83,38 @@ impl Times {
             let ticks: Vec<usize> = (0..track.len()).filter(within).collect();
             let (Some(first), Some(last)) = (ticks.first(), ticks.last()) else {
                 reasons.push(format!(
-                    "--times: {name} from {} to {} s has no tick of {}: times count from its first tick",
+                    "--times: {name} from {} to {} s has no tick of {}: times count from the first tick read (--start)",
                     span[0], span[1], track.run
                 ));
                 continue;
             };
             found.push((Pose::over(track, run, *first..last + 1), position));
         }
+        reasons.extend(moving(track, plan, &found, limits));
         if reasons.is_empty() { Ok(found) } else { Err(reasons) }
     }
+}
+
+/// The first of a run's poses in which the unit moves, and how many others: times that are late are so throughout.
+fn moving(track: &Track, plan: &Plan, poses: &[(Pose, usize)], limits: &StillLimits) -> Option<String> {
+    let ticks = || poses.iter().flat_map(|(pose, _)| pose.ticks.clone());
+    let rest = track.rate_deg_per_s.each_ref();
+    let rest = rest.map(|column| quantile(&ticks().map(|tick| column[tick]).collect::<Vec<f64>>(), 0.5));
+    let of = |(pose, position): &(Pose, usize)| {
+        let [start, end] = pose.span_s;
+        let name = &plan.positions[*position].name;
+        let how = moves(track, &pose.ticks, limits, rest)?;
+        Some(format!("{name} from {} to {} s: {how}", six(start), six(end)))
+    };
+    let found: Vec<String> = poses.iter().filter_map(of).collect();
+    let (first, others) = found.split_first()?;
+    let likewise = if others.is_empty() {
+        String::new()
+    } else {
+        format!(". Likewise {}", counted(others.len(), "other row", "other rows"))
+    };
+    Some(format!(
+        "--times: {}: {first}; times count from the first tick read (--start): correct them, or shorten the rows{likewise}",
+        track.run
+    ))
 }

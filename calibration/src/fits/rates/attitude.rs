@@ -29,7 +29,7 @@ pub(super) fn doubts(
         let Some((looks, rest)) = of_run(place, run, (axes, gains)) else { continue };
         match told
             .iter_mut()
-            .find(|(_, first, ..)| (first.shown.kind, first.order) == (looks.shown.kind, looks.order))
+            .find(|(_, first, ..)| (first.shown.kind, first.fits) == (looks.shown.kind, looks.fits))
         {
             Some((.., others)) => others.push(number),
             None => told.push((number, looks, rest, Vec::new())),
@@ -77,6 +77,7 @@ mod tests {
     use super::*;
     use crate::fits::rates::bins::{Bin, Binned};
     use crate::fits::rates::plateaus::find;
+    use crate::runs::swapped::Fits;
 
     const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
@@ -102,13 +103,13 @@ mod tests {
         doubts(&[place], &[run(shown), run(shown)], (&AXES, &[1.0; 3]))
     }
 
-    /// The order in which the accelerometers fit, of the only finding; it is of the first log, and the second shows the same.
-    fn order(found: &[Finding]) -> Option<[usize; 3]> {
+    /// With what the accelerometers fit, of the only finding; it is of the first log, and the second shows the same.
+    fn fits(found: &[Finding]) -> Fits {
         let [Finding { place, kind: Kind::Gravity { looks, others, .. } }] = found else {
             panic!("{found:?}");
         };
         assert_eq!((place.log, others.as_slice(), looks.shown.kind), (Some(0), &[1][..], "accelerometers"));
-        looks.order
+        looks.fits
     }
 
     #[test]
@@ -117,16 +118,16 @@ mod tests {
         for tilt in [level, None] {
             assert_eq!(found(|force| force, tilt), []);
             let swapped = found(|[x, y, z]| [y, x, z], tilt);
-            assert_eq!(order(&swapped), Some([1, 0, 2]));
+            assert_eq!(fits(&swapped), Fits::Order([1, 0, 2]));
             // A level unit tells nothing of x and y: the rest behind the turn does.
             assert!(matches!(swapped[0].kind, Kind::Gravity { rest: Some((_, 0)), .. }), "{swapped:?}");
         }
         let at_once = found(|[x, y, z]| [z, y, x], level);
-        assert_eq!(order(&at_once), Some([2, 1, 0]));
+        assert_eq!(fits(&at_once), Fits::Order([2, 1, 0]));
         assert!(matches!(at_once[0].kind, Kind::Gravity { rest: None, .. }), "{at_once:?}");
-        assert_eq!(order(&found(|[x, y, z]| [x, y, -z], level)), None);
+        assert_eq!(fits(&found(|[x, y, z]| [x, y, -z], level)), Fits::Nothing);
         // Levelled by themselves, they turn the wrong way.
-        assert_eq!(order(&found(|[x, y, z]| [x, y, -z], None)), None);
-        assert_eq!(order(&found(|force| force, Some([0.0, 180.0]))), None);
+        assert_eq!(fits(&found(|[x, y, z]| [x, y, -z], None)), Fits::Nothing);
+        assert_eq!(fits(&found(|force| force, Some([0.0, 180.0]))), Fits::Nothing);
     }
 }

@@ -18,7 +18,7 @@ use crate::report::{Rest, counted, output_unit, short};
 use crate::runs::Reading;
 use crate::runs::faults::{self, Fault};
 use crate::runs::series::{Series, Ticks};
-use crate::runs::swapped::{Looks, Shown};
+use crate::runs::swapped::{Looks, Shown, at_opposite_latitude};
 
 /// How far a gyro on a rate table may be from what is stated: share of the rate, and beside it (°/s).
 const TABLE_SHARE: f64 = 0.05;
@@ -321,6 +321,11 @@ pub fn attitude(samples: &Samples, document: &Document, (rest, stand): (&Rest, &
     let forces = shown(["accelerometers", "m/s²"], &samples.forces, rows, rest.force_m_per_s2);
     let rows = &document.gyro.orientation.rows;
     let gyros = shown(["gyros", "°/h"], &samples.gyros, rows, rest.rate_deg_per_h);
+    let opposite = rest.rate_deg_per_h.zip(rest.force_m_per_s2).and_then(|(earth, force)| {
+        let earth = at_opposite_latitude(earth, force);
+        <[f64; 3]>::try_from(rows.iter().map(|row| dot(*row, earth)).collect::<Vec<f64>>()).ok()
+    });
+    let gyros = gyros.map(|shown| shown.or_opposite(opposite));
     let named = |looks: Option<Looks>| looks.map(|looks| format!("{}: {looks}", samples.name));
     found.warnings.extend([gyros, forces].into_iter().flatten().filter_map(|shown| named(shown.swapped())));
     // The bias of a gyro may be many times the Earth's rate; that of an accelerometer is no third of gravity.

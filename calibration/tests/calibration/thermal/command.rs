@@ -101,6 +101,7 @@ fn folders_recordings_and_several_units() {
     std::fs::write(at.join("a.toml"), read("of-file.toml").replace("\"UNIT\"", "\"A\"")).unwrap();
     told += &said(at, &["whole.mcap", "other.mcap", "--calibration", "a.toml", "--out", "of-a.toml"]);
     assert!(logs("of-a.toml").eq(["whole.mcap"]));
+    told += &said(at, &["whole.mcap", "other.mcap", "--unit", "B"]);
 
     // What cannot be is said.
     std::fs::create_dir(at.join("empty")).unwrap();
@@ -108,7 +109,7 @@ fn folders_recordings_and_several_units() {
     let refusals: [&[&str]; 9] = [
         &of_another,
         &["empty"],
-        &["whole.mcap", "other.mcap", "--unit", "B"],
+        &["whole.mcap", "other.mcap", "--unit", "C"],
         &["whole.mcap", "./whole.mcap"],
         &["whole.mcap", "--judge", "whole.mcap"],
         &["whole.mcap", "--latitude", "55", "--heading", "30"],
