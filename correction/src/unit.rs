@@ -141,8 +141,9 @@ impl Unit {
             }
             Event::Temperature(readings) => pipeline.take_temperatures(readings),
             Event::Health(readings) => {
+                let now = pipeline.now();
                 for reading in readings {
-                    pipeline.operating.health(reading);
+                    pipeline.operating.health(reading, now);
                 }
             }
             Event::Reference(reference) => {

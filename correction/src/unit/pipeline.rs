@@ -100,6 +100,11 @@ impl Pipeline {
         }
         if let Some(active) = &mut self.active {
             active.corrector.disturb();
+    /// End of the last tick; `None` before the first.
+    pub(super) fn now(&self) -> Option<Timestamp> {
+        self.turn_on.map(|_| self.last_end)
+    }
+
         }
     }
 
