@@ -101,6 +101,8 @@ pub(super) struct Paired<'a> {
     pub(super) before: Break,
     /// When the unit was turned on.
     pub(super) turn_on: Timestamp,
+    /// End of the tick before.
+    pub(super) last_end: Timestamp,
 }
 
 impl Corrector {
@@ -223,7 +225,9 @@ impl Corrector {
             self.slew = None;
         }
         if waiting.is_due(time, delay) {
-            self.thermal.advance(calibration, waiting, delay, time, counters);
+            let begins = tick.before.restart || tick.turn_on == time;
+            let last_end = Some(tick.last_end).filter(|_| !begins);
+            self.thermal.advance(calibration, waiting, delay, (last_end, time), counters);
         }
         self.drift.advance(time, tick.before.restart, &|rate| {
             calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)

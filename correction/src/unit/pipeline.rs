@@ -93,19 +93,16 @@ impl Pipeline {
     pub(super) fn take_temperatures(&mut self, readings: &[TemperatureReading]) {
         for reading in readings {
             self.counters.temperature_readings_in += 1;
-            if reading.time + self.settings.temperature_delay < self.last_end {
-                self.counters.temperature_late += 1;
-            }
             self.waiting.push(reading, &mut self.counters);
         }
         if let Some(active) = &mut self.active {
             active.corrector.disturb();
+        }
+    }
+
     /// End of the last tick; `None` before the first.
     pub(super) fn now(&self) -> Option<Timestamp> {
         self.turn_on.map(|_| self.last_end)
-    }
-
-        }
     }
 
     /// Whether a gyro tick fits the calibration that will correct it, as things stand.
@@ -213,13 +210,13 @@ impl Pipeline {
             (out.ticks, out.series, out.revision) = (1, first.series, active.revision);
         }
         for tick in run.ticks {
-            let steps = !tick.follows(self.last_end) && !begins;
+            let last_end = core::mem::replace(&mut self.last_end, tick.end_time);
+            let steps = !tick.follows(last_end) && !begins;
             begins = false;
-            self.last_end = tick.end_time;
             let accel = accels.next().map(|accel| &accel.tick);
             match &mut self.active {
                 Some(active) if fits => {
-                    let tick = Paired { gyro: tick, accel, before: unseen, turn_on };
+                    let tick = Paired { gyro: tick, accel, before: unseen, turn_on, last_end };
                     let waiting = (&mut self.waiting, self.settings.temperature_delay);
                     let (counters, out) = (&mut self.counters, &mut self.corrected);
                     active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
