@@ -184,6 +184,8 @@ impl Unit {
             }
             if self.pipeline.takes_gyro(tick, output) {
                 starts_anew |= self.gyros.admit(tick, output, &mut self.pipeline.counters);
+            } else {
+                self.gyros.refuse();
             }
             rest = others;
         }

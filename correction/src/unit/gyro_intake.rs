@@ -106,6 +106,9 @@ pub(super) struct GyroIntake {
     restarts_pending: usize,
     newest: Option<Newest>,
     jump: Option<Jump>,
+    /// Ticks refused unseen since the last one that was admitted: for their duration, or by the calibration. Where no restart
+    /// follows, the sequence tells that they are missing.
+    unseen: u64,
     /// The producer's run in force, and the one that it took over from, whose ticks are late until they are many.
     series: Option<u64>,
     superseded: Option<u64>,
@@ -164,6 +167,7 @@ impl GyroIntake {
     pub(super) fn passed(&mut self, run: &[GyroTick]) {
         let Some(last) = run.last() else { return };
         self.jump = None;
+        self.unseen = 0;
         self.newest = Some(Newest { sequence: last.sequence, end_time: last.end_time });
         let count = u32::try_from(run.len()).unwrap_or(u32::MAX);
         // So many ones behind what there was.
@@ -179,15 +183,22 @@ impl GyroIntake {
         self.last = Some(sequence);
     }
 
+    /// Notes a tick that the calibration cannot take.
+    pub(super) fn refuse(&mut self) {
+        self.unseen += 1;
+    }
+
     /// Takes one tick of a batch; whether it starts a new series.
     pub(super) fn admit(&mut self, tick: &GyroTick, output: OutputKind, counters: &mut Counters) -> bool {
         if !is_possible(tick.duration) {
             counters.bad_duration += 1;
+            self.refuse();
             return false;
         }
         let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else {
             return false;
         };
+        let refused_before = refused_before + core::mem::take(&mut self.unseen);
         let pending = Pending { tick: tick.clone(), output, batch_end: None, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
             self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
@@ -310,6 +321,7 @@ impl GyroIntake {
         let refused_before = self.jump.map_or(0, |jump| jump.refused);
         let consistent = before.map_or(1, |jump| jump.consistent + 1);
         if consistent <= believed_after {
+            *refused(counters) += 1;
             self.jump = Some(Jump {
                 sequence: tick.sequence,
                 end_time: tick.end_time,
@@ -321,7 +333,6 @@ impl GyroIntake {
         self.jump = None;
         counters.restarts += 1;
         Admission::Admitted { restart: true, refused_before }
-            *refused(counters) += 1;
     }
 
     /// Puts a tick that came out of order in its place among those that wait.
