@@ -23,7 +23,7 @@ fn a_voltage_is_judged_by_its_worst_value_and_a_counter_by_its_increase() {
     };
     let now = Timestamp::from_ns(100_000_000_000);
     let mut feed = |name, off_s, value| {
-        let time = now + Span::from_s(10.0 + off_s) - Span::from_s(10.0);
+        let time = now + Span::from_s(20.0 + off_s) - Span::from_s(20.0);
         test.health(&HealthReading { name, time, value }, Some(now));
         [0, 1].map(|index| test.reported[index].result()).map(|result| (result.value, result.passed))
     };
