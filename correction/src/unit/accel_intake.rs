@@ -52,7 +52,7 @@ pub(super) struct AccelIntake {
     /// Since the last gyro tick one came whose number contradicts its time: it and all that come behind it are of another
     /// run, and those that wait are not.
     apart: bool,
-    /// What does go behind all has at least this number.
+    /// What does go behind all has at least this number: none, while others are set apart.
     next_sequence: u64,
     /// Messages of gyro ticks that started no new series.
     gyro_messages: u64,
@@ -72,11 +72,10 @@ impl AccelIntake {
         }
         if self.newest.is_none_or(|newest| newest < tick.end_time)
             && tick.sequence >= self.next_sequence
-            && !self.apart
             && self.pending.len() < MAX_PENDING
         {
             self.newest = Some(tick.end_time);
-            self.next_sequence = tick.sequence.saturating_add(1);
+            self.next_sequence = tick.sequence.wrapping_add(1);
             let after = self.gyro_messages;
             self.pending.push_back(PendingAccel { tick: tick.clone(), output, after });
         } else {
@@ -89,7 +88,9 @@ impl AccelIntake {
     fn admit_between(&mut self, tick: &AccelTick, output: OutputKind, counters: &mut Counters) {
         let late = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
         let is_in_time = self.is_in_time(tick);
-        self.apart |= is_in_time && self.contradicts(tick);
+        if is_in_time && !self.apart && self.contradicts(tick) {
+            (self.apart, self.next_sequence) = (true, u64::MAX);
+        }
         if is_in_time && !self.apart {
             self.insert_between(late, counters);
             return;
@@ -140,13 +141,15 @@ impl AccelIntake {
     fn look_for_newest(&mut self) {
         let last = self.pending.back().map(|last| &last.tick);
         self.newest = last.map(|last| last.end_time).max(self.released);
-        self.next_sequence = last.map_or(0, |last| last.sequence.saturating_add(1));
+        self.next_sequence = last.map_or(0, |last| last.sequence.wrapping_add(1));
     }
 
     /// Puts those that were set apart among the others; what is late is counted.
     #[cold]
     fn joins(&mut self, counters: &mut Counters) {
-        self.apart = false;
+        if core::mem::take(&mut self.apart) {
+            self.look_for_newest();
+        }
         while let Some(pending) = self.behind.pop_front() {
             if self.is_in_time(&pending.tick) {
                 self.insert_between(pending, counters);

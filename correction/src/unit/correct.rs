@@ -101,8 +101,6 @@ pub(super) struct Paired<'a> {
     pub(super) before: Break,
     /// When the unit was turned on.
     pub(super) turn_on: Timestamp,
-    /// End of the tick before.
-    pub(super) last_end: Timestamp,
 }
 
 impl Corrector {
@@ -225,8 +223,9 @@ impl Corrector {
             self.slew = None;
         }
         if waiting.is_due(time, delay) {
-            let begins = tick.before.restart || tick.turn_on == time;
-            let last_end = Some(tick.last_end).filter(|_| !begins);
+            // No tick lasts no time: nothing was corrected yet.
+            let goes_on = !tick.before.restart && self.seen.duration > Span::ZERO;
+            let last_end = goes_on.then_some(self.seen.end_time);
             self.thermal.advance(calibration, waiting, delay, (last_end, time), counters);
         }
         self.drift.advance(time, tick.before.restart, &|rate| {

@@ -210,13 +210,13 @@ impl Pipeline {
             (out.ticks, out.series, out.revision) = (1, first.series, active.revision);
         }
         for tick in run.ticks {
-            let last_end = core::mem::replace(&mut self.last_end, tick.end_time);
-            let steps = !tick.follows(last_end) && !begins;
+            let steps = !tick.follows(self.last_end) && !begins;
             begins = false;
+            self.last_end = tick.end_time;
             let accel = accels.next().map(|accel| &accel.tick);
             match &mut self.active {
                 Some(active) if fits => {
-                    let tick = Paired { gyro: tick, accel, before: unseen, turn_on, last_end };
+                    let tick = Paired { gyro: tick, accel, before: unseen, turn_on };
                     let waiting = (&mut self.waiting, self.settings.temperature_delay);
                     let (counters, out) = (&mut self.counters, &mut self.corrected);
                     active.corrector.correct(&active.calibration, &tick, waiting, counters, out);
