@@ -232,8 +232,9 @@ impl PreLaunch {
             (&[None], without, 0)
         };
         for &mode in needed {
-            let time_s = run.modes.get(mode).time_s;
-            if time_s < least_s {
+            let &Gathered { time_s, ticks, .. } = run.modes.get(mode);
+            // The last digits of a long sum are those of no tick: too little is what lacks half of one.
+            if time_s + 0.5 * time_s / real(ticks.max(1)) < least_s {
                 refusals.push(Refusal::TooLittleTime { gyro, mode, time_s, limit_s: least_s });
             }
         }

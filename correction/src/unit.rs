@@ -141,8 +141,9 @@ impl Unit {
             }
             Event::Temperature(readings) => pipeline.take_temperatures(readings),
             Event::Health(readings) => {
+                let now = pipeline.now();
                 for reading in readings {
-                    pipeline.operating.health(reading);
+                    pipeline.operating.health(reading, now);
                 }
             }
             Event::Reference(reference) => {
@@ -183,6 +184,8 @@ impl Unit {
             }
             if self.pipeline.takes_gyro(tick, output) {
                 starts_anew |= self.gyros.admit(tick, output, &mut self.pipeline.counters);
+            } else {
+                self.gyros.refuse();
             }
             rest = others;
         }

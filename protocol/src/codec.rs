@@ -199,6 +199,16 @@ pub enum CodecError {
         /// Index of the first such tick.
         index: usize,
     },
+    /// Temperatures that are not one per channel.
+    #[error("tick {index} of the batch has {got} readings, must have one per channel: {need}")]
+    ChannelReadings {
+        /// Index of the first such tick.
+        index: usize,
+        /// How many it has.
+        got: usize,
+        /// How many channels there are.
+        need: usize,
+    },
     /// Half-period counts for another number of gyros than there are.
     #[error("tick {index} of the batch has half-period counts of {got} gyros, must be 0 or {need}")]
     HalfPeriods {

@@ -228,24 +228,28 @@ impl<T: RawTick> TickReader<T> {
     fn read_body(&mut self, bytes: &[u8]) -> Result<OutputKind, CodecError> {
         let mut body = Body::new(bytes, &mut self.tail);
         let mut alike = Alike::default();
-        read_all(&mut body, &mut self.ticks, &mut alike).ok_or(CodecError::Malformed)?;
+        read_all(&mut body, &mut self.ticks, &mut alike)?;
         body.ends()?;
         alike.judge(self.ticks.len())
     }
 }
 
 /// Reads all ticks of a body.
-fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Alike) -> Option<()> {
-    // Never more than the body can hold, whatever it says.
-    let most = MAX_TICKS.min(body.left() / FEWEST_BYTES);
-    let (first, series, count) = body.part(|part| {
+fn read_all<T: RawTick>(
+    body: &mut Body<'_>,
+    ticks: &mut Vec<T>,
+    alike: &mut Alike,
+) -> Result<(), CodecError> {
+    let head = body.part(|part| {
         let first = part.u64()?;
         let series = if T::HAS_SERIES { part.u64()? } else { 0 };
-        Some((first, series, part.length(most)?))
-    })?;
+        Some((first, series, part.length(usize::MAX)?))
+    });
+    let (first, series, count) = head.ok_or(CodecError::Malformed)?;
+    body.can_hold(count, FEWEST_BYTES)?;
     ticks.resize_with(count, T::default);
     for (index, tick) in ticks.iter_mut().enumerate() {
-        body.part(|part| {
+        let read = body.part(|part| {
             let end_time = Timestamp::from_ns(part.i64()?);
             // What is longer than the longest span becomes that, which the core then refuses.
             let duration = Span::from_ns(i64::try_from(part.u64()?).unwrap_or(i64::MAX));
@@ -255,9 +259,26 @@ fn read_all<T: RawTick>(body: &mut Body<'_>, ticks: &mut Vec<T>, alike: &mut Ali
             let halves = tick.read_rest(part)?;
             alike.note(index, (output, sensors), halves);
             Some(())
-        })?;
+        });
+        if read.is_none() {
+            return Err(why_not_read(body));
+        }
     }
-    Some(())
+    Ok(())
+}
+
+/// What is wrong with the tick at which the reading of a body has stopped.
+#[cold]
+fn why_not_read(body: &mut Body<'_>) -> CodecError {
+    let sensors = body.part(|part| {
+        let _before = (part.i64()?, part.u64()?, part.variant()?);
+        part.length(usize::MAX)
+    });
+    if sensors.is_some_and(|sensors| sensors > MAX_SENSORS) {
+        CodecError::Value { field: "readings", must_be: "0 to 8 per tick" }
+    } else {
+        CodecError::Malformed
+    }
 }
 
 /// Reads the readings of a tick; what they stand for.

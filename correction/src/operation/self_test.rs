@@ -67,7 +67,7 @@ pub enum CheckItem {
     Temperature(ChannelName),
     /// Voltage of this name; its value (V) is the one nearest to a limit, or furthest beyond it.
     Voltage(ChannelName),
-    /// Increase of the counter of this name over the test.
+    /// Increase of the counter of this name over the test: two readings at least.
     Counter(ChannelName),
 }
 
@@ -140,23 +140,28 @@ struct Reported {
     item: CheckItem,
     name: ChannelName,
     limits: [f64; 2],
-    /// The first value, and the one that counts: of a voltage the worst so far, of a counter the last.
-    values: Option<(f64, f64)>,
+    /// Of a counter: where it began.
+    first: Option<f64>,
+    /// Of a voltage the worst so far, of a counter the last behind the first: one reading alone says nothing of an increase.
+    counts: Option<f64>,
 }
 
 impl Reported {
     fn take(&mut self, value: f64) {
+        if matches!(self.item, CheckItem::Counter(_)) {
+            self.counts = self.first.map(|_| value);
+            self.first.get_or_insert(value);
+            return;
+        }
         let [low, high] = self.limits;
         let excess =
             |value: f64| if value.is_nan() { f64::INFINITY } else { (low - value).max(value - high) };
-        let (_, counts) = self.values.get_or_insert((value, value));
-        let stays = matches!(self.item, CheckItem::Voltage(_)) && excess(*counts) > excess(value);
-        *counts = if stays { *counts } else { value };
+        let stays = |counts: &f64| excess(*counts) > excess(value);
+        self.counts = self.counts.filter(stays).or(Some(value));
     }
 
     fn result(&self) -> CheckResult {
-        let increases = matches!(self.item, CheckItem::Counter(_));
-        let value = self.values.map(|(first, counts)| if increases { counts - first } else { counts });
+        let value = self.counts.map(|counts| counts - self.first.unwrap_or(0.0));
         within(self.item, value, self.limits)
     }
 }
@@ -184,7 +189,7 @@ impl SelfTest {
     pub fn new(calibration: &Calibration) -> Self {
         let fresh = |sensors: usize| (0..sensors.min(MAX_SENSORS)).map(|_| Liveness::default()).collect();
         let SelfTestParts { voltages, counters } = calibration.self_test();
-        let reported = |item, name, limits| Reported { item, name, limits, values: None };
+        let reported = |item, name, limits| Reported { item, name, limits, first: None, counts: None };
         let voltages = voltages.iter().map(|it| reported(CheckItem::Voltage(it.name), it.name, it.range_v));
         let counters =
             counters.iter().map(|it| reported(CheckItem::Counter(it.name), it.name, [0.0, it.max_increase]));
@@ -218,8 +223,12 @@ impl SelfTest {
         seen.end_time.since(start) >= Self::LENGTH
     }
 
-    /// Takes what the producer reports of itself.
-    pub fn health(&mut self, reading: &HealthReading) {
+    /// Takes what the producer reports of itself, unless it is [`SelfTest::LENGTH`] away from `now`, the end of the last tick.
+    pub fn health(&mut self, reading: &HealthReading, now: Option<Timestamp>) {
+        let away = |now: Timestamp| reading.time.since(now).max(now.since(reading.time));
+        if now.is_some_and(|now| away(now) > Self::LENGTH) {
+            return;
+        }
         for reported in self.reported.iter_mut().filter(|reported| reported.name == reading.name) {
             reported.take(reading.value);
         }

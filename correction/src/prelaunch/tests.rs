@@ -98,6 +98,23 @@ fn an_instrument_without_modes_has_only_c0() {
 }
 
 #[test]
+fn the_shortest_time_is_enough_where_every_tick_is_good() {
+    let settings = PreLaunchSettings { duration: Span::from_s(60.0), ..settings() };
+    let outcome = |spoil: bool| {
+        let still = Still { tick_s: 0.01, ..Still::new(3) };
+        let spoils = |now_s: f64, seen: &mut Observation| {
+            if spoil && now_s == 30.0 {
+                seen.gyros.flags[1] |= SensorFlags::OVERRANGE;
+            }
+        };
+        run(&settings, still, 60.5, spoils)
+    };
+    let time_s = accepted(&outcome(false))[0].modes.without.time_s;
+    assert!(time_s < 60.0 && 60.0 - time_s < 1e-9, "the sum falls short, and no tick does: {time_s}");
+    assert!(matches!(refused(&outcome(true)), [Refusal::TooLittleTime { gyro: 1, .. }]));
+}
+
+#[test]
 fn the_standard_error_is_that_of_the_walk_whatever_the_modes_and_drifts_do() {
     // 6e-7 rad/√s over 200 s: 4.2e-8 rad/s. A step of 20 °/h at each switch and a drift of 1 °/h do not change it.
     let expected = 6e-7 / f64::sqrt(200.0);

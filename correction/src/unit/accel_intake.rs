@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::counters::Counters;
 use super::gyro_intake::{LONGEST_KEPT, MAX_TICK_DURATION, is_possible};
 use crate::sample::{AccelTick, GyroTick, OutputKind};
-use crate::units::Timestamp;
+use crate::units::{Span, Timestamp};
 
 /// Most accelerometer ticks that wait.
 const MAX_PENDING: usize = 8192;
@@ -26,23 +26,34 @@ impl PendingAccel {
     /// Whether it ends with a gyro tick, nearer than half the gyro tick's duration.
     #[inline]
     pub(super) fn ends_with(&self, gyro: &GyroTick) -> bool {
-        let (end_time, half) = (self.tick.end_time, gyro.duration.half());
+        let (end_time, half) = (self.tick.end_time, half_or_more(gyro.duration));
         end_time < gyro.end_time + half && end_time + half > gyro.end_time
     }
 
     /// Whether it ends earlier than that.
     fn ends_before(&self, gyro: &GyroTick) -> bool {
-        self.tick.end_time + gyro.duration.half() <= gyro.end_time
+        self.tick.end_time + half_or_more(gyro.duration) <= gyro.end_time
     }
+}
+
+/// Half a duration in whole nanoseconds, rounded up: what is nearer is nearer than half.
+#[inline]
+fn half_or_more(duration: Span) -> Span {
+    Span::from_ns(duration.as_ns() - duration.half().as_ns())
 }
 
 /// Memory of the accelerometer stream.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct AccelIntake {
     pending: VecDeque<PendingAccel>,
-    /// Ticks that came after their time, since the last gyro tick: where the next one starts a new series, they are
-    /// the first of it.
+    /// Ticks that came after their time or with those of another run, since the last gyro tick: where the next one starts a
+    /// new series, they are the first of it.
     behind: VecDeque<PendingAccel>,
+    /// Since the last gyro tick one came whose number contradicts its time: it and all that come behind it are of another
+    /// run, and those that wait are not.
+    apart: bool,
+    /// What does go behind all has at least this number: none, while others are set apart.
+    next_sequence: u64,
     /// Messages of gyro ticks that started no new series.
     gyro_messages: u64,
     /// End of the last gyro tick that was released in this series.
@@ -59,8 +70,12 @@ impl AccelIntake {
             counters.bad_duration += 1;
             return;
         }
-        if self.newest.is_none_or(|newest| newest < tick.end_time) && self.pending.len() < MAX_PENDING {
+        if self.newest.is_none_or(|newest| newest < tick.end_time)
+            && tick.sequence >= self.next_sequence
+            && self.pending.len() < MAX_PENDING
+        {
             self.newest = Some(tick.end_time);
+            self.next_sequence = tick.sequence.wrapping_add(1);
             let after = self.gyro_messages;
             self.pending.push_back(PendingAccel { tick: tick.clone(), output, after });
         } else {
@@ -68,11 +83,15 @@ impl AccelIntake {
         }
     }
 
-    /// Takes a tick that does not go behind all others; one whose gyro tick has gone is set apart.
+    /// Takes a tick that does not go behind all others; one whose gyro tick has gone, or that is of another run, is set apart.
     #[cold]
     fn admit_between(&mut self, tick: &AccelTick, output: OutputKind, counters: &mut Counters) {
         let late = PendingAccel { tick: tick.clone(), output, after: self.gyro_messages };
-        if self.released.is_none_or(|released| tick.end_time > released) {
+        let is_in_time = self.is_in_time(tick);
+        if is_in_time && !self.apart && self.contradicts(tick) {
+            (self.apart, self.next_sequence) = (true, u64::MAX);
+        }
+        if is_in_time && !self.apart {
             self.insert_between(late, counters);
             return;
         }
@@ -83,11 +102,29 @@ impl AccelIntake {
         }
     }
 
+    /// Whether its gyro tick may still be to come.
+    fn is_in_time(&self, tick: &AccelTick) -> bool {
+        self.released.is_none_or(|released| tick.end_time > released)
+    }
+
+    /// How many of those that wait end before `time`.
+    fn place(&self, time: Timestamp) -> usize {
+        self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1)
+    }
+
+    /// Whether it has another place by its number than by its time: it is not one out of order.
+    fn contradicts(&self, tick: &AccelTick) -> bool {
+        let place = self.place(tick.end_time);
+        let Some(behind) = self.pending.get(place) else { return tick.sequence < self.next_sequence };
+        let before = place.checked_sub(1).and_then(|i| self.pending.get(i));
+        tick.sequence >= behind.tick.sequence || before.is_some_and(|it| tick.sequence <= it.tick.sequence)
+    }
+
     /// Puts a tick in its place in time.
     #[cold]
     fn insert_between(&mut self, pending: PendingAccel, counters: &mut Counters) {
         let time = pending.tick.end_time;
-        let place = self.pending.iter().rposition(|p| p.tick.end_time < time).map_or(0, |i| i + 1);
+        let place = self.place(time);
         if self.pending.get(place).is_some_and(|p| p.tick.end_time == time) {
             counters.accel_duplicates += 1;
             return;
@@ -98,7 +135,28 @@ impl AccelIntake {
             self.pending.pop_back();
             counters.accel_unpaired += 1;
         }
-        self.newest = self.pending.back().map(|last| last.tick.end_time).max(self.released);
+        self.look_for_newest();
+    }
+
+    fn look_for_newest(&mut self) {
+        let last = self.pending.back().map(|last| &last.tick);
+        self.newest = last.map(|last| last.end_time).max(self.released);
+        self.next_sequence = last.map_or(0, |last| last.sequence.wrapping_add(1));
+    }
+
+    /// Puts those that were set apart among the others; what is late is counted.
+    #[cold]
+    fn joins(&mut self, counters: &mut Counters) {
+        if core::mem::take(&mut self.apart) {
+            self.look_for_newest();
+        }
+        while let Some(pending) = self.behind.pop_front() {
+            if self.is_in_time(&pending.tick) {
+                self.insert_between(pending, counters);
+            } else {
+                counters.accel_late += 1;
+            }
+        }
     }
 
     /// The ticks that wait, the oldest first, as far as they lie in one piece.
@@ -131,7 +189,7 @@ impl AccelIntake {
     #[inline]
     pub(super) fn goes_on(&mut self, counters: &mut Counters) {
         if !self.behind.is_empty() {
-            counters.accel_late += self.behind.drain(..).count() as u64;
+            self.joins(counters);
         }
         self.gyro_messages += 1;
         if self.pending.is_empty() && self.pending.capacity() > LONGEST_KEPT {
@@ -142,6 +200,9 @@ impl AccelIntake {
     /// Notes that gyro ticks came which start a new series: what came since the last message of the old one is set
     /// apart, so that ticks of the old one that still wait do not take it.
     pub(super) fn sets_apart(&mut self) {
+        if self.apart {
+            return;
+        }
         for _ in 0..self.pending.len() {
             let Some(pending) = self.pending.pop_front() else { return };
             let side = if pending.after == self.gyro_messages { &mut self.behind } else { &mut self.pending };
@@ -159,19 +220,34 @@ impl AccelIntake {
             tick.end_time + MAX_TICK_DURATION > end_time && tick.end_time < end_time + MAX_TICK_DURATION
         };
         let before = self.pending.len();
-        self.pending.retain(near);
-        self.newest = self.pending.back().map(|last| last.tick.end_time);
+        let old = self.apart;
+        self.pending.retain(|pending| !old && near(pending));
+        self.look_for_newest();
         counters.accel_unpaired += before.abs_diff(self.pending.len()) as u64;
-        while let Some(tick) = self.behind.pop_front() {
-            self.insert_between(tick, counters);
-        }
+        self.joins(counters);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Span;
+
+    #[test]
+    fn nearer_than_half_a_duration_is_so_to_the_nanosecond() {
+        for (duration, furthest) in [(1, 0), (2, 0), (3, 1), (10, 4), (11, 5)] {
+            let gyro = GyroTick { duration: Span::from_ns(duration), ..GyroTick::default() };
+            for off in -6_i64..=6 {
+                let tick = AccelTick { end_time: Timestamp::from_ns(off), ..AccelTick::default() };
+                let pending = PendingAccel { tick, output: OutputKind::Mean, after: 0 };
+                let [meets, early] = [pending.ends_with(&gyro), pending.ends_before(&gyro)];
+                assert_eq!(
+                    (meets, early),
+                    (off.abs() <= furthest, off < -furthest),
+                    "{duration} ns, {off} ns"
+                );
+            }
+        }
+    }
 
     #[test]
     fn a_tick_after_its_time_is_late_unless_a_new_series_begins_with_it() {

@@ -223,7 +223,10 @@ impl Corrector {
             self.slew = None;
         }
         if waiting.is_due(time, delay) {
-            self.thermal.advance(calibration, waiting, delay, time, counters);
+            // No tick lasts no time: nothing was corrected yet.
+            let goes_on = !tick.before.restart && self.seen.duration > Span::ZERO;
+            let last_end = goes_on.then_some(self.seen.end_time);
+            self.thermal.advance(calibration, waiting, delay, (last_end, time), counters);
         }
         self.drift.advance(time, tick.before.restart, &|rate| {
             calibration.gyro_orientation.forward(self.thermal.gyro_axes.temperature_deg_c(time), rate)

@@ -106,6 +106,9 @@ pub(super) struct GyroIntake {
     restarts_pending: usize,
     newest: Option<Newest>,
     jump: Option<Jump>,
+    /// Ticks refused unseen since the last one that was admitted: for their duration, or by the calibration. Where no restart
+    /// follows, the sequence tells that they are missing.
+    unseen: u64,
     /// The producer's run in force, and the one that it took over from, whose ticks are late until they are many.
     series: Option<u64>,
     superseded: Option<u64>,
@@ -164,6 +167,7 @@ impl GyroIntake {
     pub(super) fn passed(&mut self, run: &[GyroTick]) {
         let Some(last) = run.last() else { return };
         self.jump = None;
+        self.unseen = 0;
         self.newest = Some(Newest { sequence: last.sequence, end_time: last.end_time });
         let count = u32::try_from(run.len()).unwrap_or(u32::MAX);
         // So many ones behind what there was.
@@ -179,15 +183,22 @@ impl GyroIntake {
         self.last = Some(sequence);
     }
 
+    /// Notes a tick that the calibration cannot take.
+    pub(super) fn refuse(&mut self) {
+        self.unseen += 1;
+    }
+
     /// Takes one tick of a batch; whether it starts a new series.
     pub(super) fn admit(&mut self, tick: &GyroTick, output: OutputKind, counters: &mut Counters) -> bool {
         if !is_possible(tick.duration) {
             counters.bad_duration += 1;
+            self.refuse();
             return false;
         }
         let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else {
             return false;
         };
+        let refused_before = refused_before + core::mem::take(&mut self.unseen);
         let pending = Pending { tick: tick.clone(), output, batch_end: None, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
             self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
@@ -236,9 +247,8 @@ impl GyroIntake {
         let Some(newest) = self.newest else { return Admission::PLAIN };
         if tick.series != series {
             if self.superseded == Some(tick.series) {
-                counters.gyro_late += 1;
                 // Stragglers end; a run that goes on was interrupted by a stray tick of another, and takes over again.
-                let admission = self.follow_jump(tick, OLD_BELIEVED_AFTER, counters);
+                let admission = self.follow_jump(tick, OLD_BELIEVED_AFTER, counters, |to| &mut to.gyro_late);
                 if let Admission::Admitted { .. } = admission {
                     self.superseded = self.series.replace(tick.series);
                 }
@@ -257,8 +267,7 @@ impl GyroIntake {
         if tick.sequence <= newest.sequence && tick.end_time <= newest.end_time {
             return self.judge_old(tick, counters);
         }
-        counters.gyro_implausible += 1;
-        self.follow_jump(tick, BELIEVED_AFTER, counters)
+        self.follow_jump(tick, BELIEVED_AFTER, counters, |to| &mut to.gyro_implausible)
     }
 
     /// A tick from before the newest one: late, doubled, filling a hole, or the sign of a restart.
@@ -274,8 +283,7 @@ impl GyroIntake {
                     Admission::Refused
                 }
                 Ordering::Less => {
-                    counters.gyro_implausible += 1;
-                    self.follow_jump(tick, OLD_BELIEVED_AFTER, counters)
+                    self.follow_jump(tick, OLD_BELIEVED_AFTER, counters, |to| &mut to.gyro_implausible)
                 }
             };
         }
@@ -292,33 +300,39 @@ impl GyroIntake {
         }
         // Too far back to tell late from anew: a producer that was switched off and on begins like this.
         if age >= u64::from(u128::BITS) {
-            counters.gyro_implausible += 1;
-            return self.follow_jump(tick, OLD_BELIEVED_AFTER, counters);
+            return self.follow_jump(tick, OLD_BELIEVED_AFTER, counters, |to| &mut to.gyro_implausible);
         }
         counters.gyro_late += 1;
         Admission::Refused
     }
 
-    /// Refuses a jump until enough ticks agree with it, then follows it.
-    fn follow_jump(&mut self, tick: &GyroTick, believed_after: u32, counters: &mut Counters) -> Admission {
+    /// Refuses a jump until enough ticks agree with it, then follows it; `refused` counts those before.
+    fn follow_jump(
+        &mut self,
+        tick: &GyroTick,
+        believed_after: u32,
+        counters: &mut Counters,
+        refused: fn(&mut Counters) -> &mut u64,
+    ) -> Admission {
         let before = self.jump.filter(|jump| {
             let place = Newest { sequence: jump.sequence, end_time: jump.end_time };
             tick.sequence > jump.sequence && plausible_step(place, tick)
         });
-        let refused = self.jump.map_or(0, |jump| jump.refused);
+        let refused_before = self.jump.map_or(0, |jump| jump.refused);
         let consistent = before.map_or(1, |jump| jump.consistent + 1);
         if consistent <= believed_after {
+            *refused(counters) += 1;
             self.jump = Some(Jump {
                 sequence: tick.sequence,
                 end_time: tick.end_time,
                 consistent,
-                refused: refused + 1,
+                refused: refused_before + 1,
             });
             return Admission::Refused;
         }
         self.jump = None;
         counters.restarts += 1;
-        Admission::Admitted { restart: true, refused_before: refused }
+        Admission::Admitted { restart: true, refused_before }
     }
 
     /// Puts a tick that came out of order in its place among those that wait.

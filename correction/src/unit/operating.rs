@@ -11,6 +11,7 @@ use crate::observation::Observation;
 use crate::operation::{Command, HealthReading, Refusal, SelfTest, SelfTestReport, State};
 use crate::prelaunch::{Outcome, PreLaunch, PreLaunchProgress};
 use crate::sample::ChannelName;
+use crate::units::Timestamp;
 
 /// A calibration in force and its revision counter, as the states see it.
 pub(super) type InForce<'a> = (&'a Calibration, u64);
@@ -160,10 +161,10 @@ impl Operating {
         self.rest.as_mut().and_then(|rest| rest.observe(seen))
     }
 
-    /// Takes what the producer reports of itself.
-    pub(super) fn health(&mut self, reading: &HealthReading) {
+    /// Takes what the producer reports of itself; the last tick ends `now`.
+    pub(super) fn health(&mut self, reading: &HealthReading, now: Option<Timestamp>) {
         if let Some(test) = &mut self.self_test {
-            test.health(reading);
+            test.health(reading, now);
         }
     }
 

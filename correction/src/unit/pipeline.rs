@@ -93,14 +93,16 @@ impl Pipeline {
     pub(super) fn take_temperatures(&mut self, readings: &[TemperatureReading]) {
         for reading in readings {
             self.counters.temperature_readings_in += 1;
-            if reading.time + self.settings.temperature_delay < self.last_end {
-                self.counters.temperature_late += 1;
-            }
             self.waiting.push(reading, &mut self.counters);
         }
         if let Some(active) = &mut self.active {
             active.corrector.disturb();
         }
+    }
+
+    /// End of the last tick; `None` before the first.
+    pub(super) fn now(&self) -> Option<Timestamp> {
+        self.turn_on.map(|_| self.last_end)
     }
 
     /// Whether a gyro tick fits the calibration that will correct it, as things stand.

@@ -196,17 +196,20 @@ impl ThermalMemory {
     }
 
     /// Applies every waiting reading that takes effect before a tick ending at `end_time`, where [one is due](Waiting::is_due).
+    /// Those that `last_end`, the end of the tick before, should have felt are late.
     #[cold]
     pub(super) fn advance(
         &mut self,
         calibration: &Calibration,
         waiting: &mut Waiting,
         delay: Span,
-        end_time: Timestamp,
+        (last_end, end_time): (Option<Timestamp>, Timestamp),
         counters: &mut Counters,
     ) {
         self.changes += 1;
         while let Some(reading) = waiting.pop_before(end_time, delay) {
+            let is_late = last_end.is_some_and(|last_end| reading.time + delay < last_end);
+            counters.temperature_late += u64::from(is_late);
             self.read(calibration, &reading, delay, counters);
         }
         self.note_footing(calibration);

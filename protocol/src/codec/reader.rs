@@ -5,7 +5,7 @@
 
 use isotherm_correction::sample::LasingMode;
 
-use super::{CodecError, GOES_ON, WINDOW};
+use super::{CodecError, GOES_ON, MAX_TICKS, WINDOW};
 
 /// A body, and how far it has been read.
 #[derive(Debug)]
@@ -71,6 +71,14 @@ impl<'a> Body<'a> {
     /// A body ends here.
     pub(crate) fn ends(&self) -> Result<(), CodecError> {
         if self.left() == 0 { Ok(()) } else { Err(CodecError::Trailing { count: self.left() }) }
+    }
+
+    /// Whether what is left can be so many ticks of at least `fewest_bytes` each, whatever it says.
+    pub(crate) fn can_hold(&self, count: usize, fewest_bytes: usize) -> Result<(), CodecError> {
+        if count > MAX_TICKS {
+            return Err(CodecError::Ticks { count });
+        }
+        if count <= self.left() / fewest_bytes { Ok(()) } else { Err(CodecError::Malformed) }
     }
 
     /// A stated number of elements, at most `most`.

@@ -100,32 +100,44 @@ pub fn read_temperatures(frame: &[u8], readings: &mut Vec<TemperatureReading>) -
 fn read_body(bytes: &[u8], readings: &mut Vec<TemperatureReading>) -> Result<(), CodecError> {
     let mut tail = Tail::default();
     let mut body = Body::new(bytes, &mut tail);
-    let (count, mixed) = read_all(&mut body, readings).ok_or(CodecError::Malformed)?;
+    readings.clear();
+    let (channels, count) = read_head(&mut body).ok_or(CodecError::Malformed)?;
+    body.can_hold(count, FEWEST_BYTES)?;
+    let others = read_ticks(&mut body, (&channels, count), readings).ok_or(CodecError::Malformed)?;
     body.ends()?;
-    match mixed {
+    match others {
         _ if count == 0 => Err(CodecError::Ticks { count }),
-        Some(index) => Err(CodecError::MixedReadings { index }),
+        Some((index, got)) => Err(CodecError::ChannelReadings { index, got, need: channels.len() }),
         None => Ok(()),
     }
 }
 
-/// Reads all ticks of a body: how many there are, and the first whose readings are not one per channel.
-fn read_all(body: &mut Body<'_>, readings: &mut Vec<TemperatureReading>) -> Option<(usize, Option<usize>)> {
-    readings.clear();
-    // Never more than the body can hold, whatever it says.
-    let most = MAX_TICKS.min(body.left() / FEWEST_BYTES);
-    let mut channels = ArrayVec::<ChannelName, MAX_CHANNELS>::new();
+/// Channels of a batch.
+type Channels = ArrayVec<ChannelName, MAX_CHANNELS>;
+
+/// Reads the channels and how many ticks there are to be.
+fn read_head(body: &mut Body<'_>) -> Option<(Channels, usize)> {
+    let mut channels = Channels::new();
     for _ in 0..body.length(MAX_CHANNELS)? {
         channels.push(ChannelName::from(body.str()?).ok()?);
     }
-    let count = body.length(most)?;
-    let mut mixed = None;
+    Some((channels, body.length(usize::MAX)?))
+}
+
+/// Reads all ticks; the first whose readings are not one per channel, and how many it has.
+#[expect(clippy::option_option, reason = "no such tick is one thing, a body that does not decode another")]
+fn read_ticks(
+    body: &mut Body<'_>,
+    (channels, count): (&Channels, usize),
+    readings: &mut Vec<TemperatureReading>,
+) -> Option<Option<(usize, usize)>> {
+    let mut others = None;
     for index in 0..count {
         body.part(|part| {
             let time = Timestamp::from_ns(part.i64()?);
             let got = part.length(MAX_CHANNELS)?;
             if got != channels.len() {
-                mixed.get_or_insert(index);
+                others.get_or_insert((index, got));
             }
             for place in 0..got {
                 let raw = part.f64()?;
@@ -135,5 +147,5 @@ fn read_all(body: &mut Body<'_>, readings: &mut Vec<TemperatureReading>) -> Opti
             Some(())
         })?;
     }
-    Some((count, mixed))
+    Some(others)
 }

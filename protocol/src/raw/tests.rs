@@ -109,8 +109,9 @@ fn temperatures((channels, Ticks(plain)): PlainTemperatures) -> Result<Temperatu
     if plain.is_empty() {
         return Err(CodecError::Ticks { count: 0 });
     }
-    if let Some(index) = plain.iter().position(|tick| tick.1.len() != channels.len()) {
-        return Err(CodecError::MixedReadings { index });
+    let need = channels.len();
+    if let Some(index) = plain.iter().position(|tick| tick.1.len() != need) {
+        return Err(CodecError::ChannelReadings { index, got: plain[index].1.len(), need });
     }
     let tick = |(time_ns, raw): (i64, ArrayVec<f64, MAX_CHANNELS>)| {
         let time = Timestamp::from_ns(time_ns);
@@ -186,7 +187,11 @@ where
     P: Serialize + for<'de> Deserialize<'de>,
 {
     let frame = frame_of::<M>(body, damage);
-    let read = decode::<M>(&frame);
+    // Serde does not say which limit a body exceeds.
+    let read = decode::<M>(&frame).map_err(|error| match error {
+        CodecError::Value { .. } | CodecError::Ticks { count: MAX_TICKS.. } => CodecError::Malformed,
+        error => error,
+    });
     let plain = whole::<P>(&frame[2..frame.len() - 4]).and_then(of_plain);
     // Compared as text, where numbers that are none are equal too.
     prop_assert_eq!(format!("{:?}", read), format!("{:?}", plain));
@@ -226,6 +231,24 @@ proptest! {
             ((0..channels).map(name).collect(), Ticks(ticks.into_iter().map(tick).collect()));
         holds(&body, damage, temperatures, channels > 0)?;
     }
+}
+
+#[test]
+fn a_frame_beyond_a_limit_is_refused_for_that_limit() {
+    let channels = || (0..2).map(|_| ChannelName::default()).collect();
+    let temperatures = |ticks, readings| -> PlainTemperatures {
+        (channels(), Ticks(vec![(0, std::iter::repeat_n(1.0, readings).collect()); ticks]))
+    };
+    let refused = |frame: &[u8]| decode::<TemperatureBatch>(frame).unwrap_err();
+    let frame = frame_of::<TemperatureBatch>(&temperatures(2, 3), None);
+    assert_eq!(refused(&frame), CodecError::ChannelReadings { index: 0, got: 3, need: 2 });
+    let frame = frame_of::<TemperatureBatch>(&temperatures(4097, 2), None);
+    assert_eq!(refused(&frame), CodecError::Ticks { count: 4097 });
+    let accels = |ticks, readings| (0_u64, vec![(0_i64, 1_u64, 0_u8, vec![1_i32; readings]); ticks]);
+    let frames = [(4097, 1), (2, 9), (2, 8)].map(|(ticks, readings)| accels(ticks, readings));
+    let read = frames.map(|plain| decode::<AccelBatch>(&frame_of::<AccelBatch>(&plain, None)).map(drop));
+    let readings = CodecError::Value { field: "readings", must_be: "0 to 8 per tick" };
+    assert_eq!(read, [Err(CodecError::Ticks { count: 4097 }), Err(readings), Ok(())]);
 }
 
 #[test]

@@ -79,7 +79,7 @@ fn every_reason_to_refuse_a_frame_has_its_vector() {
         let error = decode_as(kind, &frame).expect_err(name);
         errors.insert(format!("{error:?}").split([' ', '{']).next().unwrap_or_default().to_owned());
     }
-    let all = "Checksum HalfPeriods Kind Length Malformed MixedReadings Ticks Trailing Value Version";
+    let all = "ChannelReadings Checksum HalfPeriods Kind Length Malformed MixedReadings Ticks Trailing Value Version";
     assert_eq!(errors.into_iter().collect::<Vec<_>>().join(" "), all, "every reason has its frame");
 }
 

@@ -107,6 +107,74 @@ fn i1_a_restarted_producer_is_followed_and_its_lost_ticks_are_announced() {
     assert_eq!(restart, 300);
     assert_eq!(out[restart].sequence, out[restart].missed, "the new series began at 0");
     assert_eq!(out.len() as u64 + out[restart].missed, 600);
+    assert_eq!(unit.counters().gyro_implausible, out[restart].missed, "the one that is believed is not");
+}
+
+#[test]
+fn i1_ticks_that_are_refused_around_a_restart_are_announced_by_it() {
+    let (fits, bad) = (gyro(0, &RATES), GyroTick { duration: Span::ZERO, ..gyro(0, &RATES) });
+    for broken in [bad, gyro(0, &[0.1; 4])] {
+        let mut unit = drive::unit(&compile(&identity()));
+        let tick = |like: &GyroTick, series, k| {
+            let GyroTick { sequence, end_time, .. } = gyro(k, &RATES);
+            [
+                Owned::Accel(vec![accel(k, &RATES)]),
+                Owned::Gyro(vec![GyroTick { sequence, end_time, series, ..like.clone() }]),
+            ]
+        };
+        // Within a run the sequence says it; nobody is told twice.
+        let old = (0..100).flat_map(|k| tick(if k == 50 { &broken } else { &fits }, 1, k));
+        let refused = (100..103).map(|k| (1, k)).chain((0..4).map(|k| (2, k)));
+        let refused = refused.flat_map(|(series, k)| tick(&broken, series, k));
+        let new = (4..20).map(|k| (2, k)).chain((0..9).map(|k| (3, k)));
+        let new = new.flat_map(|(series, k)| tick(&fits, series, k));
+        let out = drive::run(&mut unit, &old.chain(refused).chain(new).collect::<Vec<_>>());
+        let told = out.iter().filter(|tick| tick.missed > 0);
+        let told: Vec<_> = told.map(|tick| (tick.series, tick.sequence, tick.missed)).collect();
+        assert_eq!(told, [(1, 51, 1), (2, 4, 7)], "{broken:?}");
+        assert_eq!((out.len(), unit.counters().restarts), (99 + 16 + 9, 2));
+    }
+}
+
+#[test]
+fn i1_accelerometer_ticks_of_a_new_run_go_to_none_of_the_old() {
+    // So many ticks of the old run, of which the last have no accelerometer tick, and where the clock is when the new one begins.
+    for (ticks, silent, clock_ms) in
+        [(100, 3, 97 * 5), (100, 3, 97 * 5 + 2), (3, 0, 0), (3, 0, 3), (1, 0, 0), (7, 1, 32)]
+    {
+        let mut unit = drive::unit(&compile(&identity()));
+        let tick = |series: u32, k, clock_ms| {
+            let (gyro, accel) = (gyro(k, &RATES), accel(k, &[f64::from(series), 0.0, 0.0]));
+            let end_time = gyro.end_time + Span::from_ms(clock_ms);
+            [
+                Owned::Accel(vec![AccelTick { end_time, ..accel }]),
+                Owned::Gyro(vec![GyroTick { end_time, series: series.into(), ..gyro }]),
+            ]
+        };
+        let old = (0..ticks).flat_map(|k| {
+            let [accel, gyro] = tick(1, k, 0);
+            [Some(accel).filter(|_| k + silent < ticks), Some(gyro)].into_iter().flatten()
+        });
+        let new = (0..50).flat_map(|k| tick(2, k, clock_ms));
+        let out = drive::run(&mut unit, &old.chain(new).collect::<Vec<_>>());
+        assert_eq!(out.len() as u64, ticks + 50);
+        for tick in &out {
+            let expected = if tick.series == 1 && tick.sequence + silent >= ticks { 0 } else { tick.series };
+            let got = tick.delta_velocity[0] / tick.duration.as_s();
+            let at = (ticks, clock_ms, tick.series, tick.sequence);
+            assert!((got - f64::from(u32::try_from(expected).unwrap())).abs() < 1e-9, "{at:?}: {got}");
+        }
+    }
+}
+
+#[test]
+fn i1_accelerometer_ticks_find_their_gyro_ticks_without_numbers_of_their_own() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let unnumbered = |k| Owned::Accel(vec![AccelTick { sequence: 0, ..accel(k, &RATES) }]);
+    let events = (0..50).flat_map(|k| [unnumbered(k), Owned::Gyro(vec![gyro(k, &RATES)])]);
+    let _ = drive::run(&mut unit, &events.collect::<Vec<_>>());
+    let counters = unit.counters();
+    assert_eq!((counters.ticks_out, counters.accel_missing, counters.accel_late), (50, 0, 0));
 }
 
 #[test]

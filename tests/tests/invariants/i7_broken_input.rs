@@ -2,7 +2,9 @@
 //!
 //! Here through the state machine and the frames; over real Zenoh sessions in `system/i7_broken_input_over_zenoh.rs`.
 
-use isotherm_correction::sample::{CorrectedTick, GyroTick, SensorFlags, TickFlags};
+use isotherm_correction::sample::{
+    AccelTick, CorrectedTick, GyroTick, SensorFlags, TemperatureReading, TickFlags,
+};
 use isotherm_correction::unit::{Counters, Event, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -140,6 +142,27 @@ fn i7_a_clock_that_steps_back_takes_no_term_back_with_it() {
             |tick: &CorrectedTick| [tick.delta_angle, tick.delta_velocity].map(|v| v.map(f64::to_bits));
         assert_eq!(bits(tick), bits(&out[0]), "{tick:?}");
     }
+}
+
+#[test]
+fn i7_a_reading_is_late_where_an_earlier_tick_of_its_run_should_have_felt_it() {
+    let mut unit = drive::unit(&compile(&identity()));
+    let [far, further] = [2e3, 3e3].map(Span::from_s);
+    let mut late = |series, back: Span, ks: std::ops::Range<u64>, reading: u64| {
+        let at = TemperatureReading { time: end_of(reading) - back, ..temperature(reading, 20.0) };
+        let mut events = vec![Owned::Temperature(vec![at])];
+        for k in ks {
+            let end_time = end_of(k) - back;
+            events.push(Owned::Accel(vec![AccelTick { end_time, ..accel(k, &RATES) }]));
+            events.push(Owned::Gyro(vec![GyroTick { end_time, series, ..gyro(k, &RATES) }]));
+        }
+        let _ = drive::run(&mut unit, &events);
+        unit.counters().temperature_late
+    };
+    assert_eq!(late(1, far, 0..100, 0), 0, "before the first tick, and before the epoch of the clock");
+    assert_eq!(late(1, far, 100..200, 100), 0);
+    assert_eq!(late(2, further, 0..100, 0), 0, "the clock went back with a restart");
+    assert_eq!(late(2, further, 100..200, 50), 1);
 }
 
 #[test]

@@ -110,9 +110,10 @@ impl Scene {
 
 /// Voltages and a counter as a producer reports them.
 async fn report_health(scene: &Scene, volts: f64) {
+    let status = scene.status().await;
     let reading = |name: &str, value| HealthReading { name: ChannelName::from(name).unwrap(), value };
     let tick = |counter: f64| HealthTick {
-        time_ns: 0,
+        time_ns: status.last_tick.map_or(0, |last| last.end_time_ns),
         readings: vec![
             reading("half-wave x", 48.0),
             reading("half-wave y", volts),

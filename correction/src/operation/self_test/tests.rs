@@ -7,7 +7,7 @@ fn name(text: &str) -> ChannelName {
 #[test]
 fn a_voltage_is_judged_by_its_worst_value_and_a_counter_by_its_increase() {
     let [voltage, counter] = [name("half_wave_x"), name("crc_errors")];
-    let reported = |item, name, limits| Reported { item, name, limits, values: None };
+    let reported = |item, name, limits| Reported { item, name, limits, first: None, counts: None };
     let mut test = SelfTest {
         start: None,
         end: Timestamp::default(),
@@ -21,17 +21,24 @@ fn a_voltage_is_judged_by_its_worst_value_and_a_counter_by_its_increase() {
         ]
         .into(),
     };
-    let mut feed = |name, value| test.health(&HealthReading { name, time: Timestamp::default(), value });
+    let now = Timestamp::from_ns(100_000_000_000);
+    let mut feed = |name, off_s, value| {
+        let time = now + Span::from_s(20.0 + off_s) - Span::from_s(20.0);
+        test.health(&HealthReading { name, time, value }, Some(now));
+        [0, 1].map(|index| test.reported[index].result()).map(|result| (result.value, result.passed))
+    };
+    let nothing = (None, false);
+    for off_s in [-10.1, 10.1] {
+        assert_eq!(feed(voltage, off_s, 999.0), [nothing; 2], "of another time");
+    }
     for value in [200.0, 221.5, 199.0] {
-        feed(voltage, value);
+        feed(voltage, -10.0, value);
     }
-    for value in [70.0, 71.0, 73.0] {
-        feed(counter, value);
-    }
-    feed(name("something_else"), 1e9);
-    let [voltage, counter] = [0, 1].map(|index| test.reported[index].result());
-    assert_eq!((voltage.value, voltage.passed), (Some(221.5), false));
-    assert_eq!((counter.value, counter.passed), (Some(3.0), false));
+    let worst = (Some(221.5), false);
+    assert_eq!(feed(counter, 0.0, 70.0), [worst, nothing], "one reading is no increase");
+    assert_eq!(feed(counter, 5.0, 71.0), [worst, (Some(1.0), true)]);
+    assert_eq!(feed(counter, 10.0, 73.0), [worst, (Some(3.0), false)]);
+    feed(name("something_else"), 0.0, 1e9);
 }
 
 #[test]
