@@ -257,7 +257,7 @@ impl FileReader {
     /// The step of time to a row, where it is longer than any tick can be and the mapping knows of no gaps.
     fn gap(&self, now: i64) -> Option<Reason> {
         let tick = self.mapping.time.tick?.as_ns();
-        let numbered_by_rows = self.columns.leading().is_some_and(|ticks| ticks.sequence.is_none());
+        let numbered_by_rows = self.columns.ticks.iter().flatten().any(|ticks| ticks.sequence.is_none());
         let step = Span::from_ns(now.saturating_sub(self.last_stamp?));
         let most = i64::try_from(LONGEST_STEP + self.bad_since).unwrap_or(i64::MAX);
         let gap = self.mapping.time.gap_after_ticks.is_none()
