@@ -220,6 +220,9 @@ impl FileReader {
             return Ok(());
         }
         self.report.skipped_rows += 1;
+        if self.repeats_header() {
+            return Ok(());
+        }
         self.bad_since += 1;
         if a_gap {
             // The rows behind it follow it, not what is before it.
@@ -227,6 +230,13 @@ impl FileReader {
         }
         self.skip(stamp);
         Ok(())
+    }
+
+    /// Whether the current line is the header again, which has no tick.
+    fn repeats_header(&self) -> bool {
+        let line = self.lines.line();
+        let names = self.cells.iter().map(|cell| line.get(cell.start..cell.end).unwrap_or_default());
+        !self.header.is_empty() && names.eq(self.header.iter().map(String::as_bytes))
     }
 
     /// Leaves a gap where the row had ticks.

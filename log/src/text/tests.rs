@@ -311,6 +311,12 @@ fn bad_rows_can_be_passed_over_and_become_gaps() {
     assert_eq!(gyro(&events), expected);
     assert_eq!((report.rows, report.skipped_rows, report.lost_data()), (4, 4, true));
     assert!(report.first_skipped.is_some_and(|first| first.contains(":2:4: column 2")));
+    // A header that is repeated is counted, and no gap.
+    let (events, report) = read(
+        &mapping(&format!("{layout}\nheader = true"), STAMPS),
+        b"t,x,y,T\n10,1,7,20\nt, x,y,T\n21,2,7,20\n",
+    );
+    assert_eq!((gyro(&events), report.skipped_rows), (vec![(0, 10, 10, 1.0), (1, 21, 11, 2.0)], 1));
 }
 
 #[test]
@@ -488,7 +494,7 @@ fn a_part_of_a_log() {
     let file = stored(rows.as_bytes());
     let reader =
         LogReader::open(&mapping("delimiter = \"comma\"", STAMPS), &[file.path().to_path_buf()]).unwrap();
-    let span = |ms| isotherm_correction::units::Span::from_ms(ms);
+    let span = |ms| Span::from_ms(ms);
     let part = Part { start: span(100), end: Some(span(300)), ..Part::default() };
     let part: Vec<_> = reader.within(&part).map(Result::unwrap).collect();
     let ends: Vec<_> = gyro(&part).into_iter().map(|(_, end, ..)| end).collect();
