@@ -240,17 +240,23 @@ impl Way {
                     if !std::mem::replace(&mut said, true) {
                         say(&format!("{error}; trying again for {}", seconds(limit)));
                     }
+                    // Zenoh warns of every trial: there is none before something listens.
                     tokio::time::sleep(AGAIN).await;
+                    while Instant::now() + AGAIN < deadline && !self.listens().await {
+                        tokio::time::sleep(AGAIN).await;
+                    }
                 }
                 opened => return opened,
             }
         }
     }
 
-    /// Whether anything listens at one of its endpoints.
+    /// Whether anything listens at one of its endpoints, or there are none.
     pub async fn listens(&self) -> bool {
         let endpoints = endpoints(&self.config, "connect/endpoints");
-        let listens = tokio::task::spawn_blocking(move || endpoints.iter().any(|it| obstacle::listens(it)));
+        let listens = tokio::task::spawn_blocking(move || {
+            endpoints.is_empty() || endpoints.iter().any(|it| obstacle::listens(it))
+        });
         listens.await.unwrap_or(true)
     }
 

@@ -145,8 +145,8 @@ impl LogFiles {
                 Ok(first.map(|message| message.received_ns))
             }
             Self::Text { paths, mapping, .. } => {
-                let first = LogReader::open(mapping, paths)?.next().transpose()?;
-                Ok(first.map(|event| u64::try_from(event.began().as_ns()).unwrap_or(0)))
+                let beginning = LogReader::beginning(mapping, paths)?;
+                Ok(beginning.map(|(began, later)| u64::try_from((began + later).as_ns()).unwrap_or(0)))
             }
         }
     }

@@ -105,6 +105,9 @@ pub struct UnitSummary {
 pub struct PlotSummary {
     /// Names of the logs.
     pub logs: Vec<String>,
+    /// The serial of each log's unit, where it is shown under that of another log.
+    #[serde(skip_serializing_if = "none_has_its_own")]
+    pub own_serials: Vec<Option<String>>,
     /// What reading each of them came to.
     pub reading: Vec<LogReport>,
     /// Units by their serial, each with what it is in each log; `None` where a log does not have it.
@@ -115,6 +118,26 @@ pub struct PlotSummary {
     pub units_left_out: u64,
     /// By how much the second log was moved on the time axis (ns), where the two do not overlap.
     pub second_moved_ns: Option<i64>,
+}
+
+fn none_has_its_own(serials: &[Option<String>]) -> bool {
+    serials.iter().all(Option::is_none)
+}
+
+impl PlotSummary {
+    /// The serial in a log, counted from 0, of what is shown under this one.
+    #[must_use]
+    pub fn serial_in<'a>(&'a self, log: usize, shown: &'a str) -> &'a str {
+        self.own_serials.get(log).and_then(Option::as_deref).unwrap_or(shown)
+    }
+
+    /// The serials of what is shown under this one.
+    #[must_use]
+    pub fn serials(&self, shown: &str) -> String {
+        let mut serials: Vec<_> = (0..self.logs.len()).map(|log| self.serial_in(log, shown)).collect();
+        serials.dedup();
+        serials.join(" and ")
+    }
 }
 
 /// Reads the logs and draws them.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use arrayvec::ArrayVec;
+use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision, SigmaRun};
 use isotherm_protocol::key::UnitId;
@@ -87,7 +88,11 @@ impl Source {
     ) -> Result<(Self, Progress), Error> {
         let events = LogReader::open(mapping, paths)?.within(part);
         let progress = events.progress();
-        let text = TextLog { events, unit: unit.clone(), batcher: Batcher::new(batch_ticks), over: false };
+        // What cannot be read is reported when it is read.
+        let beginning = LogReader::beginning(mapping, paths).ok().flatten();
+        let received_after = beginning.map_or(Span::ZERO, |(_, later)| later);
+        let (unit, batcher) = (unit.clone(), Batcher::new(batch_ticks));
+        let text = TextLog { events, unit, batcher, received_after, over: false };
         Ok((Self::Text(Box::new(text)), progress))
     }
 
@@ -175,6 +180,8 @@ pub(crate) struct TextLog {
     events: LogReader,
     unit: UnitId,
     batcher: Batcher,
+    /// Time of reception after a tick's own.
+    received_after: Span,
     over: bool,
 }
 
@@ -202,7 +209,7 @@ impl TextLog {
 
     fn message(&self, frame: RawFrame) -> Message {
         let RawFrame { stream, frame, time, .. } = frame;
-        let received_ns = u64::try_from(time.as_ns()).unwrap_or(0);
+        let received_ns = u64::try_from((time + self.received_after).as_ns()).unwrap_or(0);
         Message { topic: Topic::Raw(self.unit.clone(), stream), received_ns, frame }
     }
 }

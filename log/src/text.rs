@@ -20,7 +20,7 @@ use std::sync::atomic::AtomicU64;
 
 use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureReading};
 use isotherm_correction::unit::Event;
-use isotherm_correction::units::Timestamp;
+use isotherm_correction::units::{Span, Timestamp};
 use serde::Serialize;
 
 use crate::error::Error;
@@ -203,6 +203,23 @@ impl LogReader {
         }
         let (part, progress) = (Stretch::default(), Progress::new(read, total));
         Ok(Self { files, paths, part, progress, primed: false, failed: false })
+    }
+
+    /// When a log begins, and what is added to its times so that they are times of reception, which are never before 1970; `None` for
+    /// one without events.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and where the first event cannot be read.
+    pub(crate) fn beginning(
+        mapping: &Mapping,
+        paths: &[PathBuf],
+    ) -> Result<Option<(Timestamp, Span)>, Error> {
+        let first = Self::open(mapping, paths)?.next().transpose()?;
+        Ok(first.map(|first| {
+            let began = first.began();
+            let is_before = first.time() < Timestamp::from_ns(0);
+            (began, if is_before { Timestamp::from_ns(0).since(began) } else { Span::ZERO })
+        }))
     }
 
     /// The same log, of which a part of the time is given.

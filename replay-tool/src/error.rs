@@ -30,11 +30,19 @@ pub enum Error {
     /// No service where one is needed, or none that sends anything back.
     #[error("{0}")]
     Service(String),
-    /// A log without a message to play or to correct.
+    /// A log without a message to work on: what was not done, and what kind of message there is none of.
     #[error(
-        "nothing was {0}: there is no raw message of these units, topics and times; `isotherm-replay list LOG` shows what there is"
+        "nothing was {0}: there is no {1} of these units, topics and times; `isotherm-replay list LOG` shows what there is"
     )]
-    Nothing(&'static str),
+    Nothing(&'static str, &'static str),
+    /// A log that ends before the tick that was asked for.
+    #[error("the log ends at gyro tick {last}, before --from {from}")]
+    EndsBefore {
+        /// Its last gyro tick.
+        last: u64,
+        /// What was asked for.
+        from: u64,
+    },
     /// The asynchronous runtime does not start.
     #[error("cannot start the runtime: {0}")]
     Runtime(#[source] io::Error),

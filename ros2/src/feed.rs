@@ -150,7 +150,7 @@ impl Feeder {
     /// Takes an Imu message.
     ///
     /// # Errors
-    /// [`Refusal`]; nothing has changed then, but that several in a row are believed.
+    /// [`Refusal`]; nothing has changed then, but that several in a row are believed, and that one refused for its stamp has come.
     pub fn imu(&mut self, payload: &[u8], attachment: Option<&[u8]>) -> Result<Ticks, Refusal> {
         let attachment = Attachment::parse(attachment)?;
         let Imu {
@@ -229,7 +229,14 @@ impl Feeder {
             return Ok(Some(last));
         };
         self.contradicting += 1;
-        if self.contradicting >= BELIEVED_AFTER { Ok(None) } else { Err(refusal) }
+        if self.contradicting >= BELIEVED_AFTER {
+            return Ok(None);
+        }
+        if let (Refusal::StampNotNewer { .. }, Some(last)) = (&refusal, &mut self.last) {
+            // It came: its number is not missing. Whether a tick is, the next stamp says.
+            last.sequence = attachment.sequence;
+        }
+        Err(refusal)
     }
 
     /// Takes a Temperature message of one of the unit's topics, by its place in the mapping.

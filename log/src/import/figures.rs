@@ -23,6 +23,8 @@ pub(super) struct Column {
     pub(super) empty: u64,
     /// Cells with anything else.
     pub(super) other: u64,
+    /// The first of them, and its line.
+    pub(super) first_other: Option<(u64, String)>,
     /// Cells with a date and time or a time of day, all in this unit; they count as numbers of ns too.
     stamps: u64,
     stamp_unit: Option<TimeUnit>,
@@ -129,6 +131,7 @@ impl Column {
             (ns as f64, (ns, 0.0))
         } else {
             self.other += 1;
+            self.first_other.get_or_insert_with(|| (line, cell.to_owned()));
             return;
         };
         if self.numbers == 0 {
@@ -168,9 +171,9 @@ impl Column {
             .filter(|(unit, _)| self.stamp_unit.is_none_or(|before| before == *unit))
     }
 
-    /// Whether it could be the clock of the rows.
+    /// Whether it could be the clock of the rows. A row now and then whose cell is no number, like a footer, is passed over.
     pub(super) fn increases(&self) -> bool {
-        self.numbers > 1 && self.steps.back == 0 && self.other == 0 && !self.is_in_some_rows()
+        self.numbers > 1 && self.steps.back == 0 && self.other * 10 <= self.numbers && !self.is_in_some_rows()
     }
 
     /// Whether it has a rhythm of its own. An empty cell now and then is a reading that is missing: its row is passed over, and leaves a

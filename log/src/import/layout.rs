@@ -73,9 +73,10 @@ pub(super) fn find(path: &Path, hints: &Hints) -> Result<Found, Error> {
     let both = delimiters.into_iter().flat_map(|split| marks.iter().map(move |mark| (split, *mark)));
     let apart = both.filter(|(delimiter, mark)| delimiter.byte() != Some(*mark));
     let best = apart.filter_map(|(delimiter, mark)| block(&lines, delimiter, mark)).reduce(better);
-    let (_, block) = best.ok_or_else(|| {
+    let (_, mut block) = best.ok_or_else(|| {
         refuse(path, format!("no rows of numbers in the first {} lines: is it a text log?", lines.len()))
     })?;
+    block.start = beginning(path, &lines, block)?;
     Ok(dressed(&lines, block, encoding))
 }
 
@@ -134,16 +135,62 @@ fn numeric(line: &str, delimiter: Delimiter, mark: u8) -> Option<(usize, usize)>
     (numbers >= 2 && numbers * 2 > filled).then(|| (cells.len(), numbers * 1000 / filled))
 }
 
+/// Index of the first line of the table that a run of rows belongs to: a header that is repeated, or a row that is odd, parts runs and
+/// not tables. Rows that would be lost in front of it are refused.
+fn beginning(path: &Path, lines: &[String], block: Block) -> Result<usize, Error> {
+    let Block { delimiter, mark, start, width } = block;
+    let (before, behind) = lines.split_at(start);
+    let is_comment = |line: &str| comments(delimiter).any(|prefix| line.trim_start().starts_with(prefix));
+    let is_row = |line: &str| numeric(line, delimiter, mark).is_some_and(|(of_row, _)| of_row == width);
+    let named = |line: &str| cells(line, delimiter).first().is_some_and(|first| is_word(first, mark));
+    // What lines in front state begins with its name.
+    let may_be_named = behind.iter().any(|line| is_row(line) && named(line));
+    let is_of_table = |line: &str| is_row(line) && (may_be_named || !named(line));
+    let is_header = |line: &&String| {
+        let cells = cells(line, delimiter);
+        let has_numbers = cells.iter().any(|cell| parse_float(cell, mark).is_some());
+        cells.len().abs_diff(width) <= 1 && is_wordy(&cells, mark) && !has_numbers
+    };
+    // A table goes on behind its own header only.
+    let goes_on = |index: usize| {
+        let (above, below) = before.split_at(index);
+        below.iter().filter(is_header).all(|header| above.contains(header))
+    };
+    let rows = before.iter().enumerate().filter(|(_, line)| !is_comment(line));
+    let rows: Vec<_> = rows.filter(|(_, line)| numeric(line, delimiter, mark).is_some()).collect();
+    let first = rows.iter().find(|(index, line)| is_of_table(line) && goes_on(*index));
+    let first = first.map_or(start, |(index, _)| *index);
+    let left: Vec<_> = rows.into_iter().filter(|(index, _)| *index < first).collect();
+    // One row like those of the table may number the columns; a few others say something of the log.
+    let too_many = left.len() > MOST_ODD || left.iter().filter(|(_, line)| is_of_table(line)).count() > 1;
+    match left.last() {
+        Some((last, _)) if too_many => Err(refuse(
+            path,
+            format!(
+                "{} rows of numbers would be lost before line {}, where another table begins: make two logs, or delete that line",
+                left.len(),
+                last + 2
+            ),
+        )),
+        _ => Ok(first),
+    }
+}
+
+/// Whether a cell is neither empty nor a number.
+fn is_word(cell: &str, mark: u8) -> bool {
+    cell.chars().any(char::is_alphabetic) && parse_float(cell, mark).is_none()
+}
+
+/// Whether most cells of a line are words.
+fn is_wordy(cells: &[String], mark: u8) -> bool {
+    cells.len() >= 2 && cells.iter().filter(|cell| is_word(cell, mark)).count() * 2 > cells.len()
+}
+
 /// Adds what stands before the rows.
 fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
     let Block { delimiter, mark, start, width } = block;
     let before: Vec<&String> = lines.iter().take(start).filter(|line| !line.trim().is_empty()).collect();
-    let wordy = |cells: &[String]| {
-        let words = cells
-            .iter()
-            .filter(|cell| cell.chars().any(char::is_alphabetic) && parse_float(cell, mark).is_none());
-        cells.len() >= 2 && words.count() * 2 > cells.len()
-    };
+    let wordy = |cells: &[String]| is_wordy(cells, mark);
     let mut units = Vec::new();
     let mut header_at = before.len().checked_sub(1);
     if let Some(at) = header_at {
@@ -189,7 +236,7 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
     let odd = if header_at.is_none() { odd_rows(&rows, delimiter, mark) } else { 0 };
     rows.drain(..odd);
     let skip_lines = skip_lines + odd;
-    let date_and_time = date_and_time(&rows, delimiter, comment);
+    let date_and_time = date_and_time(&rows, block, comment);
     Found {
         encoding,
         delimiter,
@@ -208,11 +255,14 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
 }
 
 /// Columns of dates and of times of day, where each row has both.
-fn date_and_time(rows: &[String], delimiter: Delimiter, comment: Option<&str>) -> Option<(usize, usize)> {
+fn date_and_time(rows: &[String], block: Block, comment: Option<&str>) -> Option<(usize, usize)> {
+    let Block { delimiter, mark, width, .. } = block;
     // The last line may be cut.
     let whole = rows.split_last().map_or(rows, |(_, before)| before).iter();
     let data = whole.filter(|row| !comment.is_some_and(|prefix| row.trim_start().starts_with(prefix)));
-    let rows: Vec<_> = data.map(|row| cells(row, delimiter)).collect();
+    let of_width =
+        data.filter(|row| numeric(row, delimiter, mark).is_some_and(|(of_row, _)| of_row == width));
+    let rows: Vec<_> = of_width.map(|row| cells(row, delimiter)).collect();
     let column = |is: &dyn Fn(&String) -> bool| {
         (0..rows.first()?.len()).find(|index| rows.iter().all(|row| row.get(*index).is_some_and(is)))
     };

@@ -31,6 +31,7 @@ pub(super) fn page(units: Vec<(UnitId, UnitLogs)>, summary: &PlotSummary) -> Opt
         let both = logs.iter().flatten().count() == 2;
         let mut drawing = Drawing { begin_ns, end_ns, both, rows: Vec::new() };
         let difference = difference.filter(|difference| both && difference.summary.common_ticks > 0);
+        let unit = summary.serials(unit.as_str());
         let chart = drawing.chart(&unit, logs, difference);
         page.heading(&format!("Unit {unit}"));
         page.paragraph(&format!(
@@ -69,7 +70,7 @@ struct Parts {
 }
 
 impl Drawing {
-    fn chart(&mut self, unit: &UnitId, logs: Vec<Option<UnitPlot>>, difference: Option<Difference>) -> Chart {
+    fn chart(&mut self, unit: &str, logs: Vec<Option<UnitPlot>>, difference: Option<Difference>) -> Chart {
         let mut parts = Parts::default();
         let mut marks = Vec::new();
         for (log, shown) in logs.into_iter().enumerate() {

@@ -27,6 +27,8 @@ struct Source {
     /// Messages read and not taken yet.
     ahead: VecDeque<Message>,
     over: bool,
+    /// The serial of its unit, where it is shown under another.
+    own: Option<UnitId>,
     /// Where on the axis it is (ns).
     now_ns: i64,
     /// What its raw messages are corrected by, and of which unit they are.
@@ -106,7 +108,8 @@ impl Plot {
                 let stream = UnitStream::new(loaded.unit.clone(), UnitSettings::default());
                 (loaded.installed(stream), loaded.unit)
             });
-            sources.push(Source { log, ahead: VecDeque::new(), over: false, now_ns: i64::MIN, corrects });
+            let ahead = VecDeque::new();
+            sources.push(Source { log, ahead, over: false, own: None, now_ns: i64::MIN, corrects });
         }
         let mut plot = Self {
             moved_ns: vec![0; sources.len()],
@@ -160,7 +163,11 @@ impl Plot {
     fn show(&mut self, log: usize, message: &Message) {
         let Some(serial) = message.topic.unit() else { return };
         let Some(source) = self.logs.get_mut(log) else { return };
-        let serial = source.log.shown_as.as_ref().unwrap_or(serial);
+        let own = serial;
+        let serial = source.log.shown_as.as_ref().unwrap_or(own);
+        if serial != own && source.own.is_none() {
+            source.own = Some(own.clone());
+        }
         if !self.units.contains_key(serial) {
             if self.units.len() == MAX_UNITS {
                 if self.left_out.len() < LOOK_AHEAD {
@@ -248,6 +255,7 @@ impl Plot {
         });
         PlotSummary {
             logs: self.logs.iter().map(|source| source.log.name.clone()).collect(),
+            own_serials: self.logs.iter().map(|source| source.own.as_ref().map(UnitId::to_string)).collect(),
             reading: self.logs.iter().map(|source| source.log.messages.report()).collect(),
             units: units.collect(),
             differences: differences.collect(),

@@ -79,6 +79,21 @@ fn two_logs_are_compared_tick_by_tick() {
 }
 
 #[test]
+fn units_of_different_serials_keep_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+    recording(&a, "ZLG-0001", 0..50, 9999, |_| 1e-6);
+    recording(&b, "MEMS-0001", 0..50, 9999, |_| 1e-6);
+    let second = PlotLog { shown_as: Some(UnitId::new("ZLG-0001").unwrap()), ..log(&b) };
+    let (page, summary) = plot(vec![log(&a), second], &PlotOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(summary.differences["ZLG-0001"].common_ticks, 50);
+    let html = page.to_html();
+    for words in ["Unit ZLG-0001 in a.mcap:", "Unit MEMS-0001 in b.mcap:", "Unit ZLG-0001 and MEMS-0001"] {
+        assert!(html.contains(words), "{words}");
+    }
+}
+
+#[test]
 fn a_log_without_ticks_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.mcap");
@@ -148,6 +163,7 @@ fn ten_million_ticks_make_a_bounded_page() {
     let taken = begun.elapsed();
     let summary = PlotSummary {
         logs: vec!["ten million".into()],
+        own_serials: Vec::new(),
         reading: Vec::new(),
         units: BTreeMap::new(),
         differences: BTreeMap::new(),

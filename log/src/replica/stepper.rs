@@ -103,7 +103,7 @@ pub struct Counted {
 pub struct Step {
     /// Number of the event, from 1.
     pub number: u64,
-    /// When it was received (ns since 1970-01-01 UTC; of a text log ns on the producer's clock).
+    /// When it was received (ns since 1970-01-01 UTC; of a text log ns on the producer's clock, counted from its beginning where that is before 0).
     pub received_ns: u64,
     /// What happened.
     pub what: What,
@@ -137,6 +137,8 @@ pub struct Stepper {
     /// Events received earlier are gone through without a word (ns since 1970-01-01 UTC).
     from_ns: u64,
     over: bool,
+    /// The last gyro tick that [`Stepper::go_to`] passed over.
+    passed: Option<u64>,
     counters: Counters,
     out: Vec<CorrectedTick>,
 }
@@ -156,6 +158,7 @@ impl Stepper {
             received_ns: 0,
             from_ns,
             over: false,
+            passed: None,
             counters,
             out: Vec::new(),
         })
@@ -177,12 +180,21 @@ impl Stepper {
         while let Some(done) = self.advance()? {
             if let Done::Frame { input: Input::Raw(RawStream::Gyro), frame, .. } = &done
                 && let Ok(batch) = codec::decode::<GyroBatch>(frame)
-                && batch.ticks.last().is_some_and(|last| last.sequence >= sequence)
+                && let Some(last) = batch.ticks.last()
             {
-                return Ok(Some(self.describe(&done)));
+                if last.sequence >= sequence {
+                    return Ok(Some(self.describe(&done)));
+                }
+                self.passed = Some(last.sequence);
             }
         }
         Ok(None)
+    }
+
+    /// The last gyro tick that [`Self::go_to`] passed over.
+    #[must_use]
+    pub fn passed(&self) -> Option<u64> {
+        self.passed
     }
 
     /// The replica.

@@ -220,6 +220,9 @@ impl FileReader {
             return Ok(());
         }
         self.report.skipped_rows += 1;
+        if self.repeats_header() {
+            return Ok(());
+        }
         self.bad_since += 1;
         if a_gap {
             // The rows behind it follow it, not what is before it.
@@ -227,6 +230,13 @@ impl FileReader {
         }
         self.skip(stamp);
         Ok(())
+    }
+
+    /// Whether the current line is the header again, which has no tick.
+    fn repeats_header(&self) -> bool {
+        let line = self.lines.line();
+        let names = self.cells.iter().map(|cell| line.get(cell.start..cell.end).unwrap_or_default());
+        !self.header.is_empty() && names.eq(self.header.iter().map(String::as_bytes))
     }
 
     /// Leaves a gap where the row had ticks.
@@ -257,7 +267,7 @@ impl FileReader {
     /// The step of time to a row, where it is longer than any tick can be and the mapping knows of no gaps.
     fn gap(&self, now: i64) -> Option<Reason> {
         let tick = self.mapping.time.tick?.as_ns();
-        let numbered_by_rows = self.columns.leading().is_some_and(|ticks| ticks.sequence.is_none());
+        let numbered_by_rows = self.columns.ticks.iter().flatten().any(|ticks| ticks.sequence.is_none());
         let step = Span::from_ns(now.saturating_sub(self.last_stamp?));
         let most = i64::try_from(LONGEST_STEP + self.bad_since).unwrap_or(i64::MAX);
         let gap = self.mapping.time.gap_after_ticks.is_none()

@@ -116,7 +116,12 @@ pub(super) fn resolve(mapping: &mut FileMapping, header: &[String]) -> Result<Co
     mapping.select.iter_mut().for_each(|select| trim(&mut select.value));
     mapping.status.iter_mut().flat_map(|status| &mut status.good).for_each(trim);
     let gyro = mapping.gyro.as_ref();
-    let ticks = [gyro.map(|gyro| TickCells::of(&gyro.ticks)), mapping.accel.as_ref().map(TickCells::of)];
+    let mut ticks = [gyro.map(|gyro| TickCells::of(&gyro.ticks)), mapping.accel.as_ref().map(TickCells::of)];
+    // The number of gyros that are in every row is the row's, and that of accelerometers that are in every row.
+    let [of_gyros, of_accels] = ticks.each_mut().map(|ticks| ticks.as_mut().filter(|it| !it.may_be_empty));
+    if let (Some(gyros), Some(accels)) = (of_gyros, of_accels) {
+        accels.sequence = accels.sequence.or(gyros.sequence);
+    }
     let switch = gyro.and_then(|gyro| gyro.switch.as_ref());
     let by_mode = switch.is_some_and(|switch| switch.column.is_none());
     let columns = Columns { ticks, by_mode, since: vec![0; mapping.temperatures.len()] };

@@ -284,6 +284,24 @@ fn a_gap_is_read_where_the_mapping_or_the_log_knows_of_it() {
 }
 
 #[test]
+fn accelerometers_in_numbered_rows_have_the_number_of_the_row() {
+    let text = "version = 1\n[[file]]\ndelimiter = \"comma\"\n[file.time]\ncolumn = 1\nunit = \"ms\"\ntick_ms = 10\n\
+                [file.gyro]\noutput = \"mean\"\nsequence_column = 2\nsensors = [{ column = 3, unit = \"rad_per_s\" }]\n\
+                [file.accel]\noutput = \"mean\"\nsensors = [{ column = 4, unit = \"m_per_s2\" }]\n";
+    let mut mapping = Mapping::parse(text, "m.toml").unwrap();
+    let rows = b"10,5,1,9\n20,6,2,9\n2020,206,3,9\n2031,207,4,9\n9000,0,5,9\n";
+    let (events, _) = read(&mapping, rows);
+    let accel = events.iter().filter_map(|event| match event {
+        LogEvent::Accel { tick, .. } => Some((tick.sequence, tick.duration.as_ns() / 1_000_000)),
+        _ => None,
+    });
+    assert!(accel.eq([(5, 10), (6, 10), (206, 10), (207, 11), (0, 10)]), "{events:?}");
+    // Of those that are in some rows it is not: nobody knows of their gaps.
+    mapping.files[0].accel.as_mut().unwrap().may_be_empty = true;
+    assert!(matches!(error(&mapping, rows).reason, Reason::Gap { ticks: 200, .. }));
+}
+
+#[test]
 fn bad_rows_can_be_passed_over_and_become_gaps() {
     let layout = "delimiter = \"comma\"\non_bad_row = \"skip\"";
     let bytes = b"10,1,7,20\n20,x,7,20\n30,3,7,20\n?,4,7,20\n50,5,7,20\n45,6,7,20\n60,7,7,20\n7";
@@ -293,6 +311,12 @@ fn bad_rows_can_be_passed_over_and_become_gaps() {
     assert_eq!(gyro(&events), expected);
     assert_eq!((report.rows, report.skipped_rows, report.lost_data()), (4, 4, true));
     assert!(report.first_skipped.is_some_and(|first| first.contains(":2:4: column 2")));
+    // A header that is repeated is counted, and no gap.
+    let (events, report) = read(
+        &mapping(&format!("{layout}\nheader = true"), STAMPS),
+        b"t,x,y,T\n10,1,7,20\nt, x,y,T\n21,2,7,20\n",
+    );
+    assert_eq!((gyro(&events), report.skipped_rows), (vec![(0, 10, 10, 1.0), (1, 21, 11, 2.0)], 1));
 }
 
 #[test]
@@ -470,7 +494,7 @@ fn a_part_of_a_log() {
     let file = stored(rows.as_bytes());
     let reader =
         LogReader::open(&mapping("delimiter = \"comma\"", STAMPS), &[file.path().to_path_buf()]).unwrap();
-    let span = |ms| isotherm_correction::units::Span::from_ms(ms);
+    let span = |ms| Span::from_ms(ms);
     let part = Part { start: span(100), end: Some(span(300)), ..Part::default() };
     let part: Vec<_> = reader.within(&part).map(Result::unwrap).collect();
     let ends: Vec<_> = gyro(&part).into_iter().map(|(_, end, ..)| end).collect();

@@ -67,7 +67,11 @@ pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
     if let Err(source) = out.flush() {
         return ended(source);
     }
-    Ok(Exit::of_loss(unread || messages.report().lost_data()))
+    let lost = messages.report().lost_data();
+    if printed == 0 && args.limit != Some(0) && !lost {
+        return Err(Error::Nothing("printed", "message"));
+    }
+    Ok(Exit::of_loss(unread || lost))
 }
 
 /// A reader that has gone away, as `head` does, has what it wanted.

@@ -266,7 +266,7 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     // What `--loss` withholds was there.
     let found = |unit: &UnitReport| unit.counts.messages_sent + unit.counts.messages_withheld > 0;
     if !lost && !play.stopped && !play.units.iter().any(found) {
-        return Err(Error::Nothing("played"));
+        return Err(Error::Nothing("played", "raw message"));
     }
     Ok(Exit::of_loss(lost))
 }

@@ -177,8 +177,9 @@ fn human(report: &Report<'_>) -> String {
     let Report { page, bytes, summary } = report;
     let mut text = format!("{page}: {} kB\n", bytes / 1000);
     for (unit, logs) in &summary.units {
-        for (log, shown) in summary.logs.iter().zip(logs) {
+        for (index, (log, shown)) in summary.logs.iter().zip(logs).enumerate() {
             let Some(shown) = shown else { continue };
+            let unit = summary.serial_in(index, unit);
             let _ = writeln!(
                 text,
                 "unit {unit} in {log}: {} raw ticks, {} corrected, {} announced as missing, {} marks",
@@ -196,7 +197,8 @@ fn human(report: &Report<'_>) -> String {
     for (unit, difference) in &summary.differences {
         let _ = writeln!(
             text,
-            "unit {unit}: {} corrected ticks in both, {} of them differ; {} only in the first, {} only in the second",
+            "unit {}: {} corrected ticks in both, {} of them differ; {} only in the first, {} only in the second",
+            summary.serials(unit),
             difference.common_ticks,
             difference.differing_ticks,
             difference.only_first,

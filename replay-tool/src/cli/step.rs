@@ -116,6 +116,12 @@ fn list(stepper: &mut Stepper, args: &StepArgs) -> Result<(), Error> {
         Some(sequence) => stepper.go_to(sequence)?,
         None => stepper.next_step()?,
     };
+    if next.is_none() {
+        return Err(match args.from.zip(stepper.passed()) {
+            Some((from, last)) => Error::EndsBefore { last, from },
+            None => Error::Nothing("stepped through", "raw message"),
+        });
+    }
     let mut left = args.count.unwrap_or(u64::MAX);
     while let Some(step) = next.filter(|_| left > 0) {
         if args.json {

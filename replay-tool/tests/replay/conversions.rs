@@ -45,6 +45,26 @@ fn convert(folder: &Path, args: &[&str], code: i32) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap()
 }
 
+#[test]
+fn a_part_of_a_recording_is_the_same_whether_or_not_its_log_begins_before_time_0() {
+    let [before, after] = [-2005, 3005].map(|begin_ms| {
+        let folder = tempfile::tempdir().unwrap();
+        let row = |row: i32| format!("{},1.5,2.5,{row}\n", row * 10 + begin_ms);
+        let front = "t [ms],gx [deg/s],gy [deg/s],gz [deg/s]\n".to_owned();
+        fs::write(folder.path().join("log.csv"), front + &(0..400).map(row).collect::<String>()).unwrap();
+        check(&replay(folder.path(), &["import", "log.csv", "--no-plot"]), 0);
+        convert(folder.path(), &["log.csv", "--unit", "U-1", "--batch", "1", "--out", "log.mcap"], 0);
+        [["--start", "0.5", "--end", "1.0"], ["--start", "1.9", "--end", "2.5"]].map(|window| {
+            let lines = stdout(&replay(folder.path(), &[&["cat", "log.mcap"][..], &window].concat()));
+            let message = |line: &str| serde_json::from_str::<Value>(line).unwrap()["message"].take();
+            let ticks = lines.lines().map(|line| message(line)["ticks"][0]["sequence"].as_u64().unwrap());
+            ticks.collect::<Vec<_>>()
+        })
+    });
+    assert_eq!(before, after);
+    assert_eq!((before[0].len(), before[1].first()), (51, Some(&190)));
+}
+
 /// A text log to a recording, back to text, and once more to a recording: the same ticks, the same messages.
 fn there_and_back(mapping: &Path, log: &Path) {
     let folder = tempfile::tempdir().unwrap();

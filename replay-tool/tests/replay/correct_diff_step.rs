@@ -256,6 +256,9 @@ fn what_does_not_go_together_is_refused() {
         &["diff", "raw.mcap", "raw.mcap"],
         &["step", "raw.mcap"],
         &["step", "raw.mcap", "--calibration", "other.toml"],
+        &["step", "mems.csv", "--calibration", "mems.toml", "--from", "2000"],
+        &["step", "mems.csv", "--calibration", "mems.toml", "--start", "100"],
+        &["cat", "mems.csv", "--topic", "imu/NOPE/**"],
     ];
     insta::assert_snapshot!(refused.map(|args| told(folder.path(), args)).concat());
     for name in ["none.csv", "none.mcap", "none.html"] {

@@ -21,7 +21,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use isotherm_log::mapping::{Column, Encoding, Mapping};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::common::{self, check, replay, stdout, told};
 use super::real_logs::data;
@@ -460,15 +460,22 @@ fn what_no_log_says_is_asked_for_with_its_option() {
             )
         }),
     );
+    let stamped = |row: usize| format!("{},1.5,2.5,{:.3}", row * 10, noise(row, 21));
+    let unstamped = |row| if row % 2 == 0 { stamped(row) } else { format!("none,1.5,2.5,{row:.3}") };
+    write("none.csv", &log("time [ms],gx [deg/s],gy [deg/s],gz [deg/s]\n", unstamped));
+    write("one.csv", "time [ms],gx [deg/s],gy [deg/s],gz [deg/s]\n0,1.5,2.5,3.5\n");
+    let header_late = |row| if row == 200 { "time,gx,gy,gz".to_owned() } else { stamped(row) };
+    write("late.csv", &log("", header_late));
     write("prose.txt", "no figures\nin here at all\n");
     write(
         "novatel.txt",
         "%RAWIMUSA,1105,425384.180;1105,425384.156166800,111607,43088060,430312,-3033352,-132863,186983,823*5aa97065\n",
     );
     let mut told =
-        ["bare.txt", "left.csv", "units.csv", "steps.csv", "twice.csv", "prose.txt", "novatel.txt"]
+        "bare.txt left.csv units.csv steps.csv twice.csv none.csv one.csv late.csv prose.txt novatel.txt"
+            .split(' ')
             .map(|log| told(folder.path(), &["import", log]))
-            .concat();
+            .collect::<String>();
     // With the answer it goes on; what is there is not written over.
     let columns = ["import", "bare.txt", "--columns", "time [ms],gx [deg/s],gy [deg/s],gz [deg/s],ax,ay,az"];
     check(&replay(folder.path(), &columns), 0);
@@ -481,23 +488,31 @@ fn what_no_log_says_is_asked_for_with_its_option() {
 
 #[test]
 fn rows_that_do_not_fit_are_passed_over_and_counted() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = log("time_ms,gx [dps],gy [dps],gz [dps]\n", |row| {
-        if row == 250 {
-            "2500,1.0,ERR,0.1".to_owned()
-        } else if row == 300 {
-            "3000,1.0,,0.1".to_owned()
-        } else {
-            format!("{},1.0,2.0,{:.3}", row * 10, noise(row, 15))
-        }
-    });
-    std::fs::write(folder.path().join("holes.csv"), text).unwrap();
-    let output = replay(folder.path(), &["import", "holes.csv"]);
-    check(&output, 3);
-    // A reading that is missing now and then is no rate of its own.
-    let mapping = std::fs::read_to_string(folder.path().join("holes.mapping.toml")).unwrap();
-    assert!(!mapping.contains("may_be_empty"), "{mapping}");
-    assert!(stdout(&output).contains("holes.csv:252:10"), "{}", stdout(&output));
+    let header = "time_ms,gx [dps],gy [dps],gz [dps]";
+    // Two rows become these; the place of the first that is passed over, and how many are.
+    for (first, second, place, skipped) in [
+        // A reading that is missing now and then is no rate of its own.
+        ("2500,1.0,ERR,0.1", "3000,1.0,,0.1", "holes.csv:252:10", 2),
+        ("2500,1.0", header, "holes.csv:252:9", 2),
+        (header, "Total,3000", "holes.csv:252:1", 2),
+        ("N/A,1.0,2.0,0.1", "3000,1.0,2.0,0.5", "holes.csv:252:1", 1),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = log(&format!("{header}\n"), |row| match row {
+            250 => first.to_owned(),
+            300 => second.to_owned(),
+            _ => format!("{},1.0,2.0,{:.3}", row * 10, noise(row, 15)),
+        });
+        std::fs::write(folder.path().join("holes.csv"), text).unwrap();
+        let output = replay(folder.path(), &["import", "holes.csv", "--no-plot", "--json"]);
+        check(&output, 3);
+        let report: Value = serde_json::from_str(&stdout(&output)).unwrap();
+        let reading = &report["info"]["reading"];
+        assert_eq!((&reading["rows"], &reading["skipped_rows"]), (&json!(ROWS - skipped), &json!(skipped)));
+        assert!(reading["first_skipped"].as_str().unwrap().starts_with(place), "{reading}");
+        let mapping = std::fs::read_to_string(folder.path().join("holes.mapping.toml")).unwrap();
+        assert!(!mapping.contains("may_be_empty") && mapping.contains("column = \"time_ms\""), "{mapping}");
+    }
 }
 
 /// Imports a real log into a folder of its own.

@@ -76,6 +76,12 @@ fn a_gap_is_the_larger_of_what_numbers_and_stamps_say() {
     assert_eq!(run(6, 8), (8, 3, 1));
     // One of another payload had the number between.
     assert_eq!(run(8, 9), (10, 1, 1));
+    // One that is refused for its stamp came: it is no gap, unless the next stamp says so.
+    for (refused, next, tick, expected) in [(9, 10, 10, (11, 0, 1)), (11, 12, 12, (13, 1, 1))] {
+        assert_eq!(take(&mut feeder, 1, refused, 9).unwrap_err().kind(), "stamp_not_newer");
+        let ticks = take(&mut feeder, 1, next, tick).unwrap();
+        assert_eq!((ticks.gyro.sequence, ticks.missing, ticks.gyro.duration.as_ns() / TICK_NS), expected);
+    }
 }
 
 #[test]

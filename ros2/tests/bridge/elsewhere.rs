@@ -50,3 +50,21 @@ async fn a_service_elsewhere_and_a_zenoh_configuration_of_ones_own() {
     );
     service.stop().await;
 }
+
+#[test]
+fn a_service_that_is_not_there_is_reported_once() {
+    let folder = tempfile::tempdir().unwrap();
+    prepare(folder.path());
+    // A port on which nothing listens.
+    let service = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let output = Command::new("timeout")
+        .args(["--signal=TERM", "2", env!("CARGO_BIN_EXE_isotherm-ros"), "bridge", "ros2.toml"])
+        .args(["--listen", "127.0.0.1:0", "--service", &service])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let log = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(log.matches("trying again").count(), 1, "{log}");
+    // Zenoh's own words for the first trial: one for the endpoint, one for all of them.
+    assert_eq!(log.matches("Unable to connect").count(), 2, "{log}");
+}

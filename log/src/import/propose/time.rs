@@ -38,11 +38,7 @@ impl File<'_> {
                 found = Some((index, unit, unknown, column));
                 break;
             }
-            let back = self.figures.columns.get(index).and_then(|column| column.back.as_ref());
-            let at = back.map_or_else(String::new, |(line, before, this)| {
-                format!(": {}:{line} has {this:?} after {before:?}; correct the row to use it", self.name)
-            });
-            let words = format!("{} does not always grow{at}", self.listed(&[index]));
+            let words = self.why_unusable(index);
             proposal.notes.push(format!("time: {words}: not used"));
             why.get_or_insert(words);
         }
@@ -58,6 +54,11 @@ impl File<'_> {
             proposal.notes.push(format!("time: {rate} rows per second, as {by}"));
             return Time { tick_ns: 1e9 / rate, ..Time::default() };
         };
+        if let Some((line, cell)) = &column.first_other {
+            let (name, of) = (self.name, self.listed(&[index]));
+            let note = format!("time: {of} in {name}:{line} is {cell:?}, no time: such rows are passed over");
+            proposal.notes.push(note);
+        }
         let step = column.steps.usual;
         let dated = column.stamp_unit().and_then(|unit| {
             let (_, word) = STAMP_UNITS.iter().find(|(stamps, _)| *stamps == unit)?;
@@ -109,6 +110,23 @@ impl File<'_> {
             unit,
             tick_ns,
             gap_after_ticks: gap_after_ticks.map(|ticks| (ticks * 100.0).round() / 100.0),
+        }
+    }
+
+    /// Why a column cannot be the time of the rows.
+    fn why_unusable(self, index: usize) -> String {
+        let (file, name) = (self.name, self.listed(&[index]));
+        let Some(column) = self.figures.columns.get(index) else { return name };
+        match (&column.back, &column.first_other) {
+            (Some((line, before, this)), _) => format!(
+                "{name} does not always grow: {file}:{line} has {this:?} after {before:?}; correct the row to use it"
+            ),
+            (None, Some((line, cell))) => format!(
+                "{name} is no time in {} rows: {file}:{line} has {cell:?}; correct them to use it",
+                column.other
+            ),
+            _ if column.numbers == 1 => format!("{name} has one row only, which shows no period"),
+            _ => format!("{name} is empty in {} rows", column.empty),
         }
     }
 

@@ -7,8 +7,9 @@ use crate::plot::PlotSummary;
 pub(super) fn results(summary: &PlotSummary) -> Vec<(String, String)> {
     let mut results = Vec::new();
     for (unit, logs) in &summary.units {
-        for (name, log) in summary.logs.iter().zip(logs) {
+        for (index, (name, log)) in summary.logs.iter().zip(logs).enumerate() {
             let Some(log) = log else { continue };
+            let unit = summary.serial_in(index, unit);
             let of = if logs.iter().flatten().count() > 1 { format!(" in {name}") } else { String::new() };
             let (raw, corrected) = (log.raw_ticks, log.corrected_ticks);
             let mut more = vec![format!("{raw} raw gyro ticks")];
@@ -35,7 +36,8 @@ pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
     }
     for (unit, difference) in &summary.differences {
         words.push(format!(
-            "Unit {unit}: {} corrected ticks are in both logs, {} of them differ; {} are in A only, {} in B only.",
+            "Unit {}: {} corrected ticks are in both logs, {} of them differ; {} are in A only, {} in B only.",
+            summary.serials(unit),
             difference.common_ticks, difference.differing_ticks, difference.only_first, difference.only_second
         ));
     }
@@ -49,6 +51,7 @@ pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
         words.push(format!("{} further units are left out: choose with --unit.", summary.units_left_out));
     }
     for (unit, logs) in &summary.units {
+        let unit = summary.serials(unit);
         let left_out: u64 = logs.iter().flatten().map(|log| log.marks_left_out).sum();
         if left_out > 0 {
             words.push(format!(

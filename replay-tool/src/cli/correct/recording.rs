@@ -99,7 +99,7 @@ fn make(
     let (units, log) = result?;
     let is_empty = units.iter().all(|unit| unit.summary.ticks == 0 && !unit.lost_data());
     if is_empty && matches!(files, LogFiles::Text { .. }) && !log.lost_data() {
-        return Err(Error::Nothing("corrected"));
+        return Err(Error::Nothing("corrected", "raw message"));
     }
     sink.finish(&args.log.log)?;
     let report = Report::new(&units, &log);

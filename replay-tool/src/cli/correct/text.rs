@@ -87,7 +87,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     stream.flush();
     let ticks_in = stream.unit().counters().gyro_ticks_in;
     if ticks_in == ticks_before && !events.report().lost_data() {
-        return Err(Error::Nothing("corrected"));
+        return Err(Error::Nothing("corrected", "raw message"));
     }
     sink.write(take(&mut stream, &mut sums, form))?;
     sink.finish(&inputs)?;
