@@ -136,6 +136,14 @@ fn what_cannot_be_read_is_a_failure_and_a_wrong_call_is_usage() {
     let output = check(&["--trusted-keys", missing.to_str().unwrap(), &config("service.toml")]);
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert_eq!(check(&[]).status.code(), Some(2));
+    let pipe = folder.path().join("pipe.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [folder.path(), &pipe] {
+        let output = check(&[path.to_str().unwrap()]);
+        let told = lines(&output.stderr);
+        assert!(output.status.code() == Some(1) && told.len() == 1, "{told:?}");
+        assert!(told[0].starts_with(pipe.to_str().unwrap()) && told[0].contains("pipe"), "{told:?}");
+    }
 }
 
 #[test]

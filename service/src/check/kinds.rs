@@ -25,10 +25,15 @@ const NO_KEYS: &str = "has no keys: state its kind with --kind";
 /// Longest message of the JSON5 parser that is passed on; long enough for Zenoh's lists of known keys.
 const MAX_MESSAGE_CHARS: usize = 1000;
 
-/// Checks one file; with the keys that are trusted, if who signed it is to be verified.
-pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<&TrustedKeys>) -> Finding {
+/// Checks what was read of one file; with the keys that are trusted, if who signed it is to be verified.
+pub(super) fn check_file(
+    path: &Path,
+    read: std::io::Result<Vec<u8>>,
+    forced: Option<FileKind>,
+    trusted: Option<&TrustedKeys>,
+) -> Finding {
     let file = path.display().to_string();
-    let bytes = match read_bounded(path) {
+    let bytes = match read {
         Ok(bytes) => bytes,
         Err(error) => return Finding::unreadable(path, error.to_string()),
     };
