@@ -12,8 +12,8 @@ use isotherm_protocol::signature::TrustedKeys;
 use super::signer::{Signer, signer};
 use super::{FileKind, Finding, Summary};
 use crate::config::Settings;
-use crate::signing::read_trusted_keys;
-use isotherm_document::file::{read_bounded, text};
+use crate::signing::doubts;
+use isotherm_document::file::text;
 use isotherm_document::unplaced;
 
 /// Top-level keys that only a calibration document has.
@@ -158,8 +158,7 @@ fn check_service(text: &str, path: &Path) -> Checked {
         return Err(reader.into_problems().unwrap_or_default());
     }
     // What the service would say of its keys at the start.
-    let keys = settings.swap.trusted_keys.as_deref().map(read_trusted_keys).transpose()?;
-    let warnings = keys.map_or_else(Vec::new, |(_, warnings)| warnings);
+    let warnings = doubts(&settings.swap)?;
     let calibrations = settings
         .calibrations
         .as_deref()
