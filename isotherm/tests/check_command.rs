@@ -94,6 +94,21 @@ fn a_folder_of_calibrations_that_is_not_there_is_a_problem_with_state_or_without
 }
 
 #[test]
+fn a_service_with_a_configuration_or_a_state_folder_that_is_none_is_not_started_again() {
+    let folder = TempDir::new().unwrap();
+    let file = write(&folder, "k.toml", "");
+    let missing = folder.path().join("none.toml").display().to_string();
+    for arguments in [["--config", &missing], ["--state", &file]] {
+        let serve = Command::new(env!("CARGO_BIN_EXE_isotherm"))
+            .args(["serve", "--listen", "127.0.0.1:0"])
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(serve.status.code(), Some(78), "{}", String::from_utf8_lossy(&serve.stderr));
+    }
+}
+
+#[test]
 fn only_one_instance_of_a_pair_connects_to_the_other() {
     let folder = TempDir::new().unwrap();
     write(&folder, "zenoh.json5", "{ connect: { endpoints: ['tcp/127.0.0.1:7'] } }");

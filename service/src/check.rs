@@ -120,7 +120,7 @@ pub fn run(args: &CheckArgs) -> Exit {
     if let Some(path) = &args.trusted_keys
         && let Err(source) = std::fs::read_dir(path)
     {
-        return ServiceError::Read { path: path.clone(), source }.tell();
+        return failed(ServiceError::Read { path: path.clone(), source }, Exit::Failed);
     }
     let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
         Ok(trusted) => trusted,
