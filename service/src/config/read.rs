@@ -58,7 +58,8 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     session(r, &settings.zenoh.session);
     let PreLaunchSettings { duration, limits, .. } = &settings.pre_launch;
     if limits.time_per_mode > *duration {
-        let (least_s, duration_s) = (limits.time_per_mode.as_s(), duration.as_s());
+        let [least_s, duration_s] =
+            [limits.time_per_mode, *duration].map(|span| (span.as_s() * 1e3).round() / 1e3);
         let must_be = format!("is {least_s}, must be at most pre_launch.duration_s, {duration_s}");
         r.report("pre_launch.min_time_per_mode_s", must_be);
     }
