@@ -2,23 +2,47 @@
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, ErrorKind, Read, Write};
-use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, PermissionsExt, fchown};
 use std::path::{Path, PathBuf, absolute};
+use std::thread;
+use std::time::{Duration, Instant};
 
+use rustix::fs::OFlags;
 use tempfile::{Builder, NamedTempFile};
 
 use crate::looks::doubt;
 use crate::problem::{Lines, Problem};
 use crate::text::{MAX_BYTES, unplaced};
 
-/// Reads a file up to one byte more than a text may have, so that a wrong file cannot fill the memory.
+/// How long somebody who writes to a pipe is waited for, and how often a pipe is looked at.
+const PIPE_LIMIT: Duration = Duration::from_secs(1);
+const PIPE_INTERVAL: Duration = Duration::from_millis(10);
+
+/// Reads a file up to one byte more than a text may have, so that a wrong file cannot fill the memory. A pipe is read to its end, however
+/// long its writer takes.
 ///
 /// # Errors
-/// That of the file.
+/// That of the file; a pipe that nobody writes to.
 pub fn read_bounded(file: &Path) -> io::Result<Vec<u8>> {
+    // Otherwise opening a pipe waits for its writer for ever.
+    let no_wait = OFlags::NONBLOCK.bits().cast_signed();
+    let opened = File::options().read(true).custom_flags(no_wait).open(file)?;
+    let mut may_lack_writer = opened.metadata()?.file_type().is_fifo();
+    let deadline = Instant::now() + PIPE_LIMIT;
     let mut bytes = Vec::new();
-    File::open(file)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
+    loop {
+        let room = MAX_BYTES + 1 - bytes.len();
+        match (&opened).take(room as u64).read_to_end(&mut bytes) {
+            Ok(0) if may_lack_writer && Instant::now() >= deadline => {
+                return Err(io::Error::other("it is a pipe that nobody writes to"));
+            }
+            Ok(0) if may_lack_writer => {}
+            Ok(_) => return Ok(bytes),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => may_lack_writer = false,
+            Err(error) => return Err(error),
+        }
+        thread::sleep(PIPE_INTERVAL);
+    }
 }
 
 /// Refuses a pipe or a device under the name of a file: to open or read it might wait for ever. What is not there is no problem here.
@@ -148,6 +172,7 @@ fn sync(folder: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use std::os::unix::fs::symlink;
+    use std::process::Command;
 
     use tempfile::TempDir;
 
@@ -163,6 +188,18 @@ mod tests {
         );
         let zero = read_bounded(Path::new("/dev/zero")).unwrap();
         assert_eq!(zero.len(), MAX_BYTES + 1);
+    }
+
+    #[test]
+    fn a_pipe_is_read_as_its_writer_writes_and_refused_without_one() {
+        let folder = TempDir::new().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert_eq!(read_bounded(&pipe).unwrap_err().to_string(), "it is a pipe that nobody writes to");
+        let slow = "exec 3>\"$0\"; sleep 1.2; echo one >&3; sleep 0.2; echo two >&3";
+        let mut writer = Command::new("sh").args(["-c", slow]).arg(&pipe).spawn().unwrap();
+        assert_eq!(read_bounded(&pipe).unwrap(), b"one\ntwo\n");
+        assert!(writer.wait().unwrap().success());
     }
 
     fn mode(path: &Path) -> u32 {
@@ -197,7 +234,7 @@ mod tests {
         let file = folder.path().join("file");
         let texts = ["a".repeat(100_000), "b".repeat(200_000)];
         replace(&file, texts[0].as_bytes()).unwrap();
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             let writer = scope.spawn(|| {
                 for round in 0..50 {
                     replace(&file, texts[round % 2].as_bytes()).unwrap();

@@ -94,6 +94,21 @@ fn a_folder_of_calibrations_that_is_not_there_is_a_problem_with_state_or_without
 }
 
 #[test]
+fn a_service_with_a_configuration_or_a_state_folder_that_is_none_is_not_started_again() {
+    let folder = TempDir::new().unwrap();
+    let file = write(&folder, "k.toml", "");
+    let missing = folder.path().join("none.toml").display().to_string();
+    for arguments in [["--config", &missing], ["--state", &file]] {
+        let serve = Command::new(env!("CARGO_BIN_EXE_isotherm"))
+            .args(["serve", "--listen", "127.0.0.1:0"])
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(serve.status.code(), Some(78), "{}", String::from_utf8_lossy(&serve.stderr));
+    }
+}
+
+#[test]
 fn only_one_instance_of_a_pair_connects_to_the_other() {
     let folder = TempDir::new().unwrap();
     write(&folder, "zenoh.json5", "{ connect: { endpoints: ['tcp/127.0.0.1:7'] } }");
@@ -136,6 +151,14 @@ fn what_cannot_be_read_is_a_failure_and_a_wrong_call_is_usage() {
     let output = check(&["--trusted-keys", missing.to_str().unwrap(), &config("service.toml")]);
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert_eq!(check(&[]).status.code(), Some(2));
+    let pipe = folder.path().join("pipe.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [folder.path(), &pipe] {
+        let output = check(&[path.to_str().unwrap()]);
+        let told = lines(&output.stderr);
+        assert!(output.status.code() == Some(1) && told.len() == 1, "{told:?}");
+        assert!(told[0].starts_with(pipe.to_str().unwrap()) && told[0].contains("pipe"), "{told:?}");
+    }
 }
 
 #[test]

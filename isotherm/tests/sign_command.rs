@@ -343,7 +343,7 @@ fn every_bad_file_among_the_trusted_keys_is_named() {
 }
 
 #[test]
-fn a_private_key_among_the_trusted_ones_is_told_by_check_and_at_the_start() {
+fn what_is_doubtful_about_the_trusted_keys_is_told_by_check_and_at_the_start() {
     let place = Place::with_signer("bench");
     std::fs::copy(place.path("bench.key"), place.path("trusted").join("bench.pem")).unwrap();
     std::fs::create_dir(place.path("units")).unwrap();
@@ -372,6 +372,18 @@ fn a_private_key_among_the_trusted_ones_is_told_by_check_and_at_the_start() {
     let output = place.run(&["serve", "--config", "service.toml", "--listen", "tcp/127.0.0.1:0"]);
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(stderr.contains("other.pub:1:1: "), "{stderr}");
+
+    // Without any of them, though one is asked for, the service would refuse every document.
+    for key in ["bench", "other"] {
+        std::fs::remove_file(place.path(&format!("trusted/{key}.pub"))).unwrap();
+    }
+    place.write("service.toml", &(config.to_owned() + "require_signature = true\n"));
+    for command in
+        [&["check", "service.toml"][..], &["serve", "--config", "service.toml", "--listen", "127.0.0.1:0"]]
+    {
+        let stderr = String::from_utf8_lossy(&place.run(command).stderr).into_owned();
+        assert!(stderr.contains("trusted:1:1: has no *.pub"), "{stderr}");
+    }
 }
 
 #[test]

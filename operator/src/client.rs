@@ -130,7 +130,7 @@ impl Client {
             // imu/{unit}/…
             let unit = key.split('/').nth(1).unwrap_or_default();
             let instances = self.pairs().await.unwrap_or_default();
-            return Err(ConsoleError::unanswered(unit, key, &self.tried, &instances));
+            return Err(ConsoleError::unanswered(unit, key, payload.is_some(), &self.tried, &instances));
         };
         String::from_utf8(bytes).map_err(unread(key))
     }

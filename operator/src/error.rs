@@ -49,14 +49,20 @@ pub enum ConsoleError {
     },
     /// A question ended before its time without an answer.
     #[error(
-        "{tried} did not answer on {key}: the connection broke, or no service there publishes the unit. An order may \
-         have been carried out: check `isotherm status` and `isotherm history`, then try again"
+        "{tried} did not answer on {key}: the connection broke, or no service there publishes the unit{}",
+        if *is_order {
+            ". An order may have been carried out: check `isotherm status` and `isotherm history`, then try again"
+        } else {
+            "; try again"
+        }
     )]
     Ended {
         /// The key.
         key: String,
         /// Where the service is.
         tried: String,
+        /// Whether something was to be done.
+        is_order: bool,
     },
     /// Only an instance that does not speak for the unit was asked.
     #[error(
@@ -128,20 +134,26 @@ pub enum ConsoleError {
 
 impl ConsoleError {
     /// Of a unit of which no answer came: another instance speaks for it, or the answer was lost on the way.
-    pub(super) fn unanswered(unit: &str, key: &str, tried: &str, instances: &[PairReport]) -> Self {
+    pub(super) fn unanswered(
+        unit: &str,
+        key: &str,
+        is_order: bool,
+        tried: &str,
+        instances: &[PairReport],
+    ) -> Self {
         let silent = |report: &PairReport| {
             report.role(unit).filter(|role| *role != Role::Speaking)?;
             let (name, unit) = (report.member.name.clone(), unit.to_owned());
             Some(Self::Standby { name, unit, elsewhere: report.elsewhere()? })
         };
-        let ended = || Self::Ended { key: key.to_owned(), tried: tried.to_owned() };
+        let ended = || Self::Ended { key: key.to_owned(), tried: tried.to_owned(), is_order };
         instances.iter().find_map(silent).unwrap_or_else(ended)
     }
 
     /// Of a unit whose status is not among those that came: nobody knows it, or no answer came of it.
     pub(super) fn unlisted(unit: &str, tried: &str, statuses: &[Status], instances: &[PairReport]) -> Self {
         if instances.is_empty() || instances.iter().any(|report| report.role(unit).is_some()) {
-            return Self::unanswered(unit, key::ALL_STATUS, tried, instances);
+            return Self::unanswered(unit, key::ALL_STATUS, false, tried, instances);
         }
         let units = statuses.iter().map(|status| status.unit.clone()).collect();
         Self::NoUnit { unit: unit.to_owned(), units }

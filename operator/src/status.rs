@@ -83,7 +83,10 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
     let (units, services, instances) = tokio::join!(client.statuses(), client.services(), client.pairs());
     let tried = client.tried().to_owned();
     client.close().await;
-    let mut report = Report { units: units?, services: or_none(services)?, instances: or_none(instances)? };
+    let units = units?;
+    // Without units and services there is nothing to show: why no service answers.
+    let services = if units.is_empty() { services? } else { or_none(services)? };
+    let mut report = Report { units, services, instances: or_none(instances)? };
     select(&mut report, &args.units, &tried)?;
     if args.json {
         return Ok(print(&report.to_json(), Exit::Ok));

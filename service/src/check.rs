@@ -7,7 +7,8 @@ mod signer;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use isotherm_cli::{Exit, print, say, say_warning};
+use isotherm_cli::{Exit, failed, print, say, say_warning};
+use isotherm_document::file::read_bounded;
 use isotherm_document::unplaced;
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
@@ -17,7 +18,7 @@ pub use signer::Signer;
 
 use crate::ServiceError;
 use crate::control::NO_OVERLAYS;
-use crate::control::watch::files_in;
+use crate::control::watch::{files_in, read_document};
 use crate::signing::read_trusted_keys;
 
 /// Arguments of `check`.
@@ -119,7 +120,7 @@ pub fn run(args: &CheckArgs) -> Exit {
     if let Some(path) = &args.trusted_keys
         && let Err(source) = std::fs::read_dir(path)
     {
-        return ServiceError::Read { path: path.clone(), source }.tell();
+        return failed(ServiceError::Read { path: path.clone(), source }, Exit::Failed);
     }
     let trusted = match args.trusted_keys.as_deref().map(read_trusted_keys).transpose() {
         Ok(trusted) => trusted,
@@ -130,10 +131,13 @@ pub fn run(args: &CheckArgs) -> Exit {
     };
     say_problems(&[], trusted.as_ref().map_or(&[][..], |(_, warnings)| warnings));
     let trusted = trusted.as_ref().map(|(trusted, _)| trusted);
-    let check = |file: &PathBuf| kinds::check_file(file, args.kind, trusted);
+    let check = |file: &PathBuf, read| kinds::check_file(file, read, args.kind, trusted);
     let check_all = |path: &PathBuf| match files_of(path) {
-        Ok(files) if path.is_dir() => files.iter().map(check).map(in_folder).collect(),
-        Ok(files) => files.iter().map(check).collect(),
+        // As a service reads them: a pipe there is none of its documents.
+        Ok(files) if path.is_dir() => {
+            files.iter().map(|file| in_folder(check(file, read_document(file)))).collect()
+        }
+        Ok(files) => files.iter().map(|file| check(file, read_bounded(file))).collect(),
         Err(words) => vec![Finding::unreadable(path, words)],
     };
     let mut findings: Vec<_> = args.files.iter().flat_map(check_all).collect();

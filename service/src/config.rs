@@ -60,8 +60,8 @@ pub struct Settings {
     /// Most units at a time; further ones are refused.
     #[schemars(with = "u32", range(min = 1, max = 16_384))]
     pub max_units: usize,
-    /// How long a unit's gyro topic must be silent before what it holds back is flushed; at least twice the pairing window and four
-    /// times the usual distance of its messages.
+    /// How long a unit's gyro topic must be silent before what it holds back is flushed; twice the pairing window or four times the usual
+    /// distance of its messages, where that is longer.
     #[serde(rename = "tail_flush_ms", with = "As::<Ms>")]
     #[schemars(with = "u32", range(min = 10, max = 60_000))]
     pub tail_flush: Duration,

@@ -14,7 +14,7 @@ use crate::control::store::StoreError;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ServiceError {
-    /// A file cannot be read.
+    /// A configuration, or a folder that is named with it, cannot be read.
     #[error("cannot read {path}: {source}", path = path.display())]
     Read {
         /// The file or folder.
@@ -111,10 +111,17 @@ impl ServiceError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Configuration(_)
+            Self::Read { .. }
+            | Self::Configuration(_)
             | Self::Other(_)
             | Self::BadCalibrations { .. }
             | Self::NoCalibrations { .. } => Exit::BadConfiguration,
+            // A file in the place of the folder.
+            Self::State(StoreError::Folder { source, .. })
+                if source.kind() == std::io::ErrorKind::NotADirectory =>
+            {
+                Exit::BadConfiguration
+            }
             // An address that is not allowed, not one that somebody else has.
             Self::Metrics { source, .. } if source.kind() == std::io::ErrorKind::Other => {
                 Exit::BadConfiguration

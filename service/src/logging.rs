@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use isotherm_cli::stderr::{queue_lines, to_stderr};
 use isotherm_cli::{Exit, coloured, failed};
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 
 /// Zenoh warns of every peer without gossip, which here is how peers are meant to be.
 const QUIET_ZENOH: &str =
@@ -76,7 +77,8 @@ impl LogArgs {
     }
 
     fn unless_said(level: &str) -> Self {
-        let log_level = std::env::var("ISOTHERM_LOG").unwrap_or_else(|_| level.to_owned());
+        let said = std::env::var("ISOTHERM_LOG").ok().filter(|said| !said.trim().is_empty());
+        let log_level = said.unwrap_or_else(|| level.to_owned());
         Self { log_format: LogFormat::Human, log_level }
     }
 
@@ -85,14 +87,10 @@ impl LogArgs {
     /// # Errors
     /// What is wrong with the filter, in words.
     pub fn start(&self) -> Result<(), String> {
-        // Zenoh reports at "info" what concerns its developers; whoever names it in a filter gets it.
-        let directives = if self.log_level.contains("zenoh") {
-            self.log_level.clone()
-        } else {
-            format!("{},{QUIET_ZENOH}", self.log_level)
-        };
-        let filter = EnvFilter::try_new(directives).map_err(|error| {
-            format!("log filter {:?} (--log-level, ISOTHERM_LOG): {error}", self.log_level)
+        let filter = directives(&self.log_level)
+            .and_then(|directives| EnvFilter::try_new(directives).map_err(|error| error.to_string()));
+        let filter = filter.map_err(|words| {
+            format!("log filter {:?} (--log-level, ISOTHERM_LOG): {words}", self.log_level)
         })?;
         let builder = tracing_subscriber::fmt()
             .with_env_filter(filter)
@@ -107,6 +105,28 @@ impl LogArgs {
         };
         Ok(())
     }
+}
+
+/// What targets of events begin with.
+const TARGETS: [&str; 2] = ["isotherm", "zenoh"];
+
+/// The filter that was asked for, with a level for everything that it does not name: a filter of targets alone would silence the rest.
+///
+/// # Errors
+/// A word that is neither a level nor a target, in words: it would silence everything.
+fn directives(filter: &str) -> Result<String, String> {
+    let given = || filter.split(',').map(str::trim).filter(|directive| !directive.is_empty());
+    let is_level = |directive: &str| directive.parse::<LevelFilter>().is_ok();
+    let is_target = |word: &str| word.starts_with('[') || TARGETS.iter().any(|known| word.starts_with(known));
+    let mut words = given().filter(|directive| !directive.contains('=') && !is_level(directive));
+    if let Some(word) = words.find(|word| !is_target(word)) {
+        return Err(format!("{word:?} is no level: error, warn, info, debug, trace or off"));
+    }
+    let level = if given().any(is_level) { "" } else { "info" };
+    // Zenoh reports at "info" what concerns its developers; whoever names it in a filter gets it.
+    let zenoh = if filter.contains("zenoh") { "" } else { QUIET_ZENOH };
+    let all = std::iter::once(level).chain(given()).chain([zenoh]);
+    Ok(all.filter(|directive| !directive.is_empty()).collect::<Vec<_>>().join(","))
 }
 
 /// Runs a command that a blocked stderr must not hold up: what it says there goes through a queue.
@@ -139,6 +159,25 @@ pub fn logged(log: &LogArgs, command: impl Future<Output = Exit>) -> Exit {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_filter_silences_what_it_does_not_name() {
+        for (filter, expected) in [
+            ("", Some("info,zenoh=warn")),
+            (" , ", Some("info,zenoh=warn")),
+            (" warn ", Some("warn,zenoh=warn")),
+            ("off,zenoh=off", Some("off,zenoh=off")),
+            ("zenoh=debug", Some("info,zenoh=debug")),
+            ("isotherm_service=trace", Some("info,isotherm_service=trace,zenoh=warn")),
+            ("DEBUG, zenoh", Some("DEBUG,zenoh")),
+            ("warning", None),
+            ("info,verbose", None),
+        ] {
+            let quiet = QUIET_ZENOH.split_once(',').unwrap().1;
+            let found = directives(filter).map(|found| found.replace(&format!(",{quiet}"), ""));
+            assert_eq!(found.ok().as_deref(), expected, "{filter:?}");
+        }
+    }
 
     #[test]
     fn what_a_library_says_to_its_developers_is_left_out() {

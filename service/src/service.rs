@@ -28,7 +28,7 @@ use crate::pair::{Asker, Pair, Watch};
 use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
 use crate::receive::unit::UnitActor;
-use crate::signing::read_trusted_keys;
+use crate::signing::doubts;
 use declare::Declared;
 
 /// The part of the time for a stop that is kept for closing the session, one in so many.
@@ -208,18 +208,17 @@ pub(crate) fn tell_state(settings: &Settings) {
 
 /// Says what is wrong with the folder of trusted keys: it is read again at each swap, and now is the time to mend it.
 fn tell_keys(settings: &Settings) {
-    let Some(folder) = &settings.swap.trusted_keys else { return };
-    match read_trusted_keys(folder) {
-        Ok((_, warnings)) => {
-            for warning in &warnings {
-                tracing::warn!("{warning}");
+    match doubts(&settings.swap) {
+        Ok(doubts) => {
+            for doubt in &doubts {
+                tracing::warn!("{doubt}");
             }
         }
         Err(problems) => {
             for problem in &problems {
                 tracing::error!("{problem}");
             }
-            tracing::error!(folder = %folder.display(), "no key is trusted until every *.pub file is valid");
+            tracing::error!("no key is trusted until every *.pub file is valid");
         }
     }
 }

@@ -14,4 +14,4 @@ pub use trusted::read_trusted_keys;
 
 pub use keygen::run as keygen;
 pub use sign::run as sign;
-pub(crate) use trusted::check_signature;
+pub(crate) use trusted::{check_signature, doubts};

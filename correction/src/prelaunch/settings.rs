@@ -19,7 +19,7 @@ const MODE_TIME_RANGE_S: [f64; 2] = [30.0, DURATION_RANGE_S[1]];
 /// A pre-launch calibration as it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PreLaunchSettings {
-    /// How long it takes, in event time (30 s…24 h); default 10 min.
+    /// How long it takes, in event time (30 s…24 h, of which a service takes 1 min…2 h); default 10 min.
     pub duration: Span,
     /// Where the unit is and how it stands; there is no default place, and none is refused.
     pub place: Option<Place>,
@@ -42,7 +42,7 @@ pub struct PreLaunchLimits {
     pub magnetic_bias_change_rad_per_s: f64,
     /// Largest |n₊ − n₋|/(n₊ + n₋), n the good ticks of a mode (0…1); default 0.2.
     pub mode_imbalance: f64,
-    /// Shortest good time of each mode, or of all of an instrument without modes (30 s…24 h); default 60 s.
+    /// Shortest good time of each mode, or of all of an instrument without modes (30 s…24 h, of which a service takes 2 h); default 60 s.
     pub time_per_mode: Span,
     /// Smallest share of good ticks in all that were produced, missing ones included (0…1); default 0.9.
     pub good_share: f64,

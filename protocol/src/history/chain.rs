@@ -188,6 +188,8 @@ pub struct Verifier {
     unit: Option<String>,
     /// Lines that cannot be read behind the last entry: what the next digest is made over is not known.
     lost: u64,
+    /// No older entries were removed for their age.
+    from_first: bool,
 }
 
 /// What every entry of whatever version has.
@@ -199,6 +201,12 @@ struct Name {
 }
 
 impl Verifier {
+    /// Of a chain that is there from its first entry on: another one at its beginning is a break.
+    #[must_use]
+    pub fn from_first() -> Self {
+        Self { from_first: true, ..Self::default() }
+    }
+
     /// Takes the next line in, with or without its line feed; what is broken at it.
     pub fn line(&mut self, line: &[u8]) -> Option<Broken> {
         let json = match checked(line) {
@@ -263,13 +271,13 @@ impl Verifier {
             return Ok(());
         }
         let previous = link.map(|link| link.previous);
-        // Older files are removed: the oldest that is there may begin at any number, unless it says that nothing stood before.
-        match (self.first, previous) {
-            (None, Some(None)) => return Err(Fault::Headless),
-            (None, Some(Some(NOTHING))) | (Some(_), _) if number > self.highest.saturating_add(1) => {
-                return Err(Fault::Missing { first: self.highest + 1, last: number - 1 });
-            }
-            _ => {}
+        if self.first.is_none() && previous == Some(None) {
+            return Err(Fault::Headless);
+        }
+        // Where older files are removed, the oldest that is there may begin at any number, unless it says that nothing stood before.
+        let carries_on = self.first.is_some() || self.from_first || previous == Some(Some(NOTHING));
+        if carries_on && number > self.highest.saturating_add(1) {
+            return Err(Fault::Missing { first: self.highest + 1, last: number - 1 });
         }
         let Some(link) = link else { return Ok(()) };
         let previous = match (self.last, link.previous) {

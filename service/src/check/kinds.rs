@@ -12,8 +12,8 @@ use isotherm_protocol::signature::TrustedKeys;
 use super::signer::{Signer, signer};
 use super::{FileKind, Finding, Summary};
 use crate::config::Settings;
-use crate::signing::read_trusted_keys;
-use isotherm_document::file::{read_bounded, text};
+use crate::signing::doubts;
+use isotherm_document::file::text;
 use isotherm_document::unplaced;
 
 /// Top-level keys that only a calibration document has.
@@ -25,10 +25,15 @@ const NO_KEYS: &str = "has no keys: state its kind with --kind";
 /// Longest message of the JSON5 parser that is passed on; long enough for Zenoh's lists of known keys.
 const MAX_MESSAGE_CHARS: usize = 1000;
 
-/// Checks one file; with the keys that are trusted, if who signed it is to be verified.
-pub(super) fn check_file(path: &Path, forced: Option<FileKind>, trusted: Option<&TrustedKeys>) -> Finding {
+/// Checks what was read of one file; with the keys that are trusted, if who signed it is to be verified.
+pub(super) fn check_file(
+    path: &Path,
+    read: std::io::Result<Vec<u8>>,
+    forced: Option<FileKind>,
+    trusted: Option<&TrustedKeys>,
+) -> Finding {
     let file = path.display().to_string();
-    let bytes = match read_bounded(path) {
+    let bytes = match read {
         Ok(bytes) => bytes,
         Err(error) => return Finding::unreadable(path, error.to_string()),
     };
@@ -153,8 +158,7 @@ fn check_service(text: &str, path: &Path) -> Checked {
         return Err(reader.into_problems().unwrap_or_default());
     }
     // What the service would say of its keys at the start.
-    let keys = settings.swap.trusted_keys.as_deref().map(read_trusted_keys).transpose()?;
-    let warnings = keys.map_or_else(Vec::new, |(_, warnings)| warnings);
+    let warnings = doubts(&settings.swap)?;
     let calibrations = settings
         .calibrations
         .as_deref()

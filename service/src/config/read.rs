@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use isotherm_bus::endpoint;
+use isotherm_bus::{SessionOptions, endpoint};
+use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_document::{Form, Reader, element};
 use isotherm_protocol::pair::is_name;
 
@@ -20,19 +21,29 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     let Settings { calibrations, state, swap, web, zenoh, .. } = &mut settings;
     // With a state folder the folder of the documents may be missing: the last good sets hold until it is there.
     if state.is_none() {
-        existing(r, "calibrations", calibrations.as_deref(), folder, Path::is_dir, "folder");
+        leads_to(r, "calibrations", calibrations.as_deref(), folder, Path::is_dir, "an existing folder");
     }
-    existing(r, "swap.trusted_keys", swap.trusted_keys.as_deref(), folder, Path::is_dir, "folder");
-    existing(r, "zenoh.config", zenoh.session.config.as_deref(), folder, Path::is_file, "file");
+    // These are made where they are missing.
+    let may_be_folder: fn(&Path) -> bool = |path| path.is_dir() || !path.exists();
+    leads_to(r, "state", state.as_deref(), folder, may_be_folder, "a folder");
+    let may_be_file: fn(&Path) -> bool = |path| path.is_file() || !path.exists();
+    leads_to(r, "web.token_file", web.token_file.as_deref(), folder, may_be_file, "a file");
+    leads_to(
+        r,
+        "swap.trusted_keys",
+        swap.trusted_keys.as_deref(),
+        folder,
+        Path::is_dir,
+        "an existing folder",
+    );
+    leads_to(r, "zenoh.config", zenoh.session.config.as_deref(), folder, Path::is_file, "an existing file");
     let paths: [&mut Option<PathBuf>; 5] =
         [calibrations, state, &mut swap.trusted_keys, &mut web.token_file, &mut zenoh.session.config];
     paths.into_iter().flatten().for_each(|path| *path = folder.join(&*path));
     if swap.require_signature {
         if swap.trusted_keys.is_none() {
-            r.report(
-                "swap",
-                "require_signature is set: trusted_keys must name the folder of the public keys",
-            );
+            let must = "is true: swap.trusted_keys must name the folder of the public keys";
+            r.report("swap.require_signature", must);
         }
         // Where a signature is asked for, an old one must not do.
         if !r.has("swap.downgrade") {
@@ -44,10 +55,13 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     if let Some(address) = settings.metrics.listen.filter(|address| !settings.metrics.admits(*address)) {
         r.report("metrics.listen", format!("is \"{address}\", must be {LOOPBACK}"));
     }
-    if !r.is_damaged("zenoh")
-        && let Err(error) = settings.zenoh.session.to_config()
-    {
-        r.report("zenoh", error.to_string());
+    session(r, &settings.zenoh.session);
+    let PreLaunchSettings { duration, limits, .. } = &settings.pre_launch;
+    if limits.time_per_mode > *duration {
+        let [least_s, duration_s] =
+            [limits.time_per_mode, *duration].map(|span| (span.as_s() * 1e3).round() / 1e3);
+        let must_be = format!("is {least_s}, must be at most pre_launch.duration_s, {duration_s}");
+        r.report("pre_launch.min_time_per_mode_s", must_be);
     }
     if let Err(reason) = settings.check_other() {
         r.report("pair.other", reason);
@@ -56,22 +70,38 @@ pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     Some(settings)
 }
 
+/// What Zenoh does not take, each in its place.
+fn session(r: &mut Reader<'_>, session: &SessionOptions) {
+    let SessionOptions { config, connect, listen, namespace, .. } = session;
+    let mut check = |key: &str, alone: SessionOptions| {
+        if let Err(error) = alone.to_config() {
+            r.report(key, error.to_string());
+        }
+    };
+    check("zenoh.config", SessionOptions { config: config.clone(), ..SessionOptions::default() });
+    check("zenoh.namespace", SessionOptions { namespace: namespace.clone(), ..SessionOptions::default() });
+    for (key, texts) in [("zenoh.connect", connect), ("zenoh.listen", listen)] {
+        for (index, text) in texts.iter().enumerate() {
+            if let Err(reason) = endpoint(text) {
+                r.report(&element(key, index), format!("is {text:?}, {reason}"));
+            }
+        }
+    }
+}
+
 /// A path that must lead to something.
-fn existing(
+fn leads_to(
     r: &mut Reader<'_>,
     key: &str,
     path: Option<&Path>,
     folder: &Path,
-    is_there: fn(&Path) -> bool,
+    fits: fn(&Path) -> bool,
     what: &str,
 ) {
     let Some(path) = path else { return };
     let whole = folder.join(path);
-    if !is_there(&whole) {
-        r.refuse(
-            key,
-            format!("is \"{}\", must be an existing {what}; looked for {}", path.display(), whole.display()),
-        );
+    if !fits(&whole) {
+        r.refuse(key, format!("is \"{}\", must be {what}; looked for {}", path.display(), whole.display()));
     }
 }
 

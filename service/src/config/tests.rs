@@ -183,6 +183,10 @@ fn each_problem_names_its_place_its_value_and_its_limit() {
         "[zenoh]\nlisten = \"tcp/x\"",
         "[zenoh]\nconnect = [1]",
         "[zenoh]\nnamespace = \"\"",
+        "[zenoh]\nnamespace = \"/q\"",
+        "[pre_launch]\nduration_s = 60\nmin_time_per_mode_s = 61",
+        "state = \"Cargo.toml\"",
+        "[web]\ntoken_file = \"src\"",
         "[navigation]\ntick = 1",
     ]
     .map(|text| {
@@ -217,8 +221,10 @@ fn all_problems_come_at_once_in_the_order_of_the_text() {
 }
 
 #[test]
-fn an_endpoint_that_is_none_is_a_problem_of_the_configuration() {
-    let problems = parse("[zenoh]\nlisten = [\"nowhere\"]").unwrap_err();
+fn everything_that_zenoh_does_not_take_is_told_in_its_place() {
+    let problems =
+        parse("[zenoh]\nnamespace = \"a//b\"\nlisten = [\"nowhere\", \"tcp/a:1\", \"x\"]\nconnect = [\"y\"]")
+            .unwrap_err();
     insta::assert_snapshot!(problems.join("\n"));
 }
 

@@ -95,8 +95,10 @@ impl Worker {
             let words = format!("swaps are refused, the state folder cannot be written: {words}");
             add(STATE_FOLDER, 1, words);
         }
-        if let Some((_, words)) = self.losses.first() {
-            add("audit_file", self.losses.len(), words.clone());
+        let losses =
+            self.losses.iter().map(|(_, words)| words.as_str()).chain(self.store.changed_by_others());
+        if let Some(words) = losses.clone().next() {
+            add("audit_file", losses.count(), words.to_owned());
         }
         let skipped = self.records.iter().filter_map(|(unit, record)| Some((unit, record.skipped.as_ref()?)));
         if let Some((unit, first)) = skipped.clone().next() {

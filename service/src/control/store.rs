@@ -70,6 +70,8 @@ pub struct Store {
     prune_due: bool,
     /// Lines of the audit file were lost.
     is_damaged: bool,
+    /// What somebody else did to the audit file while it was written to, in words.
+    changed: Option<String>,
     /// Why the last write failed, until one works.
     write_failure: Option<String>,
     /// When it is tried whether one works.
@@ -165,6 +167,7 @@ impl Store {
             stuck: false,
             prune_due: false,
             is_damaged: false,
+            changed: None,
             write_failure: None,
             next_trial: Instant::now(),
         }
@@ -314,6 +317,8 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let lost = match self.check_held() {
             Ok(()) => {
+                // Where that cannot be told, the next entry cannot be written.
+                let _ = self.note_change();
                 self.try_if_due(Instant::now());
                 self.prune_if_due(time);
                 return Ok(false);
@@ -358,15 +363,33 @@ impl Store {
         Ok((lines, number, chain))
     }
 
+    /// What somebody else did to the audit file since it was opened, in words: entries may be missing.
+    pub(crate) fn changed_by_others(&self) -> Option<&str> {
+        self.changed.as_deref()
+    }
+
+    /// Whether somebody else has changed the audit file; that it was stays known.
+    fn note_change(&mut self) -> Result<bool, StoreError> {
+        let Journal::Folder { log, path, .. } = &self.journal else { return Ok(false) };
+        let changed = log.changed_by_others()?;
+        if changed && self.changed.is_none() {
+            let (folder, next) = (path.display(), self.index.next_number());
+            let words = format!(
+                "the audit file in {folder} was removed or changed by someone else while the service ran: entries before \
+                 {next} may be missing. `isotherm history --verify {folder}` names them; look for them in a backup"
+            );
+            tracing::error!("{words}");
+            self.changed = Some(words);
+        }
+        Ok(changed)
+    }
+
     /// Begins a new audit file where this one is full, empty behind a full one, or no longer ours.
     fn begin_anew_if_due(&mut self, time: SystemTime) -> Result<(), StoreError> {
+        let taken_away = self.note_change()?;
         let Journal::Folder { log, path, .. } = &self.journal else { return Ok(()) };
-        let taken_away = log.changed_by_others()?;
         if taken_away {
-            tracing::warn!(
-                "the audit file in {} was changed by someone else: a new one is started",
-                path.display()
-            );
+            tracing::warn!("a new audit file is started in {}", path.display());
         }
         let full = log.grown() >= self.full_bytes;
         let lacks_carried = log.is_empty() && !self.index.is_empty();

@@ -47,6 +47,21 @@ pub fn read_trusted_keys(folder: &Path) -> Result<(TrustedKeys, Vec<Problem>), V
     if problems.is_empty() { Ok((trusted, warnings)) } else { Err(problems) }
 }
 
+/// What is doubtful about the configured keys, as a service finds it at its start.
+///
+/// # Errors
+/// As [`read_trusted_keys`].
+pub(crate) fn doubts(settings: &SwapSettings) -> Result<Vec<Problem>, Vec<Problem>> {
+    let Some(folder) = &settings.trusted_keys else { return Ok(Vec::new()) };
+    let (trusted, mut doubts) = read_trusted_keys(folder)?;
+    if settings.require_signature && trusted.is_empty() {
+        let words = "has no *.pub, so every document is refused (swap.require_signature): copy the public keys of \
+                     those who sign there";
+        doubts.push(unplaced(Some(&folder.display().to_string()), words.to_owned()));
+    }
+    Ok(doubts)
+}
+
 /// Verifies the signature as far as the configuration asks for one.
 pub(crate) fn check_signature(
     settings: &SwapSettings,

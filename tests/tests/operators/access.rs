@@ -126,7 +126,7 @@ impl Shipped {
         );
         std::fs::write(folder.path().join("service.toml"), settings).unwrap();
         let authority = Authority::new(folder.path());
-        for name in ["service", "operator", "viewer", BASE_UNIT, "stranger"] {
+        for name in ["service", "operator", "viewer", "recorder", BASE_UNIT, "stranger"] {
             authority.make(name);
         }
         let home = folder.path().to_owned();
@@ -168,6 +168,15 @@ impl Shipped {
         }
     }
 
+    /// What the status shows to who may ask for it before any unit has appeared, and to an instrument, which may not.
+    fn show_services(&self) {
+        let status = |name| isotherm(&self.authority.client(Some(name), &self.service.locator), &["status"]);
+        for name in ["recorder", "viewer"] {
+            assert!(status(name).status.success(), "{name}");
+        }
+        refused(&status(BASE_UNIT), &["access control", "certificate of ZLG-0001", "isotherm/*/status"]);
+    }
+
     /// What the operator's programs order.
     fn order_by_programs(&self) {
         let at_operator = self.authority.client(Some("operator"), &self.service.locator);
@@ -204,6 +213,7 @@ impl Shipped {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_shipped_access_control_refuses_what_a_certificate_may_not_do() {
     let shipped = Shipped::start().await;
+    shipped.show_services();
     // The instrument publishes its own unit, and the operator sees it.
     let instrument = shipped.session(BASE_UNIT).await;
     let operator = Operator::new(shipped.session("operator").await);

@@ -104,6 +104,10 @@ async fn an_emptied_audit_file_is_told_and_no_revision_is_given_twice() {
     assert_eq!(told(&until_service(&stand, |_| true).await, "audit_file"), None);
     let reply = stand.swap("ZLG-8", &document("ZLG-8", 1.0), &plain()).await;
     assert_accepted(&reply, revisions[0]);
+
+    // While the service runs, too.
+    std::fs::write(audit_file(&folders.state), "").unwrap();
+    until_service(&stand, |status| told(status, "audit_file").is_some()).await;
     stand.stop().await;
 }
 

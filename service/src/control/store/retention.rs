@@ -10,7 +10,7 @@ use super::log::full_files;
 use super::{Journal, Store};
 
 /// Full audit files that are kept: a gibibyte.
-const KEPT_FILES: usize = 16;
+pub(super) const KEPT_FILES: usize = 16;
 /// How long a document is kept that no revision names any more which can be gone back to.
 const KEPT: Duration = Duration::from_secs(90 * 86_400);
 

@@ -259,9 +259,11 @@ fn an_audit_file_that_others_remove_or_change_is_begun_anew_with_all_that_holds(
         let folder = TempDir::new().unwrap();
         let (mut store, _) = Store::open(folder.path()).unwrap();
         let digest = accept(&mut store, "ZLG-1", 1, "one", Source::Bus);
+        assert_eq!(store.changed_by_others(), None);
         damage(&folder.path().join("audit.jsonl"));
         assert_eq!(store.append(at(2), Some(&unit("ZLG-1")), "", command("run")).unwrap(), 3);
         assert_eq!(numbers(folder.path()), [2, 3]);
+        assert!(store.changed_by_others().is_some());
         drop(store);
         let (store, _) = Store::open(folder.path()).unwrap();
         assert_eq!(store.last_good(&unit("ZLG-1")).unwrap().digest, digest);

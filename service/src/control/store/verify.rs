@@ -16,6 +16,7 @@ use super::blobs::BlobStore;
 use super::folder::Mark;
 use super::index::Index;
 use super::log::{NAME, full_files};
+use super::retention::KEPT_FILES;
 use super::{StoreError, read};
 
 /// Most breaks that are kept in words.
@@ -96,7 +97,9 @@ pub fn verify(folder: &Path, noted: Option<Digest>) -> Result<Verification, Stor
 fn once(folder: &Path, full: &[PathBuf], noted: Option<Digest>) -> Result<Verification, StoreError> {
     // First of all: a service may be writing.
     let written = Mark::last_entry(folder);
-    let mut verifier = Verifier::default();
+    // Only beside as many files as are kept is an older one removed for its age.
+    let is_whole = full.len() < KEPT_FILES;
+    let mut verifier = if is_whole { Verifier::from_first() } else { Verifier::default() };
     let (mut breaks, mut broken) = (Vec::new(), 0);
     let mut index = Index::default();
     let mut note = |file: &Path, line: u64, found: Option<Broken>| {
