@@ -96,6 +96,8 @@ pub struct StepSum {
     last: ([f64; 3], [f64; 3]),
     /// Standard errors of the open step, which a tick's form leaves out.
     errors: Option<Box<Sigma>>,
+    /// What ticks next to one another have of one switch: their flags of it, and their restoration's standard errors so far (rad).
+    bridged: (TickFlags, [f64; 3]),
 }
 
 impl StepSum {
@@ -154,7 +156,15 @@ impl StepSum {
         self.last = (tick.delta_angle, tick.delta_velocity);
 
         if let Some(errors) = tick.sigma.as_deref() {
-            let sum = self.errors.as_deref().map_or(*errors, |sum| sum.plus(errors));
+            let flags = tick.flags & (TickFlags::INTERPOLATED | TickFlags::ANGLE_RESTORED);
+            if self.errors.is_none() || flags.is_empty() || flags != self.bridged.0 {
+                self.bridged = (flags, [0.0; 3]);
+            }
+            let same = self.bridged.1;
+            let sum = self.errors.as_deref().map_or(*errors, |sum| sum.plus(errors, same));
+            if !flags.is_empty() {
+                self.bridged.1 = plus(same, errors.angle.restoration);
+            }
             **self.errors.get_or_insert_default() = sum;
         }
         let full = if let Some(open) = &mut self.open {

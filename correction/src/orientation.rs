@@ -77,6 +77,12 @@ impl SensorMask {
         Self(self.0 & other.0)
     }
 
+    /// The sensors of this mask that the other one does not hold.
+    #[must_use]
+    pub const fn but(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
     /// How many sensors take part.
     #[must_use]
     pub const fn count(self) -> usize {

@@ -33,6 +33,7 @@ pub use window::MIN_ADAPTIVE_READINGS;
 
 use crate::lanes::Lanes;
 use crate::later::Later;
+use crate::orientation::SensorMask;
 use crate::sample::{LasingMode, MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
 
@@ -83,6 +84,8 @@ pub struct Substitution {
     after: usize,
     /// Angle per sensor that the next good reading brings back (rad).
     pending: Option<[f64; MAX_SENSORS]>,
+    /// Sensors of which the switch at hand has no reading to predict from, or none to fit.
+    apart: SensorMask,
     /// Ticks of the running transition that are still to come.
     left: u8,
     /// Mode of the last tick that stated one.
@@ -115,19 +118,32 @@ impl Substitution {
     /// Takes one tick: replaces the increments of a lost tick, restores angle in a good one.
     ///
     /// `increments` are the angle increments per sensor (rad), scaled and with every bias removed; those of a
-    /// lost tick are overwritten unread. Returns which of `INTERPOLATED`, `ANGLE_RESTORED` and
-    /// `SWITCH_UNRESOLVED` apply.
+    /// lost tick are overwritten unread. The readings of sensors outside `counted` are no basis of a bridge. Returns
+    /// which of `INTERPOLATED`, `ANGLE_RESTORED` and `SWITCH_UNRESOLVED` apply to all sensors but those that stand
+    /// [`apart`](Self::apart).
     ///
     /// A mode that differs from the last one without a command begins a transition at this tick; where ticks
     /// are missing before it the switch may have come later than the gap's start, so all n are counted
     /// from here. Ticks missing inside a transition count as ticks of it.
     #[inline]
-    pub fn tick(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
+    pub fn tick(
+        &mut self,
+        reversal: &Reversal,
+        input: TickInput,
+        increments: &mut [f64],
+        counted: SensorMask,
+    ) -> TickFlags {
         if !self.passes(&input) {
-            return self.bridge(reversal, input, increments);
+            return self.bridge(reversal, input, increments, counted);
         }
-        self.pass(&input, rates(increments, input.duration));
+        self.pass(&input, rates(increments, input.duration, counted));
         TickFlags::empty()
+    }
+
+    /// Sensors whose increment in an `INTERPOLATED` or `ANGLE_RESTORED` tick just taken is none that a bridge made: without a reading to
+    /// predict from, or without one to fit behind the switch.
+    pub(crate) fn apart(&self) -> SensorMask {
+        self.apart
     }
 
     /// Whether a tick has nothing to do with a switch: it [passes](Self::pass) as it is.
@@ -136,7 +152,7 @@ impl Substitution {
         self.is_settled() && !input.restart && !self.may_switch(input)
     }
 
-    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); NaN where there is no sensor.
+    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); NaN where no reading counts.
     #[expect(clippy::inline_always, reason = "once per tick: the reading is made where it is put")]
     #[inline(always)]
     pub(crate) fn pass(&mut self, input: &TickInput, rates: Lanes) {
@@ -147,7 +163,13 @@ impl Substitution {
     }
 
     /// Takes a tick in or about a switch.
-    fn bridge(&mut self, reversal: &Reversal, input: TickInput, increments: &mut [f64]) -> TickFlags {
+    fn bridge(
+        &mut self,
+        reversal: &Reversal,
+        input: TickInput,
+        increments: &mut [f64],
+        counted: SensorMask,
+    ) -> TickFlags {
         let mut flags = TickFlags::empty();
         if input.restart {
             if !(self.lost.is_empty() && self.pending.is_none()) {
@@ -162,7 +184,7 @@ impl Substitution {
         let resolved = if left > 0 {
             self.take_lost(*reversal, &input, increments, &mut flags)
         } else {
-            self.take_good(*reversal, &input, increments, &mut flags)
+            self.take_good(*reversal, &input, (increments, counted), &mut flags)
         };
         if !resolved {
             flags |= TickFlags::SWITCH_UNRESOLVED;
@@ -210,6 +232,9 @@ impl Substitution {
             resolved = self.resolve(reversal);
         }
         *flags |= TickFlags::INTERPOLATED;
+        if self.lost.is_empty() && self.pending.is_none() {
+            self.apart = SensorMask::NONE;
+        }
         let predicted = self.predict(reversal, input);
         for (increment, predicted) in increments.iter_mut().zip(&predicted) {
             *increment = *predicted;
@@ -231,10 +256,11 @@ impl Substitution {
         &mut self,
         reversal: Reversal,
         input: &TickInput,
-        increments: &mut [f64],
+        (increments, counted): (&mut [f64], SensorMask),
         flags: &mut TickFlags,
     ) -> bool {
-        let reading = Reading::of(input.end_time, input.duration, rates(increments, input.duration));
+        let rates = rates(increments, input.duration, counted);
+        let reading = Reading::of(input.end_time, input.duration, rates);
         let mut resolved = true;
         if self.is_overdue(reversal, input, reading.as_ref()) {
             resolved = self.resolve(reversal);
@@ -269,8 +295,9 @@ impl Substitution {
         waited.abs() > reach_s(reversal, nominal)
     }
 
-    /// `P_pred` of the coming tick per sensor (rad); zero where nothing is known.
-    fn predict(&self, reversal: Reversal, input: &TickInput) -> [f64; MAX_SENSORS] {
+    /// `P_pred` of the coming tick per sensor (rad); zero where nothing is known. A sensor of which less is known than of others stands
+    /// apart.
+    fn predict(&mut self, reversal: Reversal, input: &TickInput) -> [f64; MAX_SENSORS] {
         let mut predicted = [0.0; MAX_SENSORS];
         let Some(newest) = self.history.newest() else {
             return predicted;
@@ -284,6 +311,9 @@ impl Substitution {
             .collect();
         for (sensor, predicted) in predicted.iter_mut().enumerate() {
             let points: Points = window.iter().filter_map(|(at, r)| r.point(*at, sensor)).collect();
+            if points.is_empty() && !window.is_empty() {
+                self.apart = self.apart.with(sensor);
+            }
             let fit = Fit::new(&points, reversal.parts.predict_degree.into());
             let angle = fit.map_or(0.0, |fit| fit.at(x) * input.duration.as_s());
             *predicted = if angle.is_finite() { angle } else { 0.0 };
@@ -313,7 +343,7 @@ impl Substitution {
         for (sensor, restored) in restored.iter_mut().enumerate().take(last.sensors) {
             let Some(points) = fit_points(&self.history, reversal, &waiting, after, sensor) else {
                 // Nothing new is known of this sensor: the prediction stands.
-                resolved = false;
+                self.apart = self.apart.with(sensor);
                 continue;
             };
             let Some(fit) = Fit::new(&points, reversal.parts.fit_degree.into()) else {
@@ -334,7 +364,7 @@ impl Substitution {
             }
         }
         if !any_restored {
-            return resolved;
+            return false;
         }
         let pending = self.pending.get_or_insert([0.0; MAX_SENSORS]);
         for (pending, restored) in pending.iter_mut().zip(&restored) {
@@ -344,10 +374,11 @@ impl Substitution {
     }
 }
 
-/// Rates (rad/s) of the sensors that gained these angles (rad) in a tick; NaN where there is no sensor.
-fn rates(increments: &[f64], duration: Span) -> Lanes {
+/// Rates (rad/s) of the sensors that gained these angles (rad) in a tick; NaN where no reading counts.
+fn rates(increments: &[f64], duration: Span, counted: SensorMask) -> Lanes {
     let (mut rates, duration_s) = ([f64::NAN; MAX_SENSORS], duration.as_s());
-    rates.iter_mut().zip(increments).for_each(|(rate, increment)| *rate = increment / duration_s);
+    let lanes = rates.iter_mut().zip(increments).enumerate().filter(|(lane, _)| counted.contains(*lane));
+    lanes.for_each(|(_, (rate, increment))| *rate = increment / duration_s);
     rates
 }
 

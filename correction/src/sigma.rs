@@ -54,14 +54,16 @@ impl Causes {
         core::array::from_fn(|axis| self.all().iter().map(|cause| cause[axis] * cause[axis]).sum())
     }
 
-    /// That of a sum of two outputs: noise is new in each of them, what was calibrated and clamped is the same.
-    fn plus(&self, other: &Self) -> Self {
-        let apart =
-            |a: [f64; 3], b: [f64; 3]| core::array::from_fn(|i| libm::sqrt(a[i] * a[i] + b[i] * b[i]));
+    /// That of a sum of two outputs: noise is new in each of them, what was calibrated and clamped is the same. So is what the other one
+    /// was bridged with, in that part of this restoration that stems from the same readings.
+    fn plus(&self, other: &Self, same: [f64; 3]) -> Self {
+        let apart = |a: [f64; 3], b: [f64; 3], same: [f64; 3]| {
+            core::array::from_fn(|i| libm::sqrt(a[i] * a[i] + b[i] * b[i] + 2.0 * same[i] * b[i]))
+        };
         let together = |a: [f64; 3], b: [f64; 3]| core::array::from_fn(|i| a[i] + b[i]);
         Self {
-            noise: apart(self.noise, other.noise),
-            restoration: apart(self.restoration, other.restoration),
+            noise: apart(self.noise, other.noise, [0.0; 3]),
+            restoration: apart(self.restoration, other.restoration, same),
             calibration: together(self.calibration, other.calibration),
             clamping: together(self.clamping, other.clamping),
         }
@@ -72,8 +74,11 @@ impl Sigma {
     /// Nothing is known.
     pub const UNKNOWN: Self = Self { angle: Causes::UNKNOWN, velocity: Causes::UNKNOWN };
 
-    /// That of a sum of two outputs.
-    pub(crate) fn plus(&self, other: &Self) -> Self {
-        Self { angle: self.angle.plus(&other.angle), velocity: self.velocity.plus(&other.velocity) }
+    /// That of a sum of two outputs; `same`: restoration of this angle that stems from the readings that bridged the other one (rad).
+    pub(crate) fn plus(&self, other: &Self, same: [f64; 3]) -> Self {
+        Self {
+            angle: self.angle.plus(&other.angle, same),
+            velocity: self.velocity.plus(&other.velocity, [0.0; 3]),
+        }
     }
 }

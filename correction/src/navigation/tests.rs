@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::sample::LasingMode;
+use crate::sigma::Causes;
 use crate::units::Timestamp;
 
 const TICK_S: f64 = 5e-3;
@@ -282,4 +283,37 @@ proptest! {
             .collect();
         prop_assert!(!summed(stated(5, true), &ticks).is_empty());
     }
+}
+
+#[test]
+fn restoration_adds_up_over_the_ticks_of_one_switch_and_in_squares_beyond() {
+    let ticks: Vec<_> = (0..8)
+        .map(|k| {
+            let lost = (2..5).contains(&k);
+            let restoration = if lost || k == 6 { [3e-6; 3] } else { [0.0; 3] };
+            let flags = match k {
+                2..=4 => TickFlags::INTERPOLATED,
+                6 => TickFlags::ANGLE_RESTORED,
+                _ => TickFlags::empty(),
+            };
+            let angle = Causes { noise: [1e-6; 3], restoration, ..Causes::default() };
+            let sigma = Some(Box::new(Sigma { angle, ..Sigma::default() }));
+            CorrectedTick { flags, sigma, ..tick(k) }
+        })
+        .collect();
+    let of = |ticks: u16, all: &[CorrectedTick]| -> Vec<[f64; 2]> {
+        let steps = summed(stated(ticks, false), all);
+        let angles = steps.iter().map(|step| step.sigma.as_deref().unwrap().angle);
+        angles.map(|angle| [angle.noise[0], angle.restoration[0]].map(|sigma| 1e6 * sigma)).collect()
+    };
+    let near = |got: &[[f64; 2]], expected: &[[f64; 2]]| {
+        assert_eq!(got.len(), expected.len());
+        let pairs = got.iter().flatten().zip(expected.iter().flatten());
+        pairs.for_each(|(got, expected)| assert!((got - expected).abs() < 1e-9, "{got} {expected}"));
+    };
+    let root = |squared: f64| libm::sqrt(squared);
+    near(&of(8, &ticks), &[[root(8.0), root(81.0 + 9.0)]]);
+    near(&of(4, &ticks), &[[2.0, 6.0], [2.0, root(18.0)]]);
+    // Two switches.
+    near(&of(5, &[&ticks[2..4], &ticks[6..], &ticks[4..5]].concat()), &[[root(5.0), root(36.0 + 18.0)]]);
 }

@@ -62,8 +62,8 @@ impl Restoration {
             room.push(lost);
             return Some(core::array::from_fn(|sensor| {
                 let mut weights = Weights::default();
-                weights.predict(substitution, reversal, (sensor, 0), &lost, 1.0);
-                weights.gain(substitution)
+                let known = weights.predict(substitution, reversal, (sensor, 0), &lost, 1.0);
+                if known { weights.gain(substitution) } else { Gain::UNKNOWN }
             }));
         }
         let restored = flags.contains(TickFlags::ANGLE_RESTORED).then(|| {
@@ -120,7 +120,7 @@ impl Weights {
         }
     }
 
-    /// Adds `times` the prediction of a lost tick from the readings before the newest `after`.
+    /// Adds `times` the prediction of a lost tick from the readings before the newest `after`. Whether there are any.
     fn predict(
         &mut self,
         substitution: &Substitution,
@@ -128,7 +128,7 @@ impl Weights {
         (sensor, after): (usize, usize),
         tick: &LostTick,
         times: f64,
-    ) {
+    ) -> bool {
         let parts = &reversal.parts;
         let readings = substitution.history.newest_first().enumerate().skip(after);
         let readings = readings.take(parts.predict_readings.into());
@@ -148,6 +148,7 @@ impl Weights {
                 *to += times * weight;
             }
         }
+        !used.is_empty()
     }
 
     /// Variance of the angle.

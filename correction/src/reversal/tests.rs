@@ -10,6 +10,7 @@ use crate::sample::Sensors;
 const ARCSEC: f64 = PI / 180.0 / 3600.0;
 const TICK_NS: i64 = 5_000_000;
 const TICK_S: f64 = 5e-3;
+const ALL: SensorMask = SensorMask::all(MAX_SENSORS);
 
 fn reversal(parts: ReversalParts) -> Reversal {
     Reversal::new(&parts).unwrap()
@@ -69,7 +70,7 @@ impl<A: Fn(f64) -> f64> Bench<A> {
         let lost = self.substitution.is_lost(&self.reversal, &input);
         let mut increments = Sensors::new();
         increments.push(if lost { f64::NAN } else { increment });
-        let flags = self.substitution.tick(&self.reversal, input, &mut increments);
+        let flags = self.substitution.tick(&self.reversal, input, &mut increments, ALL);
         assert_eq!(lost, flags.contains(TickFlags::INTERPOLATED));
         self.published += increments[0];
         self.truth += increment;
@@ -351,7 +352,7 @@ fn a_restart_gives_up_what_was_pending_and_says_so() {
         ..TickInput::default()
     };
     let mut increments: Sensors<f64> = [0.1].into_iter().collect();
-    let flags = bench.substitution.tick(&reversal, input, &mut increments);
+    let flags = bench.substitution.tick(&reversal, input, &mut increments, ALL);
     assert_eq!((flags, increments[0]), (TickFlags::SWITCH_UNRESOLVED, 0.1));
     assert!(bench.substitution.is_settled());
 }
@@ -383,14 +384,14 @@ fn a_producer_that_reports_the_mode_as_it_is_switches_once() {
             ..TickInput::default()
         };
         let mut increments: Sensors<f64> = [1.0].into_iter().collect();
-        let flags = substitution.tick(&reversal, input, &mut increments);
+        let flags = substitution.tick(&reversal, input, &mut increments, ALL);
         interpolated += i32::from(flags.contains(TickFlags::INTERPOLATED));
     }
     assert_eq!(interpolated, 3);
 }
 
 #[test]
-fn a_sensor_without_a_number_after_the_switch_keeps_its_prediction_and_says_so() {
+fn a_sensor_without_a_number_after_the_switch_keeps_its_prediction_and_stands_apart() {
     let reversal = paper(1, 1);
     let mut substitution = Substitution::default();
     for k in -5..=4_i32 {
@@ -402,9 +403,10 @@ fn a_sensor_without_a_number_after_the_switch_keeps_its_prediction_and_says_so()
         };
         let second = if k > 1 { f64::NAN } else { 2.0 };
         let mut increments: Sensors<f64> = [1.0, second].into_iter().collect();
-        let flags = substitution.tick(&reversal, input, &mut increments);
+        let flags = substitution.tick(&reversal, input, &mut increments, ALL);
         assert!((increments[0] - 1.0).abs() < 1e-12);
-        assert_eq!(flags.contains(TickFlags::SWITCH_UNRESOLVED), k == 3);
+        assert!(!flags.contains(TickFlags::SWITCH_UNRESOLVED));
+        assert_eq!(substitution.apart().contains(1), k > 2);
     }
 }
 
@@ -528,7 +530,7 @@ proptest! {
                 ..TickInput::default()
             };
             let mut all: Sensors<f64> = [*a, *b, 2.0 * a - b].into_iter().collect();
-            substitution.tick(&reversal, input, &mut all);
+            substitution.tick(&reversal, input, &mut all, ALL);
             let scale = all[0].abs() + all[1].abs() + 1.0;
             prop_assert!((2.0 * all[0] - all[1] - all[2]).abs() < 1e-9 * scale);
         }
@@ -556,7 +558,7 @@ proptest! {
                 restart: restart % 32 == 0,
             };
             let mut increments: Sensors<f64> = [value, 1.0, -value].into_iter().collect();
-            let flags = substitution.tick(&reversal, input, &mut increments);
+            let flags = substitution.tick(&reversal, input, &mut increments, ALL);
             if flags.contains(TickFlags::INTERPOLATED) {
                 prop_assert!(increments.iter().all(|increment| increment.is_finite()));
             }
@@ -597,7 +599,7 @@ fn a_transition_that_is_cut_is_flagged_at_its_last_bridged_tick() {
                     missed: 0,
                     restart: false,
                 };
-                substitution.tick(&reversal, input, &mut [1e-5]).contains(TickFlags::SWITCH_UNRESOLVED)
+                substitution.tick(&reversal, input, &mut [1e-5], ALL).contains(TickFlags::SWITCH_UNRESOLVED)
             })
             .collect();
         assert_eq!(unresolved, if cut { &[32][..] } else { &[] }, "{time_s} s");
@@ -627,7 +629,7 @@ fn fast_ticks(transition: Transition, angle: impl Fn(f64) -> f64) -> (f64, usize
         };
         // What the instrument loses: the ticks 1 to 15.
         let mut increments = [if (1..=15).contains(&k) { 1e3 } else { angle(end) - angle(begin) }];
-        let flags = substitution.tick(&reversal, input, &mut increments);
+        let flags = substitution.tick(&reversal, input, &mut increments, ALL);
         lost += usize::from(flags.contains(TickFlags::INTERPOLATED));
         error += increments[0] - (angle(end) - angle(begin));
     }
@@ -693,7 +695,7 @@ fn a_window_that_adapts_follows_noise_at_rest_and_motion_when_there_is_any() {
                     restart: false,
                 };
                 let mut increments = [truth + if lost { 1e3 } else { noise }];
-                substitution.tick(&reversal, input, &mut increments);
+                substitution.tick(&reversal, input, &mut increments, ALL);
                 // The noise of the good ticks is no error of the substitution.
                 error += increments[0] - truth - if lost { 0.0 } else { noise };
             }

@@ -27,6 +27,10 @@ pub(crate) struct Watched<'a> {
     pub(crate) calibration: &'a Calibration,
     pub(crate) seen: &'a Observation,
     pub(crate) out: &'a CorrectedTick,
+    /// Its flags and those of the tick before, without those that they have of others.
+    pub(crate) own_flags: [TickFlags; 2],
+    /// What part of a tick each gyro is held back; `None` where none is.
+    pub(crate) held_back_ticks: Option<Lanes>,
     pub(crate) substitution: &'a Substitution,
     pub(crate) since_turn_on_s: f64,
     pub(crate) gyros: Resolved<'a>,
@@ -51,6 +55,8 @@ pub(crate) struct Resolved<'a> {
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct SigmaMemory {
     restoration: Restoration,
+    /// Variances of what fits have in the gyros' increments of the last two ticks (rad²), newest first, where gyros are held back.
+    bridged: Option<[Lanes; 2]>,
 }
 
 /// Variances of one sensor's increment, by cause (rad² or m²/s²).
@@ -64,42 +70,60 @@ impl SigmaMemory {
         let restored = match calibration.reversal {
             Some(reversal) => {
                 let span = (out.end_time, out.duration);
-                self.restoration.follow(tick.substitution, reversal, span, out.flags)
+                self.restoration.follow(tick.substitution, reversal, span, tick.own_flags[0])
             }
             None => None,
         };
         let duration_s = out.duration.as_s();
+        let bridged = self.hold_back(tick.held_back_ticks.as_ref(), bridged(model, restored.as_ref()));
         let angle = if out.flags.contains(TickFlags::ANGLE_INVALID) {
             Causes::UNKNOWN
         } else {
             let rate = out.delta_angle.map(|angle| angle / duration_s);
-            tick.gyros.causes(|lane| tick.of_gyro(model, lane, &rate, restored.as_ref()))
+            tick.gyros.causes(|lane| tick.of_gyro(model, lane, &rate, &bridged))
         };
         let velocity = match (&tick.accels, tick.seen.specific_force) {
-            (Some(accels), Some(force)) => {
+            (Some(accels), Some(force)) if !out.flags.contains(TickFlags::VELOCITY_INVALID) => {
                 accels.causes(|lane| tick.of_accel(model, accels, lane, &force, &angle))
             }
             _ => Causes::UNKNOWN,
         };
         Sigma { angle, velocity }
     }
+
+    /// Variances of what fits have in the gyros' increments (rad²), where these are held back by `ticks` (models §3): one error spread
+    /// over all ticks that have part of it.
+    fn hold_back(&mut self, ticks: Option<&Lanes>, bridged: Lanes) -> Lanes {
+        let Some(ticks) = ticks else {
+            self.bridged = None;
+            return bridged;
+        };
+        let [last, one_before] = self.bridged.unwrap_or_default();
+        self.bridged = Some([bridged, last]);
+        array::from_fn(|lane| {
+            let (held, bend) = (ticks[lane], 0.5 * ticks[lane] * (1.0 - ticks[lane]));
+            let shares = [1.0 - held - bend, held + 2.0 * bend, -bend];
+            let parts = shares.into_iter().zip([bridged[lane], last[lane], one_before[lane]]);
+            // What has no share may be unknown.
+            let parts = parts.filter(|(share, _)| *share != 0.0);
+            let sum: f64 = parts.map(|(share, variance)| share * libm::sqrt(variance)).sum();
+            sum * sum
+        })
+    }
 }
 
 impl Watched<'_> {
-    fn of_gyro(
-        &self,
-        model: &SigmaModel,
-        lane: usize,
-        rate: &[f64; 3],
-        restored: Option<&[Gain; MAX_SENSORS]>,
-    ) -> Variances {
+    /// Whether a gyro's increment has nothing of a reading but through fits.
+    fn is_lost(&self, lane: usize) -> bool {
+        let [now, last] = self.own_flags.map(|flags| flags.contains(TickFlags::INTERPOLATED));
+        now && (last || self.held_back_ticks.is_none_or(|ticks| ticks[lane] == 0.0))
+    }
+
+    fn of_gyro(&self, model: &SigmaModel, lane: usize, rate: &[f64; 3], bridged: &Lanes) -> Variances {
         let Some(parts) = model.gyros.get(lane) else { return Variances::default() };
         let duration_s = self.out.duration.as_s();
         let (white, instants) = fast(parts);
-        let interpolated = self.out.flags.contains(TickFlags::INTERPOLATED);
-        let own = if interpolated { 0.0 } else { white * duration_s + 2.0 * instants };
-        let bridged = restored.and_then(|gains| gains.get(lane));
-        let bridged = bridged.map_or(0.0, |gain| white * gain.white + instants * gain.instants);
+        let own = if self.is_lost(lane) { 0.0 } else { white * duration_s + 2.0 * instants };
         let along = dot(&self.gyros.rows[lane], rate);
         let bias = if self.drift_sigma[lane].is_nan() {
             bias(parts, self.gyros.temperature_deg_c[lane])
@@ -110,7 +134,7 @@ impl Watched<'_> {
         let curves = self.calibration.gyros.get(lane).map(|gyro| gyro.terms.curves_over_temperature());
         Variances([
             own + self.slow(parts),
-            bridged + self.transient(lane, white * duration_s + 6.0 * instants),
+            bridged[lane] + self.transient(lane, white * duration_s + 6.0 * instants),
             self.calibrated(parts, bias, along, rate),
             self.clamped(parts, flags, &self.gyros, lane, curves.into_iter().flatten()),
         ])
@@ -234,6 +258,17 @@ impl Resolved<'_> {
         let [noise, restoration, calibration, clamping] = sums.map(|sum| sum.map(libm::sqrt));
         Causes { noise, restoration, calibration, clamping }
     }
+}
+
+/// Variances of what fits have in the gyros' increments (rad²).
+fn bridged(model: &SigmaModel, gains: Option<&[Gain; MAX_SENSORS]>) -> Lanes {
+    let mut bridged = [0.0; MAX_SENSORS];
+    let known = model.gyros.iter().zip(gains.into_iter().flatten());
+    for (bridged, (parts, gain)) in bridged.iter_mut().zip(known) {
+        let (white, instants) = fast(parts);
+        *bridged = white * gain.white + instants * gain.instants;
+    }
+    bridged
 }
 
 /// N² and Q².

@@ -19,6 +19,8 @@ pub(super) struct Axes {
     target: f64,
     /// Where the plays have been dragged to (°C).
     played: ArrayVec<f64, MAX_PLAYS>,
+    /// What readings of the last moment found.
+    found: Option<Found>,
     clamped: bool,
     /// Whether a temperature was read: the first one is not approached from the assumed one, but met.
     started: bool,
@@ -38,6 +40,16 @@ pub(super) struct Axes {
     parity: ParityCheck,
 }
 
+/// What the readings of one moment found, whichever of them came first: they act together.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Found {
+    start: Timestamp,
+    /// Longest time over which one of them acts.
+    over: Span,
+    played: ArrayVec<f64, MAX_PLAYS>,
+    started: bool,
+}
+
 impl Axes {
     /// Starts at the assumed temperature (°C).
     pub(super) fn new(orientation: &Orientation, target: f64) -> Self {
@@ -47,6 +59,7 @@ impl Axes {
             temperature: Ramp::hold(target),
             target,
             played: orientation.plays().iter().map(|_| target).collect(),
+            found: None,
             clamped: outside(orientation, target),
             started: false,
             all: mask,
@@ -68,7 +81,14 @@ impl Axes {
         start: Timestamp,
         over: Span,
     ) {
-        let over = if self.started { over } else { Span::ZERO };
+        let found = match self.found.take().filter(|found| found.start == start) {
+            Some(found) => Found { over: found.over.max(over), ..found },
+            None => Found { start, over, played: self.played.clone(), started: self.started },
+        };
+        self.played.clone_from(&found.played);
+        self.started = found.started;
+        let over = if self.started { found.over } else { Span::ZERO };
+        self.found = Some(found);
         let clamped = outside(orientation, temperature);
         let temperature = self.stick(orientation, temperature);
         self.started = true;
@@ -110,6 +130,16 @@ impl Axes {
     /// Sensors that the parity check has not excluded.
     pub(super) fn included(&self) -> SensorMask {
         self.included
+    }
+
+    /// Whether these sensors span the space at `time`.
+    pub(super) fn are_spanned_by(
+        &self,
+        orientation: &Orientation,
+        sensors: SensorMask,
+        time: Timestamp,
+    ) -> bool {
+        orientation.inverse(self.temperature.at(time), sensors).is_some()
     }
 
     /// The inverse at `time`, where it takes all sensors and none is excluded.
@@ -250,12 +280,41 @@ mod tests {
     use alloc::vec;
 
     use super::*;
-    use crate::orientation::OrientationParts;
+    use crate::orientation::{AxesPlay, OrientationParts};
 
     const TICK: Span = Span::from_ns(1_000_000_000);
 
     fn seconds(s: i64) -> Timestamp {
         Timestamp::from_ns(1_000_000_000 * s)
+    }
+
+    #[test]
+    fn readings_of_one_moment_act_together_in_whatever_order_they_come() {
+        let parts = OrientationParts {
+            reference_deg_c: 20.0,
+            rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            slopes_per_deg_c: vec![],
+            plays: vec![AxesPlay { half_width_deg_c: 0.3, share: 0.5 }],
+            weights: vec![],
+            range_deg_c: [0.0, 50.0],
+            parity_limit: None,
+            parity_confirm_ticks: 0,
+        };
+        let orientation = Orientation::new(&parts).unwrap();
+        // The first of two channels leaves the mean at either; the second has been silent for long.
+        let run = |firsts: [f64; 2], over: [Span; 2]| {
+            let mut axes = Axes::new(&orientation, 20.0);
+            for (moment, (first, both)) in (0..).zip(firsts.into_iter().zip([24.0, 26.0])) {
+                for (mean, over) in [first, both].into_iter().zip(over) {
+                    axes.update(&orientation, mean, seconds(10 * moment), over);
+                }
+            }
+            [0, 5, 11, 20].map(|s| axes.temperature_deg_c(seconds(s)))
+        };
+        let long = Span::from_ns(4 * TICK.as_ns());
+        let found = run([22.0, 25.0], [TICK, long]);
+        assert_eq!(found.map(f64::to_bits), run([24.5, 27.0], [long, TICK]).map(f64::to_bits), "{found:?}");
+        assert!((found[0] - 24.0).abs() < 1e-12 && (found[3] - 25.85).abs() < 1e-12, "{found:?}");
     }
 
     #[test]

@@ -352,6 +352,13 @@ fn of_sensors(flags: [SensorFlags; MAX_SENSORS], sensors: usize) -> Sensors<Sens
     flags
 }
 
+/// No sensor outside `usable` is used as read, whatever its own reading.
+#[cold]
+fn withdraw(flags: &mut Sensors<SensorFlags>, usable: SensorMask) {
+    let unused = flags.iter_mut().enumerate().filter(|(lane, _)| !usable.contains(*lane));
+    unused.for_each(|(_, flags)| *flags -= SensorFlags::VALID);
+}
+
 /// The first three raw readings as they are, unscaled and flagged.
 pub(super) fn pass_through(tick: &GyroTick, accel: Option<&AccelTick>) -> CorrectedTick {
     let first_three = |readings: &[f64]| {

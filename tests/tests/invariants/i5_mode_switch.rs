@@ -2,10 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use isotherm_correction::calibration::GyroParts;
 use isotherm_correction::reversal::{Reversal, ReversalParts, Transition};
-use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, TickFlags};
+use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, SensorFlags, TickFlags};
 use isotherm_correction::units::Span;
-use isotherm_tests::calibrations::{MAGNETIC_BIAS_RAD_PER_S, compile, mode_reversed};
+use isotherm_tests::calibrations::{
+    ALONG_CASE_AXES, MAGNETIC_BIAS_RAD_PER_S, compile, mode_reversed, orientation, plain_gyro,
+};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams;
 
@@ -173,7 +176,7 @@ fn i5_the_mode_dependent_bias_leaves_no_trace() {
 }
 
 #[test]
-fn i5_a_gyro_that_is_held_back_loses_nothing_and_the_next_tick_is_flagged_too() {
+fn i5_a_gyro_that_is_held_back_loses_nothing_and_the_next_two_ticks_are_flagged_too() {
     let parts = ReversalParts::default();
     let calibration = |delay_ticks| {
         let mut stated = mode_reversed(parts);
@@ -197,5 +200,46 @@ fn i5_a_gyro_that_is_held_back_loses_nothing_and_the_next_tick_is_flagged_too() 
     };
     let (plain, held) = (marked(&plain), marked(&held));
     assert!(plain.iter().all(|k| held.contains(k)), "{plain:?} {held:?}");
-    assert_eq!(held.last().copied(), plain.last().map(|k| k + 1), "{plain:?} {held:?}");
+    assert_eq!(held.last().copied(), plain.last().map(|k| k + 2), "{plain:?} {held:?}");
+}
+
+#[test]
+fn i5_a_gyro_that_is_not_used_has_no_part_in_the_bridge() {
+    let (parts, switches, n) = (ReversalParts::default(), [LAST_GOOD + 1], 3);
+    let restored = LAST_GOOD + n + 3;
+    let mut three = mode_reversed(parts);
+    three.gyros.iter_mut().for_each(|gyro| gyro.input_limit = 1.0);
+    let mut four = three.clone();
+    four.gyros.push(GyroParts { input_limit: 1.0, ..plain_gyro() });
+    let skewed = 3_f64.sqrt().recip();
+    four.gyro_orientation = orientation(&[ALONG_CASE_AXES.as_slice(), &[[skewed; 3]]].concat());
+    let run = |parts, gyro: usize, reads: f64, from: u64, to: u64| {
+        let ticks = (0..TICKS).map(|k| {
+            let mut tick = raw(k, 1.0, 0.3, &switches, n);
+            if gyro == 3 {
+                tick.readings.push(3_f64.sqrt() * truth(k, 1.0, 0.3) / TICK_S);
+            }
+            if (from..to).contains(&k) {
+                tick.readings[gyro] = reads;
+            }
+            tick
+        });
+        drive::run(&mut drive::unit(&compile(parts)), &[Owned::Gyro(ticks.collect())])
+    };
+    let flags = |out: &[CorrectedTick]| out.iter().fold(TickFlags::empty(), |all, tick| all | tick.flags);
+    for reads in [f64::NAN, 5.0, -1e9] {
+        for (from, to) in [(18, 19), (20, 21), (16, 21), (24, 25), (24, 26), (24, 60), (26, 27), (0, 60)] {
+            let out = run(&four, 3, reads, from, to);
+            let error = error(&out, LAST_GOOD, restored, 1.0, 0.3) / ARCSEC;
+            assert!(error.abs() < 1.0, "{reads} in {from}…{to}: {error}″");
+            assert!(!flags(&out).intersects(TickFlags::SWITCH_UNRESOLVED | TickFlags::ANGLE_INVALID));
+            let at = |tick: &&CorrectedTick| tick.sequence == restored;
+            let used = out.iter().find(at).unwrap().gyro_flags[3].contains(SensorFlags::VALID);
+            assert_eq!(used, ![(16, 21), (24, 26), (24, 60), (26, 27), (0, 60)].contains(&(from, to)));
+        }
+        // The other two do not do without.
+        let unresolved = run(&three, 0, reads, 10, 60);
+        let unresolved = unresolved.iter().filter(|tick| tick.flags.contains(TickFlags::SWITCH_UNRESOLVED));
+        assert_eq!(unresolved.map(|tick| tick.sequence).collect::<Vec<_>>(), [21, 22, 23, restored]);
+    }
 }

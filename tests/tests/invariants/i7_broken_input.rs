@@ -5,6 +5,7 @@
 use isotherm_correction::sample::{
     AccelTick, CorrectedTick, GyroTick, SensorFlags, TemperatureReading, TickFlags,
 };
+use isotherm_correction::sigma::SigmaParts;
 use isotherm_correction::unit::{Counters, Event, UnitSettings};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::{RawStream, UnitId};
@@ -78,6 +79,22 @@ fn i7_each_kind_of_broken_tick_is_counted_and_harmless() {
             assert_eq!(announced, Some(1), "{name}");
         }
     }
+}
+
+#[test]
+fn i7_nothing_is_known_of_the_error_of_an_invalid_velocity() {
+    let mut parts = identity();
+    parts.accels[0].sigma = Some(SigmaParts::default());
+    let half = AccelTick { duration: Span::from_ns(2_500_000), ..accel(1, &RATES) };
+    let events = [accel(0, &RATES), half].map(|tick| Owned::Accel(vec![tick]));
+    let gyros = Owned::Gyro((0..2).map(|k| gyro(k, &RATES)).collect());
+    let out = drive::run(&mut drive::unit(&compile(&parts)), &[&events[..], &[gyros]].concat());
+    let invalid = |tick: &CorrectedTick| tick.flags.contains(TickFlags::VELOCITY_INVALID);
+    let unknown = |tick: &CorrectedTick| tick.sigma.as_deref().unwrap().velocity.restoration[0].is_nan();
+    assert_eq!(
+        out.iter().map(|tick| [invalid(tick), unknown(tick)]).collect::<Vec<_>>(),
+        [[false; 2], [true; 2]]
+    );
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! Laws of every term that is declared, whichever these are: what a term adds is proportional to its coefficient, makes no jump, and is
 //! finite for whatever comes in.
 
-use isotherm_correction::calibration::CalibrationParts;
+use isotherm_correction::calibration::{CalibrationParts, TermParts};
 use isotherm_correction::sample::{ChannelName, CorrectedTick, TemperatureReading};
-use isotherm_correction::thermal::{ACCEL_TERMS, GYRO_TERMS, Term};
-use isotherm_tests::calibrations::{compile, stated, with_auxiliaries};
+use isotherm_correction::thermal::{ACCEL_TERMS, Feature, GYRO_TERMS, Term};
+use isotherm_tests::calibrations::{
+    ALONG_CASE_AXES, compile, constant, identity, orientation, plain_accel, stated, with_auxiliaries,
+};
 use isotherm_tests::drive::{self, Owned};
 use isotherm_tests::streams::{accel, gyro, temperature};
 
@@ -107,5 +109,33 @@ fn whatever_comes_in_what_goes_out_is_finite() {
                 .all(|tick| tick.delta_angle.iter().chain(&tick.delta_velocity).all(|x| x.is_finite()));
             assert!(finite, "{} times {times}", term.key);
         }
+    }
+}
+
+#[test]
+fn gyros_drift_with_the_force_of_the_accelerometers_that_are_used() {
+    let mut parts = identity();
+    parts.gyros[0].terms.push(TermParts::new(Feature::ForceX, constant(1e-4)));
+    parts.accels.push(plain_accel());
+    let skewed = 3_f64.sqrt().recip();
+    parts.accel_orientation = Some(orientation(&[ALONG_CASE_AXES.as_slice(), &[[skewed; 3]]].concat()));
+    let run = |dead: usize| {
+        let events = (0..200).flat_map(|k: u32| {
+            let force = (0.1 * f64::from(k)).sin();
+            let mut forces = [force, 0.0, 0.0, skewed * force];
+            if k >= 20 {
+                forces[dead..].fill(f64::NAN);
+            }
+            [Owned::Accel(vec![accel(k.into(), &forces)]), Owned::Gyro(vec![gyro(k.into(), &[0.0; 3])])]
+        });
+        let events: Vec<_> = events.collect();
+        drive::run(&mut drive::unit(&compile(&parts)), &events)
+    };
+    let [all, one_less, two] = [4, 3, 2].map(run);
+    for (k, tick) in all.iter().enumerate() {
+        assert!((one_less[k].delta_angle[0] - tick.delta_angle[0]).abs() < 1e-18, "{k}");
+        // Two accelerometers tell no force: the last one stands.
+        let known = &all[k.min(19)];
+        assert!((two[k].delta_angle[0] - known.delta_angle[0]).abs() < 1e-18, "{k}");
     }
 }

@@ -3,7 +3,7 @@
 use core::array;
 
 use super::needs::Needs;
-use super::{Corrector, Paired, of_sensors};
+use super::{Corrector, Paired, of_sensors, withdraw};
 use crate::calibration::Calibration;
 use crate::lanes::{narrow, put, within};
 use crate::observation::SOUND;
@@ -22,6 +22,8 @@ pub(super) struct Felt<const N: usize> {
     pub(super) forces: [f64; N],
     /// Accelerometers whose reading counts.
     usable: SensorMask,
+    /// Whether all of them tell of the same time.
+    comparable: bool,
     /// Measured duration of their tick (s).
     duration_s: f64,
     /// Inverse of the axes of all accelerometers, where it is worked out already.
@@ -124,19 +126,21 @@ impl Corrector {
         put(&mut seen.reading, *readings);
         seen.flags = flags;
         out.accel_flags = of_sensors(flags, count);
+        let mut comparable = true;
         if self.calm.needs.intersects(Needs::SQUARES.union(Needs::DELAYS)) {
             let (mut left, mut counted) = (forces, usable);
             if self.calm.needs.contains(Needs::SQUARES) {
                 self.remove_squares(shares, &mut left);
             }
             if self.calm.needs.contains(Needs::DELAYS) {
-                self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
+                comparable = self.hold_accels_back(calibration, tick, duration_s, (&mut left, &mut counted));
+                withdraw(&mut out.accel_flags, counted);
             }
             (forces, usable) = (left, counted);
         }
-        let mut felt = Felt { forces, usable, duration_s, inverse: None };
-        if self.calm.needs.contains(Needs::FORCE) & within {
-            felt.inverse = self.note_force(orientation, forces, time);
+        let mut felt = Felt { forces, usable, comparable, duration_s, inverse: None };
+        if self.calm.needs.contains(Needs::FORCE) {
+            felt.inverse = self.note_force(orientation, (forces, usable), time);
         }
         Some(felt)
     }
@@ -147,7 +151,7 @@ impl Corrector {
     pub(super) fn resolve_force<const N: usize>(
         &mut self,
         calibration: &Calibration,
-        Felt { forces, usable, duration_s, inverse }: Felt<N>,
+        Felt { forces, usable, comparable, duration_s, inverse }: Felt<N>,
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
@@ -161,7 +165,9 @@ impl Corrector {
         let time = out.end_time;
         let sensors = orientation.sensors();
         let mut excluded = false;
-        if sensors > MIN_SENSORS {
+        if sensors > MIN_SENSORS && !comparable {
+            out.accel_parity.clear();
+        } else if sensors > MIN_SENSORS {
             let watched = forces;
             let left_over = (&mut out.accel_parity, &mut out.flags);
             excluded = axes.watch(orientation, usable, &watched[..sensors], left_over);

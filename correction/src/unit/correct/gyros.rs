@@ -3,9 +3,9 @@
 use core::array;
 
 use super::needs::Needs;
-use super::{Corrector, Paired, of_sensors};
+use super::{Corrector, Paired, of_sensors, withdraw};
 use crate::calibration::Calibration;
-use crate::lanes::{narrow, put, within};
+use crate::lanes::{Lanes, narrow, put, within};
 use crate::observation::SOUND;
 use crate::orientation::SensorMask;
 use crate::reversal::{Reversal, Substitution, TickInput};
@@ -164,29 +164,46 @@ impl Corrector {
 
         match reversal {
             Some((_, input)) if self.substitution.passes(&input) => {
-                // A memory of the unit holds them, and is the same to the bit wherever it is made.
-                let counted: [f64; N] = array::from_fn(|i| if i < count { rates[i] } else { f64::NAN });
-                let mut of_sensors = [f64::NAN; MAX_SENSORS];
-                put(&mut of_sensors, counted);
-                self.substitution.pass(&input, of_sensors);
+                self.pass_switches(&input, (rates, count), (!sound).then_some(usable));
             }
             None if !self.calm.needs.contains(Needs::SPECIAL) => {}
             _ => {
-                let mut bridged = increments;
-                out.flags |= self.substitute(reversal, &mut bridged[..count]);
-                increments = bridged;
+                let (mut bridged, mut counted) = (increments, usable);
+                self.substitute(calibration, reversal, (&mut bridged[..count], &mut counted), out);
+                (increments, usable) = (bridged, counted);
             }
         }
         if out.flags.intersects(SWITCHING) {
             count_switch_flags(out.flags, counters);
         }
+        let mut comparable = true;
         if self.calm.needs.contains(Needs::DELAYS) {
             let (mut held, mut counted) = (increments, usable);
-            let given = self.hold_gyros_back(calibration, tick, &mut out.flags, (&mut held, &mut counted));
-            (increments, usable, rates) = (held, counted, given.unwrap_or(rates));
+            (rates, comparable) = self.hold_gyros_back(calibration, tick, (&mut held, &mut counted), out);
+            (increments, usable) = (held, counted);
         }
         self.seen.settled = !lost && self.slew.is_none() && !out.flags.intersects(UNSETTLED);
-        self.resolve_angle(calibration, usable, (increments, rates), counters, out);
+        let watched = comparable.then_some(rates);
+        self.resolve_angle(calibration, usable, (increments, watched), counters, out);
+    }
+
+    /// Remembers the rates (rad/s) of a tick away from mode switches; `usable`: the gyros whose readings count, where these are not all.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
+    fn pass_switches<const N: usize>(
+        &mut self,
+        input: &TickInput,
+        (rates, count): ([f64; N], usize),
+        usable: Option<SensorMask>,
+    ) {
+        // A memory of the unit holds them, and is the same to the bit wherever it is made.
+        let counted: [f64; N] = array::from_fn(|i| if i < count { rates[i] } else { f64::NAN });
+        let mut of_sensors = [f64::NAN; MAX_SENSORS];
+        put(&mut of_sensors, counted);
+        if let Some(usable) = usable {
+            leave_out(&mut of_sensors, usable);
+        }
+        self.substitution.pass(input, of_sensors);
     }
 
     /// Remembers the rates (rad/s) of those readings that were good.
@@ -249,27 +266,49 @@ impl Corrector {
         flags
     }
 
-    /// Bridges a mode switch (models §5).
-    fn substitute(&mut self, reversal: Option<(&Reversal, TickInput)>, increments: &mut [f64]) -> TickFlags {
-        match reversal {
-            Some((reversal, input)) => self.substitution.tick(reversal, input, increments),
+    /// Bridges a mode switch (models §5). Gyros that it has no angle of leave `usable`, where the others do without.
+    fn substitute(
+        &mut self,
+        calibration: &Calibration,
+        reversal: Option<(&Reversal, TickInput)>,
+        (increments, usable): (&mut [f64], &mut SensorMask),
+        out: &mut CorrectedTick,
+    ) {
+        out.flags |= match reversal {
+            Some((reversal, input)) => {
+                let mut flags = self.substitution.tick(reversal, input, increments, *usable);
+                let axes = &self.thermal.gyro_axes;
+                let others = axes.included().but(self.substitution.apart());
+                if flags.intersects(TickFlags::INTERPOLATED | TickFlags::ANGLE_RESTORED)
+                    && others != axes.included()
+                {
+                    if axes.are_spanned_by(&calibration.gyro_orientation, others, input.end_time) {
+                        *usable = usable.intersection(others);
+                    } else {
+                        flags |= TickFlags::SWITCH_UNRESOLVED;
+                    }
+                }
+                withdraw(&mut out.gyro_flags, *usable);
+                flags
+            }
             // A swap took the substitution away in the middle of a transition.
             None if !self.substitution.is_settled() => {
                 self.substitution = Substitution::default();
                 TickFlags::SWITCH_UNRESOLVED
             }
             None => TickFlags::empty(),
-        }
+        };
     }
 
-    /// Resolves the increments (rad) in case axes, and watches the parity of the rates before the substitution (rad/s).
+    /// Resolves the increments (rad) in case axes, and watches the parity of the rates before the substitution (rad/s), where these can be
+    /// compared.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     fn resolve_angle<const N: usize>(
         &mut self,
         calibration: &Calibration,
         usable: SensorMask,
-        (increments, rates): ([f64; N], [f64; N]),
+        (increments, rates): ([f64; N], Option<[f64; N]>),
         counters: &mut Counters,
         out: &mut CorrectedTick,
     ) {
@@ -278,9 +317,8 @@ impl Corrector {
         let mut excluded = false;
         if orientation.sensors() > MIN_SENSORS {
             out.gyro_parity.clear();
-            let watched = rates;
-            let watched = &watched[..orientation.sensors()];
-            if !out.flags.contains(TickFlags::INTERPOLATED) {
+            if let Some(watched) = rates.filter(|_| !out.flags.contains(TickFlags::INTERPOLATED)) {
+                let watched = &watched[..orientation.sensors()];
                 excluded = axes.watch(orientation, usable, watched, (&mut out.gyro_parity, &mut out.flags));
             }
         }
@@ -316,6 +354,13 @@ impl<const N: usize> Scale<N> {
         }
         array::from_fn(|lane| self.weight[lane] * readings[lane])
     }
+}
+
+/// Makes no number of what gyros outside `usable` are said to read.
+#[cold]
+fn leave_out(rates: &mut Lanes, usable: SensorMask) {
+    let unused = rates.iter_mut().enumerate().filter(|(lane, _)| !usable.contains(*lane));
+    unused.for_each(|(_, rate)| *rate = f64::NAN);
 }
 
 /// What the substitution must know of a tick.

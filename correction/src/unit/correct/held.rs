@@ -8,11 +8,11 @@ use core::array;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Corrector, Paired};
+use super::{Corrector, Paired, withdraw};
 use crate::calibration::Calibration;
 use crate::lanes::{Lanes, narrow, put};
 use crate::orientation::SensorMask;
-use crate::sample::{MAX_SENSORS, TickFlags};
+use crate::sample::{CorrectedTick, MAX_SENSORS, TickFlags};
 use crate::units::Span;
 
 /// What holds for a tick that has part of such a tick in it, too.
@@ -24,8 +24,8 @@ const CARRIED: TickFlags =
 pub(super) struct HeldBack {
     gyros: Held,
     accels: Held,
-    /// Of the last tick.
-    flags: TickFlags,
+    /// Of the last two ticks, without what these have of others, newest first.
+    flags: [TickFlags; 2],
 }
 
 /// Likewise of one kind of sensor (rad, or m/s).
@@ -35,6 +35,8 @@ struct Held {
     fresh: bool,
     /// Increments of the last tick; `None` before the first and after a gap.
     before: Option<Lanes>,
+    /// Whether what the next tick is to give was found with those of the tick before the last one.
+    curved: bool,
     /// What the next tick is to give.
     owed: Lanes,
     /// Sensors whose last reading does not count.
@@ -43,13 +45,19 @@ struct Held {
 
 impl Held {
     /// Holds part of a tick's increments back, and gives what was held back of the last one. A sensor whose last reading did not count
-    /// leaves `usable`.
+    /// leaves `usable`. Whether what is left of all sensors is of the same time: not next to the beginning or a gap.
     fn pass<const N: usize>(
         &mut self,
         ticks: &[f64; N],
         (increments, usable): (&mut [f64; N], &mut SensorMask),
-    ) {
-        let before = self.before.as_ref().map_or(*increments, |before| *narrow(before));
+    ) -> bool {
+        // What stood in for a reading that did not count tells of no slope.
+        let before: [f64; N] = array::from_fn(|lane| match &self.before {
+            Some(before) if !self.unusable.contains(lane) => before[lane],
+            _ => increments[lane],
+        });
+        let curved = self.before.is_some();
+        let comparable = core::mem::replace(&mut self.curved, curved) && curved;
         let back: [f64; N] = array::from_fn(|lane| {
             let (held, increment) = (ticks[lane], increments[lane]);
             held * increment + 0.5 * held * (1.0 - held) * (increment - before[lane])
@@ -67,6 +75,7 @@ impl Held {
             *usable = usable.set(lane, counts && (counted || given == 0.0));
             self.unusable = self.unusable.set(lane, !counts);
         }
+        comparable
     }
 
     /// Whether the next tick is to give nothing.
@@ -79,7 +88,7 @@ impl HeldBack {
     /// Before the first tick of a series, or in the middle of one.
     fn new(fresh: bool) -> Self {
         let held = || Held { fresh, ..Held::default() };
-        Self { gyros: held(), accels: held(), flags: TickFlags::empty() }
+        Self { gyros: held(), accels: held(), flags: [TickFlags::empty(); 2] }
     }
 
     /// Forgets the increments of the last tick: ticks are missing behind it.
@@ -101,32 +110,46 @@ impl Corrector {
         self.motion.held.get_or_insert_with(|| Box::new(HeldBack::new(is_first)))
     }
 
-    /// Holds the gyros' increments (rad) back; what the substitution made of the last tick holds for this one too. Gives their mean rates
-    /// (rad/s), where they are rates.
+    /// Which flags of this tick and the last one are their own, and how many ticks each gyro is held back; `None` where none is.
+    pub(super) fn gyros_held_back(
+        &self,
+        calibration: &Calibration,
+        flags: TickFlags,
+    ) -> ([TickFlags; 2], Option<Lanes>) {
+        let Some(held) = self.motion.held.as_deref() else { return ([flags, TickFlags::empty()], None) };
+        let ticks = self.on_its_way(calibration, |motion| &motion.held_back_ticks[0]);
+        ([(flags - CARRIED) | held.flags[0], held.flags[1]], Some(ticks))
+    }
+
+    /// Holds the gyros' increments (rad) back; what the substitution made of the last two ticks holds for this one too. Gives their mean
+    /// rates (rad/s), and whether parity can compare them.
     #[cold]
     pub(super) fn hold_gyros_back<const N: usize>(
         &mut self,
         calibration: &Calibration,
         tick: &Paired<'_>,
-        flags: &mut TickFlags,
         (increments, usable): (&mut [f64; N], &mut SensorMask),
-    ) -> Option<[f64; N]> {
+        out: &mut CorrectedTick,
+    ) -> ([f64; N], bool) {
         let [gyros, accels] = [0, 1]
             .map(|kind: usize| self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[kind]));
         let held = self.held(tick);
-        held.gyros.pass(&gyros, (increments, usable));
-        let before = core::mem::replace(&mut held.flags, *flags & CARRIED);
-        *flags |= before;
-        let none = gyros.iter().chain(&accels).all(|ticks| *ticks == 0.0);
+        let comparable = held.gyros.pass(&gyros, (increments, usable));
+        let [last, one_before] = held.flags;
+        held.flags = [out.flags & CARRIED, last];
+        out.flags |= last | one_before;
+        withdraw(&mut out.gyro_flags, *usable);
+        let carries = out.flags.intersects(CARRIED);
+        let none = !carries && gyros.iter().chain(&accels).all(|ticks| *ticks == 0.0);
         if none && held.gyros.owes_nothing() && held.accels.owes_nothing() {
             self.motion.held = None;
             self.disturb();
         }
         let per_second = 1.0 / tick.gyro.duration.as_s();
-        (!flags.intersects(CARRIED)).then(|| increments.map(|increment| increment * per_second))
+        (increments.map(|increment| increment * per_second), comparable && !carries)
     }
 
-    /// Holds back what the accelerometers feel (m/s²) over a tick of `duration_s`.
+    /// Holds back what the accelerometers feel (m/s²) over a tick of `duration_s`. Whether parity can compare what is left.
     #[cold]
     pub(super) fn hold_accels_back<const N: usize>(
         &mut self,
@@ -134,10 +157,11 @@ impl Corrector {
         tick: &Paired<'_>,
         duration_s: f64,
         (forces, usable): (&mut [f64; N], &mut SensorMask),
-    ) {
+    ) -> bool {
         let ticks = self.on_its_way::<N>(calibration, |motion| &motion.held_back_ticks[1]);
         let mut increments = forces.map(|force| force * duration_s);
-        self.held(tick).accels.pass(&ticks, (&mut increments, usable));
+        let comparable = self.held(tick).accels.pass(&ticks, (&mut increments, usable));
         *forces = increments.map(|increment| increment / duration_s);
+        comparable
     }
 }

@@ -181,20 +181,21 @@ impl Corrector {
         clamped
     }
 
-    /// Notes the specific force of a tick in case axes, from what the accelerometers feel (m/s²), for the gyros that drift with it; where
+    /// Notes the specific force of a tick in case axes, from what the usable accelerometers feel (m/s²), for the gyros that drift with it; where
     /// it is not to be had, the last one stands. Gives the inverse of the axes, where that is of all accelerometers.
     #[expect(clippy::inline_always, reason = "once per tick: lanes that stay in registers")]
     #[inline(always)]
     pub(super) fn note_force<const N: usize>(
         &mut self,
         orientation: &Orientation,
-        forces: [f64; N],
+        (forces, usable): ([f64; N], SensorMask),
         time: Timestamp,
     ) -> Option<[[f64; 4]; N]> {
         let axes = self.thermal.accel_axes.as_mut()?;
-        let Some(inverse) = axes.inverse(time) else {
+        let whole = if usable == axes.included() { axes.inverse(time) } else { None };
+        let Some(inverse) = whole else {
             let felt = forces;
-            if let (force, true) = axes.resolve_some(orientation, axes.included(), &felt, time) {
+            if let (force, true) = axes.resolve_some(orientation, usable, &felt, time) {
                 self.motion.force = force;
             }
             return None;

@@ -36,10 +36,13 @@ impl Corrector {
                 *to = estimate.map_or(f64::NAN, |estimate| estimate.sigma);
             }
         }
+        let (own_flags, held_back_ticks) = self.gyros_held_back(calibration, out.flags);
         let watched = Watched {
             calibration,
             seen: &self.seen,
             out,
+            own_flags,
+            held_back_ticks,
             substitution: &self.substitution,
             since_turn_on_s,
             gyros: resolved(&calibration.gyro_orientation, &thermal.gyro_axes, &thermal.gyro_footing),
