@@ -27,7 +27,6 @@ use super::file::Read;
 use super::manager::Worker;
 use super::request::Request;
 use crate::control::watch::{FolderEvent, read_document};
-use crate::receive::intake::Answers;
 use isotherm_document::unplaced;
 
 /// Why an overlay in the folder is not taken.
@@ -214,7 +213,7 @@ impl Worker {
             self.settle(path, Vec::new());
             return true;
         }
-        if let Some(unit) = named.filter(|unit| self.intake.answers_for(unit) != Answers::Here) {
+        if let Some(unit) = named.filter(|unit| !self.intake.speaks_for(unit)) {
             tracing::info!("{} is left to the instance that publishes its unit", path.display());
             self.settle(path, Vec::new());
             self.leave(&unit, path, read.digest, at_start);

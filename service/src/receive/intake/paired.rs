@@ -14,6 +14,8 @@ use crate::receive::fault::{FaultKind, standing};
 /// How long whoever asks something of a unit waits until it is known which instance speaks for it, and how often that is looked for.
 const LONGEST_DOUBT: Duration = Duration::from_millis(500);
 const DOUBT_INTERVAL: Duration = Duration::from_millis(5);
+/// The same where this process stood still: the watch looks long before, unless the machine is too busy to tell.
+const LONGEST_STILL: Duration = Duration::from_millis(100);
 
 /// Which instance does what is asked for of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,7 +58,10 @@ impl Intake {
     pub(crate) fn answers_for(&self, unit: &UnitId) -> Answers {
         let since = Instant::now();
         let pair = self.pair.as_ref();
-        let stood_still = || pair.is_some_and(|pair| pair.has_stood_still(Instant::now()).is_some());
+        let stood_still = || {
+            since.elapsed() < LONGEST_STILL
+                && pair.is_some_and(|pair| pair.has_stood_still(Instant::now()).is_some())
+        };
         let is_alone = || pair.is_some_and(|pair| pair.standing().alone_since.is_some());
         let is_open = || {
             let [doubts, speaks] =
