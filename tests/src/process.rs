@@ -16,12 +16,8 @@ pub fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("the running test has a path");
     let folder =
         test.parent().and_then(|deps| deps.parent()).expect("target/PROFILE/deps/TEST").to_path_buf();
-    // `cargo test` builds the programs of tested packages only; a test of this package alone needs them too. Whoever has built them
-    // says so: cargo would wait for another that is building beside the tests.
+    // `cargo test` builds the programs of tested packages only; a test of this package alone needs them too.
     BUILD.call_once(|| {
-        if std::env::var_os("ISOTHERM_BUILT").is_some() {
-            return;
-        }
         let target = folder.parent().expect("target/PROFILE");
         let mut cargo = Command::new(env!("CARGO"));
         // The whole workspace, so that the dependencies have the features that they have under test.

@@ -91,12 +91,8 @@ pub(crate) fn json(arguments: &[&str]) -> Value {
 pub(crate) fn replayed(log: &[&str], document: &str, more: &[&str]) -> Vec<CorrectedTick> {
     static BUILD: Once = Once::new();
     let own = Path::new(env!("CARGO_BIN_EXE_isotherm-calibrate"));
-    // `cargo test` builds the programs of the tested package only; built with all, so that features are the same. Not where somebody
-    // says that they are built.
+    // `cargo test` builds the programs of the tested package only; built with all, so that features are the same.
     BUILD.call_once(|| {
-        if std::env::var_os("ISOTHERM_BUILT").is_some() {
-            return;
-        }
         let target = own.parent().unwrap();
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["build", "--quiet", "--workspace", "--bins", "--target-dir"]);
