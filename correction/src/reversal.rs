@@ -119,8 +119,8 @@ impl Substitution {
     ///
     /// `increments` are the angle increments per sensor (rad), scaled and with every bias removed; those of a
     /// lost tick are overwritten unread. The readings of sensors outside `counted` are no basis of a bridge. Returns
-    /// which of `INTERPOLATED`, `ANGLE_RESTORED` and `SWITCH_UNRESOLVED` apply to all sensors but those that stand
-    /// [`apart`](Self::apart).
+    /// which of `INTERPOLATED`, `ANGLE_RESTORED` and `SWITCH_UNRESOLVED` apply to all sensors but those without a
+    /// reading about the switch, which stand apart.
     ///
     /// A mode that differs from the last one without a command begins a transition at this tick; where ticks
     /// are missing before it the switch may have come later than the gap's start, so all n are counted
