@@ -62,17 +62,33 @@ async fn a_tick_with_other_bits_is_an_alarm_that_names_it() {
         let _ = sender.send((sample.key_expr().clone(), sample.payload().to_bytes().into_owned()));
     });
     let listening = listening.await.unwrap();
-    let (topic, frame) = tokio::time::timeout(LIMIT, heard.recv()).await.unwrap().unwrap();
+    let (deadline, mut changed) = (tokio::time::Instant::now() + LIMIT, Vec::new());
+    let words = loop {
+        // On a busy machine one that comes after its time is compared with nothing: another one, then.
+        while heard.try_recv().is_ok() {}
+        let (topic, frame) = tokio::time::timeout(LIMIT, heard.recv()).await.unwrap().unwrap();
+        let mut batch: CorrectedBatch = codec::decode(&frame).unwrap();
+        let tick = &mut batch.ticks[0];
+        if changed.contains(&tick.sequence) {
+            continue;
+        }
+        changed.push(tick.sequence);
+        tick.delta_angle[1] = f64::from_bits(tick.delta_angle[1].to_bits() ^ 1);
+        stand.session.put(topic, codec::encode(&batch).unwrap()).await.unwrap();
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        if let Some(fault) = faults(&stand, "instances_disagree").await.first() {
+            break fault.first.clone();
+        }
+        assert!(tokio::time::Instant::now() < deadline, "{changed:?}");
+    };
     drop(listening);
-    let mut batch: CorrectedBatch = codec::decode(&frame).unwrap();
-    let tick = &mut batch.ticks[0];
-    let (sequence, right) = (tick.sequence, tick.delta_angle[1]);
-    tick.delta_angle[1] = f64::from_bits(right.to_bits() ^ 1);
-    stand.session.put(topic, codec::encode(&batch).unwrap()).await.unwrap();
-    let words = told(&stand, "instances_disagree").await;
-    for part in [format!("unit {UNIT}"), format!("sequence {sequence}:"), "delta_angle_rad".to_owned()] {
+    for part in [format!("unit {UNIT}"), "delta_angle_rad".to_owned()] {
         assert!(words.contains(&part), "{part}: {words}");
     }
+    assert!(
+        changed.iter().any(|sequence| words.contains(&format!("sequence {sequence}:"))),
+        "{changed:?}: {words}"
+    );
     let standby = reports(&stand.session).await.into_iter().flat_map(|report| report.units);
     assert!(standby.map(|unit| unit.ticks_differing).sum::<u64>() > 0);
     // It takes the other's memory anew, and stands by again.
