@@ -56,10 +56,18 @@ fn actor(outlet: Outlet) -> UnitActor {
     UnitActor::new(UnitId::new("U-1").unwrap(), UnitSettings::default(), tail_flush, outlet)
 }
 
+const EXAMPLE: &str = include_str!("../../../../config/calibration/example-full.toml");
+
 fn example() -> (Arc<Calibration>, [u8; 8]) {
-    let text = include_str!("../../../../config/calibration/example-full.toml");
-    let parsed = Document::parse(text, None).unwrap();
+    let parsed = Document::parse(EXAMPLE, None).unwrap();
     (Arc::new(parsed.calibration), *parsed.digest.first_chunk().unwrap())
+}
+
+/// The example with its text, and an overlay or none.
+fn compiled(overlay: Option<Digest>) -> Arc<Compiled> {
+    let parsed = Document::parse(EXAMPLE, None).unwrap();
+    let label = Label { overlay, ..Label::of(&parsed.document, Digest(parsed.digest), "") };
+    Arc::new(Compiled::new(Arc::new(parsed.calibration), label, Compressed::new(EXAMPLE.as_bytes())))
 }
 
 /// Gives a unit a calibration from the next tick on, as the next revision.

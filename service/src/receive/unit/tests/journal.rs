@@ -8,8 +8,6 @@ use isotherm_protocol::key::Input;
 
 use super::*;
 
-const EXAMPLE: &str = include_str!("../../../../../config/calibration/example-full.toml");
-
 /// What a journal was given.
 #[derive(Clone, Default)]
 struct Tape(Arc<Mutex<(Joiner, Vec<JournalEntry>)>>);
@@ -88,13 +86,9 @@ impl Bench {
     }
 
     fn change(&mut self, at: Schedule, slew: Span) {
-        let parsed = Document::parse(EXAMPLE, None).unwrap();
-        let digest = Digest(parsed.digest);
-        let label = Label { overlay: Some(Digest([3; 32])), ..Label::of(&parsed.document, digest, "") };
-        let text = Compressed::new(EXAMPLE.as_bytes());
         let next = Given::new(
             self.actor.stream.next_counter(),
-            Arc::new(Compiled::new(Arc::new(parsed.calibration), label, text)),
+            compiled(Some(Digest([3; 32]))),
             &isotherm_protocol::history::Source::Rollback { to: 1 },
         );
         self.actor.change(Change { next: Arc::new(next), at, slew });

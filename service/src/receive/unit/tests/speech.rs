@@ -219,11 +219,6 @@ fn what_was_ordered_here_holds_though_the_memory_of_the_other_instance_is_older(
 
 /// A change to a document with its text, from the next tick on.
 fn document(counter: u64) -> Change {
-    let text = include_str!("../../../../../config/calibration/example-full.toml");
-    let parsed = Document::parse(text, None).unwrap();
-    let digest = Digest(parsed.digest);
-    let label = Label::of(&parsed.document, digest, "");
-    let compiled = Compiled::new(Arc::new(parsed.calibration), label, Compressed::new(text.as_bytes()));
-    let next = Arc::new(Given::new(counter, Arc::new(compiled), &isotherm_protocol::history::Source::Bus));
+    let next = Arc::new(Given::new(counter, compiled(None), &isotherm_protocol::history::Source::Bus));
     Change { next, at: Schedule::NextTick, slew: Span::ZERO }
 }
