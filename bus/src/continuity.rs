@@ -36,13 +36,13 @@ impl Continuity {
             Some(_) if flags.contains(TickFlags::RESTART) => self.restarts += 1,
             Some((same, last)) if same == series => {
                 let expected = last.saturating_add(1).saturating_add(missed);
-                self.lost += first.saturating_sub(expected);
-                self.duplicated += expected.saturating_sub(first);
+                add(&mut self.lost, first.saturating_sub(expected));
+                add(&mut self.duplicated, expected.saturating_sub(first));
             }
             _ => {}
         }
         self.ticks += ticks;
-        self.announced_missing += missed;
+        add(&mut self.announced_missing, missed);
         self.last = Some((series, sequence));
         if flags.contains(TickFlags::UNCALIBRATED) {
             self.uncalibrated += ticks;
@@ -60,4 +60,9 @@ impl Continuity {
     pub fn is_whole(&self) -> bool {
         self.lost == 0 && self.duplicated == 0
     }
+}
+
+/// What a frame says may be any number.
+fn add(counter: &mut u64, ticks: u64) {
+    *counter = counter.saturating_add(ticks);
 }

@@ -71,10 +71,10 @@ class Account:
             self.restarts += 1
         elif self.last_sequence is not None and series == self.last_series:
             expected = min(_MOST, self.last_sequence + 1 + missed)
-            self.lost += max(0, first - expected)
-            self.duplicated += max(0, expected - first)
+            self.lost = min(_MOST, self.lost + max(0, first - expected))
+            self.duplicated = min(_MOST, self.duplicated + max(0, expected - first))
         self.ticks += max(1, int(tick["ticks"]))
-        self.announced_missing += missed
+        self.announced_missing = min(_MOST, self.announced_missing + missed)
         self.last_sequence, self.last_series = int(tick["sequence"]), series
 
 
