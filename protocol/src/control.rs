@@ -19,3 +19,8 @@ pub use swap::{
 
 /// Longest name of an operator or program, in characters.
 pub const MAX_BY: usize = 64;
+
+/// Whether a text can say who asks.
+pub(crate) fn is_by(text: &str) -> bool {
+    text.chars().count() <= MAX_BY && !text.contains(char::is_control)
+}

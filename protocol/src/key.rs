@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::control::MAX_BY;
+use crate::control::is_by;
 use crate::digest::Digest;
 
 /// Longest serial, in bytes.
@@ -275,8 +275,8 @@ pub fn asker(key: &str) -> (&str, Option<&str>) {
 
 /// Whether a name fits in a key, and in the audit file.
 fn is_name(name: &str) -> bool {
-    let unfit = |c: char| c.is_control() || "/*$#?".contains(c);
-    (1..=MAX_BY).contains(&name.chars().count()) && !name.contains(unfit)
+    // No `*` stands for a chunk that begins with `@`: nobody would hear it.
+    is_by(name) && !name.is_empty() && !name.starts_with('@') && !name.contains(['/', '*', '$', '#', '?'])
 }
 
 /// Key of a document or an overlay in a service instance's state folder: `isotherm/{instance}/kept/{digest}`.
@@ -365,7 +365,7 @@ mod tests {
         for order in [calibration(&unit), command(&unit)] {
             assert_eq!(asker(&order), (&*order, None));
             assert_eq!(asker(&by(&order, "ann of the bench").unwrap()), (&*order, Some("ann of the bench")));
-            for name in ["", "*", "$*", "a/b", "a\n", &"x".repeat(65)] {
+            for name in ["", "*", "$*", "a/b", "a\n", "@ann", &"x".repeat(65)] {
                 assert_eq!(by(&order, name), None, "{name:?}");
             }
             let anybody = format!("{order}/*");

@@ -3,8 +3,8 @@
 use isotherm_correction::operation::State;
 use serde::{Deserialize, Serialize};
 
-use super::MAX_BY;
 use super::swap::SwapReply;
+use super::{MAX_BY, is_by};
 use crate::escape::clipped;
 
 /// What of an error of JSON is shown, in characters.
@@ -37,7 +37,7 @@ impl CommandOrder {
             return Err("the command cannot be read: \"command\" must be the name of a command".to_owned());
         }
         let order: Self = serde_json::from_value(value).map_err(unreadable)?;
-        if order.by.chars().count() > MAX_BY || order.by.chars().any(char::is_control) {
+        if !is_by(&order.by) {
             return Err(format!(
                 "by must have at most {MAX_BY} characters, none of them a control character"
             ));

@@ -6,7 +6,8 @@ pub use isotherm_correction::unit::At as Schedule;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::MAX_BY;
+use super::is_by;
+use crate::digest;
 use crate::document::Problem;
 use crate::escape::clipped;
 
@@ -69,9 +70,7 @@ impl SwapOptions {
                 _ => Err(error("true or false")),
             };
             match name {
-                "by" if value.chars().count() <= MAX_BY && !value.chars().any(char::is_control) => {
-                    options.by.clone_from(&value);
-                }
+                "by" if is_by(&value) => options.by.clone_from(&value),
                 "by" => return Err(error("at most 64 characters, none of them a control character")),
                 "dry_run" => options.dry_run = flag()?,
                 "any_serial" => options.any_serial = flag()?,
@@ -136,8 +135,8 @@ fn decode(value: &str) -> String {
     let mut parts = value.split('%');
     let mut decoded = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let escaped = part.get(..2).and_then(|hex| u8::from_str_radix(hex, 16).ok()).filter(u8::is_ascii);
-        if let (Some(byte), Some(rest)) = (escaped, part.get(2..)) {
+        let escaped = part.get(..2).and_then(digest::bytes::<1>).filter(|[byte]| byte.is_ascii());
+        if let (Some([byte]), Some(rest)) = (escaped, part.get(2..)) {
             decoded.push(char::from(byte));
             decoded.push_str(rest);
         } else {
@@ -251,6 +250,9 @@ mod tests {
         assert_eq!(SwapOptions::parse(&options.to_parameters()), Ok(options));
         assert_eq!(SwapOptions::parse(""), Ok(SwapOptions::default()));
         assert_eq!(SwapOptions::parse("dry_run").map(|options| options.dry_run), Ok(true));
+        for (value, by) in [("50%+2", "50%+2"), ("%3b%", ";%"), ("%D0%90", "%D0%90"), ("%é", "%é")] {
+            assert_eq!(SwapOptions::parse(&format!("by={value}")).map(|options| options.by), Ok(by.to_owned()));
+        }
     }
 
     #[test]
