@@ -156,10 +156,10 @@ impl Follower {
         if self.anchors.front().is_some_and(|anchor| anchor.entry.instance != entry.instance) {
             return false;
         }
-        let place = self.entries.partition_point(|(other, _)| other.number <= entry.number);
-        let known = place.checked_sub(1).and_then(|before| self.entries.get(before));
-        let known =
-            known.is_some_and(|(other, _)| other.number == entry.number && other.instance == entry.instance);
+        let same = |(other, _): &(JournalEntry, u64)| {
+            (other.number, &other.instance) == (entry.number, &entry.instance)
+        };
+        let known = self.entries.iter().any(same);
         let in_memory = self.anchors.front().is_some_and(|anchor| !is_behind(&entry, &anchor.entry));
         if known || in_memory {
             return false;
@@ -167,7 +167,8 @@ impl Follower {
         if self.entries.len() == MAX_ENTRIES {
             self.entries.remove(0);
         }
-        self.entries.insert(place.min(self.entries.len()), (entry, now_ns));
+        let place = self.entries.partition_point(|(other, _)| other.number <= entry.number);
+        self.entries.insert(place, (entry, now_ns));
         self.waiting = self.entries.len().min(self.waiting + 1);
         true
     }

@@ -159,6 +159,26 @@ fn an_entry_that_comes_late_takes_effect_at_its_place() {
 }
 
 #[test]
+fn an_entry_counts_once_whatever_another_instance_says_under_its_number() {
+    let (mut leader, mut standby) = (Leader::new(), Standby::new());
+    for sequence in 0..10 {
+        leader.take(sequence);
+        standby.take(sequence);
+    }
+    let memory = leader.memory();
+    let order = leader.command(&Command::Standby);
+    let other = JournalEntry { instance: "other".to_owned(), ..order.clone() };
+    assert_eq!([order.clone(), other, order].map(|entry| standby.entry(entry)), [true, true, false]);
+    assert!(standby.entry(memory));
+    for sequence in 10..20 {
+        leader.take(sequence);
+        standby.take(sequence);
+    }
+    assert!(standby.follower.has_joined());
+    assert_eq!(standby.stream.memory(), leader.stream.memory());
+}
+
+#[test]
 fn an_entry_that_comes_before_its_frames_waits_for_them() {
     let (mut leader, mut standby) = joined();
     for sequence in 500..600 {
