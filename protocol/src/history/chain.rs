@@ -7,10 +7,9 @@
 //! Whoever changes, removes, inserts or exchanges lines breaks it. Whoever may write the file can make every digest anew from
 //! some line on, or cut the end off: only a digest that was noted elsewhere tells.
 
-use serde::Deserialize;
 use thiserror::Error;
 
-use super::line::{LineError, checked, sealed, with_last, without_last};
+use super::line::{LineError, Name, checked, read, sealed, with_last, without_last};
 use super::{AuditEntry, Digest};
 
 /// What stands before the digits of an entry's digest, which is the last field before the checksum.
@@ -192,14 +191,6 @@ pub struct Verifier {
     from_first: bool,
 }
 
-/// What every entry of whatever version has.
-#[derive(Deserialize)]
-struct Name {
-    number: u64,
-    #[serde(default)]
-    unit: Option<String>,
-}
-
 impl Verifier {
     /// Of a chain that is there from its first entry on: another one at its beginning is a break.
     #[must_use]
@@ -209,16 +200,10 @@ impl Verifier {
 
     /// Takes the next line in, with or without its line feed; what is broken at it.
     pub fn line(&mut self, line: &[u8]) -> Option<Broken> {
-        let json = match checked(line) {
-            Ok(json) => json,
+        let read = checked(line).and_then(|json| Ok((read(&json)?, json)));
+        let (Name { number, unit }, json) = match read {
+            Ok(read) => read,
             Err(error) => return Some(self.unreadable(line, error)),
-        };
-        let Name { number, unit } = match serde_json::from_str(&json) {
-            Ok(name) => name,
-            Err(error) => {
-                let error = LineError::Entry { words: error.to_string(), number: None };
-                return Some(self.unreadable(line, error));
-            }
         };
         self.entries += 1;
         let chained = Link::of(&json);

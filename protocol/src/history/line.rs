@@ -54,8 +54,10 @@ pub enum LineError {
 
 /// What every entry of whatever version has.
 #[derive(Deserialize)]
-struct Head {
-    number: u64,
+pub(super) struct Name {
+    pub(super) number: u64,
+    #[serde(default)]
+    pub(super) unit: Option<String>,
 }
 
 impl AuditEntry {
@@ -80,11 +82,7 @@ impl AuditEntry {
     /// # Errors
     /// [`LineError`] where it is damaged or not understood.
     pub fn from_line(line: &[u8]) -> Result<Self, LineError> {
-        let json = checked(line)?;
-        serde_json::from_str(&json).map_err(|error| {
-            let number = serde_json::from_str::<Head>(&json).ok().map(|head| head.number);
-            LineError::Entry { words: clipped(&error.to_string(), LONGEST_WORDS), number }
-        })
+        read(&checked(line)?)
     }
 
     /// Whether a line is whole, by its checksum.
@@ -92,6 +90,14 @@ impl AuditEntry {
     pub fn is_whole(line: &[u8]) -> bool {
         checked(line).is_ok()
     }
+}
+
+/// What a line says.
+pub(super) fn read<'j, T: Deserialize<'j>>(json: &'j str) -> Result<T, LineError> {
+    serde_json::from_str(json).map_err(|error| LineError::Entry {
+        words: clipped(&error.to_string(), LONGEST_WORDS),
+        number: serde_json::from_str(json).ok().map(|Name { number, .. }| number),
+    })
 }
 
 /// A JSON object with one more field, a text.

@@ -108,6 +108,11 @@ fn a_byte_changed_anywhere_is_found_with_a_checksum_that_fits_or_not() {
         assert_ne!(changed, good);
         assert_eq!(broken(&changed), [(Some(2), Fault::Digest)], "{from}");
     }
+    // What JSON repeats of a line is cut.
+    let long = format!("\"number\":\"{}\"", "x".repeat(5000));
+    let changed = [good[0].clone(), resealed(&good[1].replacen("\"number\":2", &long, 1))];
+    let [(None, Fault::Line(LineError::Entry { words, .. }))] = &*broken(&changed) else { panic!() };
+    assert_eq!(words.chars().count(), 300);
     // With its own digest made anew it is the next one that does not fit.
     let mut chain = Chain::default();
     chain.pass(good[0].as_bytes());
