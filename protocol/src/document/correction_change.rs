@@ -106,5 +106,5 @@ pub fn turn_rad(old: [f64; 3], new: [f64; 3]) -> f64 {
     let [new_x, new_y, new_z] = new;
     let cross = [old_y * new_z - old_z * new_y, old_z * new_x - old_x * new_z, old_x * new_y - old_y * new_x];
     let sine = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
-    sine.atan2(old_x * new_x + old_y * new_y + old_z * new_z)
+    libm::atan2(sine, old_x * new_x + old_y * new_y + old_z * new_z)
 }
