@@ -68,7 +68,7 @@ impl Member {
         let mode = [Mode::Standby, Mode::Active].into_iter().find(|known| known.name() == mode)?;
         let (priority, started_unix_ms) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
         let (name, group) = (parts.next()?.to_owned(), parts.next()?.to_owned());
-        Some(Self { instance, name, mode, priority, started_unix_ms, group })
+        parts.next().is_none().then_some(Self { instance, name, mode, priority, started_unix_ms, group })
     }
 
     /// Whether it goes before another: by priority, then by age.
@@ -185,6 +185,7 @@ mod tests {
             "isotherm/a/alive",
             "isotherm/a/member/x/1/2/n/g",
             "isotherm/a/member/active/300/2/n/g",
+            "isotherm/a/member/active/3/2/n/g/x",
             "imu/a/member",
         ] {
             assert_eq!(Member::parse(other), None, "{other}");

@@ -142,7 +142,7 @@ class CorrectedStream(Stream[CorrectedBatch]):
     @property
     def outputs_dropped(self) -> int:
         """Outputs dropped since another service's had come first."""
-        return sum(arbiter.dropped for arbiter in self._arbiters.values())
+        return sum(arbiter.dropped for arbiter in list(self._arbiters.values()))
 
     def _read(self, key: str, frame: bytes) -> CorrectedBatch | None:
         batch = self._decoders.setdefault(key, CorrectedDecoder()).decode(frame)

@@ -244,7 +244,7 @@ impl Sequencer {
         let together =
             self.waiting.iter().flatten().filter(|frame| (gyro_before..=first).contains(&frame.order));
         let received_ns = frames.iter().find(|frame| frame.order == first)?.received_ns;
-        let near = together.filter(|frame| frame.received_ns + 1_000_000 >= received_ns);
+        let near = together.filter(|frame| frame.received_ns.saturating_add(1_000_000) >= received_ns);
         near.map(|frame| frame.order).min()
     }
 
