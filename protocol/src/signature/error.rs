@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use isotherm_document::few;
 use thiserror::Error;
 
 use super::key::KeyId;
@@ -111,17 +112,13 @@ pub enum Damage {
 }
 
 fn trusted_words(trusted: &[(KeyId, String)]) -> String {
-    /// As many as fit in a message.
-    const SHOWN: usize = 8;
     if trusted.is_empty() {
         return "no key is trusted: put the signer's .pub file into the folder of trusted keys".to_owned();
     }
-    let names: Vec<_> = trusted.iter().take(SHOWN).map(|(id, name)| format!("{name} ({id})")).collect();
-    let more = trusted.len().saturating_sub(SHOWN);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    let (names, verb) = (names.join(", "), if trusted.len() == 1 { "is" } else { "are" });
+    let names = few(trusted.iter().map(|(id, name)| format!("{name} ({id})")));
+    let verb = if trusted.len() == 1 { "is" } else { "are" };
     format!(
-        "{names}{more} {verb}: put the signer's .pub file into the folder of trusted keys, or have the document \
+        "{names} {verb}: put the signer's .pub file into the folder of trusted keys, or have the document \
          signed with a trusted key"
     )
 }
