@@ -251,7 +251,10 @@ mod tests {
         assert_eq!(SwapOptions::parse(""), Ok(SwapOptions::default()));
         assert_eq!(SwapOptions::parse("dry_run").map(|options| options.dry_run), Ok(true));
         for (value, by) in [("50%+2", "50%+2"), ("%3b%", ";%"), ("%D0%90", "%D0%90"), ("%é", "%é")] {
-            assert_eq!(SwapOptions::parse(&format!("by={value}")).map(|options| options.by), Ok(by.to_owned()));
+            assert_eq!(
+                SwapOptions::parse(&format!("by={value}")).map(|options| options.by),
+                Ok(by.to_owned())
+            );
         }
     }
 
