@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use isotherm_protocol::codec::CodecError;
 use isotherm_protocol::key::UnitId;
+use isotherm_protocol::raw::BatchError;
 use thiserror::Error;
 
 /// Why something on the bus did not work.
@@ -93,15 +94,13 @@ pub enum BusError {
         /// What the codec says.
         source: CodecError,
     },
-    /// A reading that is announced as a count is no whole number of 32 bits.
-    #[error(
-        "unit {unit}: a reading in the ticks from sequence {sequence} on is a count but not a whole number of 32 bits"
-    )]
-    NotCounts {
+    /// A batch that no frame can carry.
+    #[error("unit {unit}: {source}")]
+    Batch {
         /// Serial of the unit.
         unit: UnitId,
-        /// First sequence number of the batch.
-        sequence: u64,
+        /// Which, and why.
+        source: BatchError,
     },
     /// An option of the producer is outside its range.
     #[error("{option} is {got}, must be {min} to {max}")]

@@ -6,7 +6,7 @@ use isotherm_correction::sample::{AccelTick, GyroTick, OutputKind, TemperatureRe
 use isotherm_correction::units::Timestamp;
 use isotherm_protocol::codec::{self, MAX_TICKS};
 use isotherm_protocol::key::{self, Input, RawStream, UnitId};
-use isotherm_protocol::raw::{BatchError, Batcher, HealthBatch, HealthReading, HealthTick, RawFrame};
+use isotherm_protocol::raw::{Batcher, HealthBatch, HealthReading, HealthTick, RawFrame};
 use zenoh::Session;
 
 use crate::BusError;
@@ -94,11 +94,11 @@ impl Producer {
     /// this process or another, does not go on with it.
     ///
     /// # Errors
-    /// [`BusError::NotCounts`], [`BusError::Encode`], [`BusError::Put`], [`BusError::NoAcknowledgement`].
+    /// [`BusError::Batch`], [`BusError::Put`], [`BusError::NoAcknowledgement`]: what is ready behind it goes out with the next call.
     pub async fn gyro(&mut self, output: OutputKind, mut tick: GyroTick) -> Result<(), BusError> {
         tick.series = self.series;
-        let taken = self.batcher.gyro(output, tick);
-        self.publish_ready(taken).await
+        self.batcher.gyro(output, tick);
+        self.publish_ready().await
     }
 
     /// Takes one accelerometer tick.
@@ -106,8 +106,8 @@ impl Producer {
     /// # Errors
     /// As [`Producer::gyro`].
     pub async fn accel(&mut self, output: OutputKind, tick: AccelTick) -> Result<(), BusError> {
-        let taken = self.batcher.accel(output, tick);
-        self.publish_ready(taken).await
+        self.batcher.accel(output, tick);
+        self.publish_ready().await
     }
 
     /// Takes temperature readings.
@@ -115,14 +115,16 @@ impl Producer {
     /// # Errors
     /// As [`Producer::gyro`].
     pub async fn temperatures(&mut self, readings: &[TemperatureReading]) -> Result<(), BusError> {
-        let taken = readings.iter().try_for_each(|reading| self.batcher.temperature(*reading));
-        self.publish_ready(taken).await
+        for reading in readings {
+            self.batcher.temperature(*reading);
+        }
+        self.publish_ready().await
     }
 
     /// Publishes what the instrument reports of itself at a time, at once: readings have no batch to wait for.
     ///
     /// # Errors
-    /// As [`Producer::gyro`].
+    /// [`BusError::Encode`] and [`BusError::Put`].
     pub async fn health(&mut self, time: Timestamp, readings: &[HealthReading]) -> Result<(), BusError> {
         let tick = HealthTick { time_ns: time.as_ns(), readings: readings.to_vec() };
         let frame = codec::encode(&HealthBatch { ticks: vec![tick] }).map_err(|source| BusError::Encode {
@@ -137,8 +139,8 @@ impl Producer {
     /// # Errors
     /// As [`Producer::gyro`].
     pub async fn flush(&mut self) -> Result<(), BusError> {
-        let flushed = self.batcher.flush();
-        self.publish_ready(flushed).await
+        self.batcher.flush();
+        self.publish_ready().await
     }
 
     /// Waits until every tick sent has come back, at most the acknowledge timeout without progress.
@@ -164,9 +166,11 @@ impl Producer {
         self.outlet.in_flight()
     }
 
-    /// Publishes the frames that are ready, and then tells what was wrong with a tick.
-    async fn publish_ready(&mut self, taken: Result<(), BatchError>) -> Result<(), BusError> {
-        while let Some(RawFrame { stream, frame, first_sequence, ticks, .. }) = self.batcher.next_frame() {
+    /// Publishes the frames that are ready, up to a batch that cannot be one.
+    async fn publish_ready(&mut self) -> Result<(), BusError> {
+        while let Some(ready) = self.batcher.next_frame() {
+            let refused = |source| BusError::Batch { unit: self.outlet.unit().clone(), source };
+            let RawFrame { stream, frame, first_sequence, ticks, .. } = ready.map_err(refused)?;
             if stream == RawStream::Gyro {
                 let ticks = GyroTicks { series: self.series, first: first_sequence, count: ticks };
                 self.outlet.publish_gyro(frame, ticks).await?;
@@ -175,10 +179,6 @@ impl Producer {
                 self.outlet.publish(Input::Raw(stream), frame).await?;
             }
         }
-        let unit = self.outlet.unit();
-        taken.map_err(|error| match error {
-            BatchError::NotCounts { sequence } => BusError::NotCounts { unit: unit.clone(), sequence },
-            BatchError::Codec(source) => BusError::Encode { key: key::raw(unit, RawStream::Gyro), source },
-        })
+        Ok(())
     }
 }

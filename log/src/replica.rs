@@ -22,7 +22,6 @@ use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::{CorrectedBatch, Revision};
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
 use isotherm_protocol::key::{Input, UnitId};
-use isotherm_protocol::replay::input_name;
 use isotherm_protocol::stream::{Label, UnitStream};
 use serde::Serialize;
 
@@ -321,12 +320,7 @@ fn difference(own: &UnitStream, service: &UnitStream) -> String {
     for input in Input::ALL {
         let frames = |stream: &UnitStream| stream.heard().get(input.index()).map_or(0, |heard| heard.frames);
         if frames(own) != frames(service) {
-            words.push(format!(
-                "{} frames {} here, {} there",
-                input_name(input),
-                frames(own),
-                frames(service)
-            ));
+            words.push(format!("{} frames {} here, {} there", input.name(), frames(own), frames(service)));
         }
     }
     let counters = own.counters().into_iter().zip(service.counters());

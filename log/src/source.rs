@@ -189,21 +189,21 @@ impl TextLog {
     fn next_message(&mut self) -> Result<Option<Message>, Error> {
         loop {
             if let Some(frame) = self.batcher.next_frame() {
+                let frame = frame.map_err(|source| Error::Batch { unit: self.unit.clone(), source })?;
                 return Ok(Some(self.message(frame)));
             }
             if self.over {
                 return Ok(None);
             }
-            let taken = match self.events.next().transpose()? {
+            match self.events.next().transpose()? {
                 Some(LogEvent::Gyro { output, tick }) => self.batcher.gyro(output, tick),
                 Some(LogEvent::Accel { output, tick }) => self.batcher.accel(output, tick),
                 Some(LogEvent::Temperature(reading)) => self.batcher.temperature(reading),
                 None => {
                     self.over = true;
-                    self.batcher.flush()
+                    self.batcher.flush();
                 }
-            };
-            taken.map_err(|source| Error::Batch { unit: self.unit.clone(), source })?;
+            }
         }
     }
 

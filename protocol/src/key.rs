@@ -172,11 +172,8 @@ impl Input {
     #[must_use]
     pub const fn index(self) -> usize {
         match self {
-            Self::Raw(RawStream::Gyro) => 0,
-            Self::Raw(RawStream::Accel) => 1,
-            Self::Raw(RawStream::Temperature) => 2,
-            Self::Raw(RawStream::Health) => 3,
-            Self::Reference => 4,
+            Self::Raw(stream) => stream as usize,
+            Self::Reference => RawStream::ALL.len(),
         }
     }
 
@@ -188,6 +185,18 @@ impl Input {
             Self::Raw(RawStream::Accel) => "raw/accel",
             Self::Raw(RawStream::Temperature) => "raw/temp",
             Self::Raw(RawStream::Health) => "raw/health",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// Its name, for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Raw(RawStream::Gyro) => "gyro",
+            Self::Raw(RawStream::Accel) => "accelerometer",
+            Self::Raw(RawStream::Temperature) => "temperature",
+            Self::Raw(RawStream::Health) => "health",
             Self::Reference => "reference",
         }
     }

@@ -13,6 +13,6 @@ mod outline;
 mod sequencer;
 
 pub use follower::{Follower, MAX_WAITING, Rebuilt};
-pub use notice::{Notice, input_name};
+pub use notice::Notice;
 pub use outline::{Mark, MarkKind, Outline, Outlines, UnitOutline};
 pub use sequencer::{Deed, NEAR_NS, Sequencer};

@@ -11,7 +11,6 @@ use isotherm_correction::unit::{At, Change, UnitSettings};
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision, are_same};
-use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::key::{self, Input, RawStream, UnitId};
 use isotherm_protocol::raw::Batcher;
@@ -80,7 +79,7 @@ impl Source {
     /// Where it is none.
     pub fn swap(&mut self, document: &str, revision: u64, at: At) {
         let parsed = Document::parse(document, None).expect("a document");
-        let label = Label::of(&parsed.document, Digest(parsed.digest), "");
+        let label = Label::of(&parsed.document, parsed.digest, "");
         let calibration = Arc::new(parsed.calibration);
         self.reference.schedule(Change { calibration, revision, at, slew: Span::ZERO }, label);
     }
@@ -93,16 +92,16 @@ impl Source {
         let Step { mut gyro, accel, temperatures, .. } = self.simulation.next().expect("long enough");
         let instrument = &self.scenario.instrument;
         for reading in &temperatures {
-            self.batcher.temperature(*reading).expect("taken");
+            self.batcher.temperature(*reading);
         }
         if let (Some(output), Some(tick)) = (instrument.accel_output_kind(), accel) {
-            self.batcher.accel(output, tick).expect("taken");
+            self.batcher.accel(output, tick);
         }
         (gyro.series, self.last) = (self.series, gyro.sequence);
         let sequence = gyro.sequence;
-        self.batcher.gyro(instrument.gyros.output_kind(), gyro).expect("taken");
+        self.batcher.gyro(instrument.gyros.output_kind(), gyro);
         let at = Instant::now();
-        while let Some(raw) = self.batcher.next_frame() {
+        while let Some(raw) = self.batcher.next_frame().transpose().expect("good ticks") {
             self.reference.receive(raw.stream, &raw.frame).expect("a good frame");
             if raw.stream == RawStream::Gyro {
                 let ticks = GyroTicks { series: self.series, first: raw.first_sequence, count: raw.ticks };

@@ -92,7 +92,7 @@ fn messages<E: Borrow<LogEvent>>(
     let unit = unit_id(unit).unwrap();
     let mut batcher = Batcher::new(256);
     let mut write = |batcher: &mut Batcher| {
-        while let Some(frame) = batcher.next_frame() {
+        while let Some(frame) = batcher.next_frame().transpose().unwrap() {
             let topic = Topic::Raw(unit.clone(), frame.stream);
             let received_ns = u64::try_from(frame.time.as_ns()).unwrap();
             each(Message { topic, received_ns, frame: frame.frame });
@@ -100,15 +100,15 @@ fn messages<E: Borrow<LogEvent>>(
     };
     for event in events {
         match event.borrow() {
-            LogEvent::Temperature(reading) => batcher.temperature(*reading).unwrap(),
-            LogEvent::Accel { output, tick } => batcher.accel(*output, tick.clone()).unwrap(),
+            LogEvent::Temperature(reading) => batcher.temperature(*reading),
+            LogEvent::Accel { output, tick } => batcher.accel(*output, tick.clone()),
             LogEvent::Gyro { output, tick } => {
-                batcher.gyro(*output, tick.clone()).unwrap();
+                batcher.gyro(*output, tick.clone());
                 write(&mut batcher);
             }
         }
     }
-    batcher.flush().unwrap();
+    batcher.flush();
     write(&mut batcher);
 }
 

@@ -9,7 +9,7 @@ use isotherm_protocol::raw::GyroBatch;
 use isotherm_protocol::stream::UnitStream;
 use serde::Serialize;
 
-use super::{Done, Replica, entry_words, input_name};
+use super::{Done, Replica, entry_words};
 use crate::error::Error;
 use crate::part::{LogFiles, Messages, Part};
 use crate::streams::decoded::Decoded;
@@ -311,5 +311,5 @@ fn in_frame(input: Input, frame: &[u8], taken: &Result<(), CodecError>) -> What 
     };
     let times = decoded.and_then(|decoded| decoded.times());
     let [from_ns, to_ns] = [0, 1].map(|end| times.map(|times| times[end].as_ns()));
-    What::Frame { input: input_name(input), first_sequence, ticks, from_ns, to_ns, bad }
+    What::Frame { input: input.name(), first_sequence, ticks, from_ns, to_ns, bad }
 }

@@ -7,22 +7,20 @@ use isotherm_correction::units::Timestamp;
 use thiserror::Error;
 
 use super::temperature::ticks;
-use super::{RawBatch, RawTick, TemperatureBatch};
+use super::{AccelBatch, GyroBatch, RawBatch, RawTick, TemperatureBatch};
 use crate::codec::{self, CodecError, MAX_TICKS, Message};
-use crate::key::RawStream;
+use crate::key::{Input, RawStream};
 
-/// A tick that no frame can carry.
+/// A batch that no frame can carry: it is given up, and nothing else.
 #[derive(Debug, Error)]
-pub enum BatchError {
-    /// A reading that is said to be a count and is none.
-    #[error("tick {sequence}: its readings are not counts of 32 bits")]
-    NotCounts {
-        /// Sequence number of the first tick of the batch.
-        sequence: u64,
-    },
+#[error("{} ticks from {first_sequence} on: {source}", Input::Raw(*stream).name())]
+pub struct BatchError {
+    /// Its topic.
+    pub stream: RawStream,
+    /// Sequence number of its first tick; 0 for temperatures.
+    pub first_sequence: u64,
     /// What the codec refuses.
-    #[error(transparent)]
-    Codec(#[from] CodecError),
+    pub source: CodecError,
 }
 
 /// A raw batch as a frame.
@@ -48,10 +46,10 @@ pub struct RawFrame {
 #[derive(Debug)]
 pub struct Batcher {
     batch_ticks: usize,
-    gyro: Pending<GyroTick>,
-    accel: Pending<AccelTick>,
+    gyro: GyroBatch,
+    accel: AccelBatch,
     temperature: Vec<TemperatureReading>,
-    ready: VecDeque<RawFrame>,
+    ready: VecDeque<Result<RawFrame, BatchError>>,
 }
 
 impl Batcher {
@@ -60,90 +58,73 @@ impl Batcher {
     pub fn new(batch_ticks: usize) -> Self {
         Self {
             batch_ticks: batch_ticks.clamp(1, MAX_TICKS),
-            gyro: Pending::default(),
-            accel: Pending::default(),
+            gyro: RawBatch::empty(),
+            accel: RawBatch::empty(),
             temperature: Vec::new(),
             ready: VecDeque::new(),
         }
     }
 
     /// Takes one gyro tick.
-    ///
-    /// # Errors
-    /// [`BatchError`]: the batch that cannot be a frame is given up.
-    pub fn gyro(&mut self, output: OutputKind, tick: GyroTick) -> Result<(), BatchError> {
+    pub fn gyro(&mut self, output: OutputKind, tick: GyroTick) {
         if !self.gyro.continues(output, &tick) {
-            self.flush()?;
+            self.flush();
         }
         self.gyro.push(output, tick);
-        if self.gyro.ticks.len() >= self.batch_ticks { self.flush() } else { Ok(()) }
+        if self.gyro.ticks.len() >= self.batch_ticks {
+            self.flush();
+        }
     }
 
     /// Takes one accelerometer tick.
-    ///
-    /// # Errors
-    /// As [`Batcher::gyro`].
-    pub fn accel(&mut self, output: OutputKind, tick: AccelTick) -> Result<(), BatchError> {
+    pub fn accel(&mut self, output: OutputKind, tick: AccelTick) {
         if !self.accel.continues(output, &tick) || self.accel.ticks.len() == MAX_TICKS {
-            self.flush_accel()?;
+            self.flush_accel();
         }
         self.accel.push(output, tick);
-        Ok(())
     }
 
     /// Takes one temperature reading.
-    ///
-    /// # Errors
-    /// As [`Batcher::gyro`].
-    pub fn temperature(&mut self, reading: TemperatureReading) -> Result<(), BatchError> {
+    pub fn temperature(&mut self, reading: TemperatureReading) {
         self.temperature.push(reading);
-        if self.temperature.len() >= MAX_TICKS { self.flush_temperatures() } else { Ok(()) }
+        if self.temperature.len() >= MAX_TICKS {
+            self.flush_temperatures();
+        }
     }
 
     /// Makes everything ready that was handed over, full batch or not.
-    ///
-    /// # Errors
-    /// As [`Batcher::gyro`].
-    pub fn flush(&mut self) -> Result<(), BatchError> {
-        self.flush_temperatures()?;
-        self.flush_accel()?;
-        self.flush_gyro()
+    pub fn flush(&mut self) {
+        self.flush_temperatures();
+        self.flush_accel();
+        let batch = std::mem::replace(&mut self.gyro, RawBatch::empty());
+        self.push_ticks(RawStream::Gyro, &batch);
     }
 
-    /// Takes the next frame that is ready.
-    pub fn next_frame(&mut self) -> Option<RawFrame> {
+    /// Takes the next frame that is ready, or what is wrong with the batch in its place.
+    pub fn next_frame(&mut self) -> Option<Result<RawFrame, BatchError>> {
         self.ready.pop_front()
     }
 
-    fn flush_temperatures(&mut self) -> Result<(), BatchError> {
+    fn flush_temperatures(&mut self) {
         let readings = std::mem::take(&mut self.temperature);
         for batch in temperature_batches(&readings) {
             let time = batch.readings.last().map_or_else(Timestamp::default, |reading| reading.time);
-            self.push(RawStream::Temperature, &batch, time, 0, batch.ticks().count())?;
+            self.push(RawStream::Temperature, &batch, time, 0, batch.ticks().count());
         }
-        Ok(())
     }
 
-    fn flush_accel(&mut self) -> Result<(), BatchError> {
-        let (output, ticks) = self.accel.take();
+    fn flush_accel(&mut self) {
+        let RawBatch { output, ticks } = std::mem::replace(&mut self.accel, RawBatch::empty());
         for part in ticks.chunks(self.batch_ticks) {
-            self.push_ticks(RawStream::Accel, &RawBatch { output, ticks: part.to_vec() })?;
+            self.push_ticks(RawStream::Accel, &RawBatch { output, ticks: part.to_vec() });
         }
-        Ok(())
     }
 
-    fn flush_gyro(&mut self) -> Result<(), BatchError> {
-        let (output, ticks) = self.gyro.take();
-        self.push_ticks(RawStream::Gyro, &RawBatch { output, ticks })
-    }
-
-    fn push_ticks<T: RawTick>(&mut self, stream: RawStream, batch: &RawBatch<T>) -> Result<(), BatchError> {
-        let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) else { return Ok(()) };
-        let (sequence, (time, _)) = (first.parts().sequence, last.parts().times);
-        self.push(stream, batch, time, sequence, batch.ticks.len()).map_err(|error| match error {
-            BatchError::Codec(CodecError::NotCounts { .. }) => BatchError::NotCounts { sequence },
-            error => error,
-        })
+    fn push_ticks<T: RawTick>(&mut self, stream: RawStream, batch: &RawBatch<T>) {
+        if let (Some(first), Some(last)) = (batch.ticks.first(), batch.ticks.last()) {
+            let (sequence, (time, _)) = (first.parts().sequence, last.parts().times);
+            self.push(stream, batch, time, sequence, batch.ticks.len());
+        }
     }
 
     fn push(
@@ -153,27 +134,20 @@ impl Batcher {
         time: Timestamp,
         first_sequence: u64,
         ticks: usize,
-    ) -> Result<(), BatchError> {
-        let frame = codec::encode(batch)?;
-        self.ready.push_back(RawFrame { stream, frame, time, first_sequence, ticks: ticks as u64 });
-        Ok(())
+    ) {
+        self.ready.push_back(match codec::encode(batch) {
+            Ok(frame) => Ok(RawFrame { stream, frame, time, first_sequence, ticks: ticks as u64 }),
+            Err(source) => Err(BatchError { stream, first_sequence, source }),
+        });
     }
 }
 
-/// Consecutive ticks of one kind and number of readings.
-#[derive(Debug)]
-struct Pending<T> {
-    output: OutputKind,
-    ticks: Vec<T>,
-}
-
-impl<T> Default for Pending<T> {
-    fn default() -> Self {
+/// Consecutive ticks of one kind and number of readings, while they are gathered.
+impl<T: RawTick> RawBatch<T> {
+    fn empty() -> Self {
         Self { output: OutputKind::Counts, ticks: Vec::new() }
     }
-}
 
-impl<T: RawTick> Pending<T> {
     /// Whether such a tick can stand in the same batch as those that wait.
     fn continues(&self, output: OutputKind, tick: &T) -> bool {
         self.ticks.last().is_none_or(|last| {
@@ -187,10 +161,6 @@ impl<T: RawTick> Pending<T> {
     fn push(&mut self, output: OutputKind, tick: T) {
         self.output = output;
         self.ticks.push(tick);
-    }
-
-    fn take(&mut self) -> (OutputKind, Vec<T>) {
-        (self.output, std::mem::take(&mut self.ticks))
     }
 }
 
@@ -253,7 +223,7 @@ mod tests {
             readings: (0..sensors).map(|_| 0.0).collect(),
             ..AccelTick::default()
         };
-        let mut pending = Pending::default();
+        let mut pending = RawBatch::empty();
         assert!(pending.continues(OutputKind::Counts, &tick(9, 3)));
         pending.push(OutputKind::Counts, tick(9, 0));
         assert!(pending.continues(OutputKind::Counts, &tick(10, 0)));
@@ -263,12 +233,26 @@ mod tests {
     }
 
     #[test]
-    fn readings_that_are_no_counts_are_named() {
-        let mut batcher = Batcher::new(1);
-        let readings = [1.0, 0.5].into_iter().collect();
-        let error = batcher
-            .gyro(OutputKind::Counts, GyroTick { sequence: 7, readings, ..GyroTick::default() })
-            .unwrap_err();
-        assert_eq!(error.to_string(), "tick 7: its readings are not counts of 32 bits");
+    fn a_batch_that_no_frame_can_carry_is_named_and_nothing_else_is_lost() {
+        let mut batcher = Batcher::new(2);
+        for (sequence, reading) in [(7, 1.0), (8, 0.5), (9, 2.0), (10, 3.0)] {
+            let readings = || [reading].into_iter().collect();
+            batcher.accel(
+                OutputKind::Counts,
+                AccelTick { sequence, readings: readings(), ..AccelTick::default() },
+            );
+            // The first of another batch comes while the one before cannot go out.
+            let sequence = if sequence > 7 { sequence + 10 } else { sequence };
+            batcher
+                .gyro(OutputKind::Counts, GyroTick { sequence, readings: readings(), ..GyroTick::default() });
+        }
+        batcher.flush();
+        let told = std::iter::from_fn(|| batcher.next_frame()).map(|ready| match ready {
+            Ok(RawFrame { stream, first_sequence, ticks, .. }) => {
+                format!("{stream:?} {first_sequence}, {ticks} ticks")
+            }
+            Err(error) => error.to_string(),
+        });
+        insta::assert_snapshot!(told.collect::<Vec<_>>().join("\n"));
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
-use crate::key::{Input, RawStream};
+use crate::key::Input;
 
 /// Where recorder and service did not have the same, or what could not be done.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -55,7 +55,7 @@ pub enum Notice {
     #[error(
         "the last {} frame that the service received before entry {entry} of its journal is not in the recording: its \
         place is estimated from times of reception",
-        input_name(*.input)
+        .input.name()
     )]
     PlaceUnknown {
         /// Of which input.
@@ -134,20 +134,8 @@ impl Notice {
     }
 }
 
-/// Name of an input, for people.
-#[must_use]
-pub const fn input_name(input: Input) -> &'static str {
-    match input {
-        Input::Raw(RawStream::Gyro) => "gyro",
-        Input::Raw(RawStream::Accel) => "accelerometer",
-        Input::Raw(RawStream::Temperature) => "temperature",
-        Input::Raw(RawStream::Health) => "health",
-        Input::Reference => "reference",
-    }
-}
-
 fn counted(frames: u64, input: Input) -> String {
-    format!("{frames} {} frame{}", input_name(input), if frames == 1 { "" } else { "s" })
+    format!("{frames} {} frame{}", input.name(), if frames == 1 { "" } else { "s" })
 }
 
 fn entries(from: u64, to: u64) -> String {

@@ -114,17 +114,19 @@ impl Line {
     async fn play(&mut self, ticks: u64) {
         for _ in 0..ticks {
             let Step { gyro, accel, temperatures, .. } = self.simulation.next().expect("long enough");
-            temperatures.iter().try_for_each(|reading| self.batcher.temperature(*reading)).unwrap();
-            if let (Some(output), Some(tick)) = (self.scenario.instrument.accel_output_kind(), accel) {
-                self.batcher.accel(output, tick).unwrap();
+            for reading in &temperatures {
+                self.batcher.temperature(*reading);
             }
-            self.batcher.gyro(self.scenario.instrument.gyros.output_kind(), gyro).unwrap();
+            if let (Some(output), Some(tick)) = (self.scenario.instrument.accel_output_kind(), accel) {
+                self.batcher.accel(output, tick);
+            }
+            self.batcher.gyro(self.scenario.instrument.gyros.output_kind(), gyro);
             self.publish().await;
         }
     }
 
     async fn publish(&mut self) {
-        while let Some(frame) = self.batcher.next_frame() {
+        while let Some(frame) = self.batcher.next_frame().transpose().unwrap() {
             match self.dice.below(1000) {
                 0..4 => {}
                 4..10 => {
