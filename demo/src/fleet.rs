@@ -109,7 +109,7 @@ pub(crate) fn fleet(seed: u64) -> Result<Vec<Member>, DemoError> {
         let nominal = Nominal::new(&parsed.document.to_parts()).ok_or_else(unusable)?;
         let scenario = Scenario { unit: id.to_string(), ..(kind.scenario)(seed) };
         let ticks = Simulation::new(&scenario)?.remaining();
-        let digest = parsed.digest.first_chunk().copied().unwrap_or_default();
+        let digest = parsed.digest.head();
         Ok(Member { id, kind, scenario, ticks, nominal, calibration: Arc::new(parsed.calibration), digest })
     };
     KINDS.into_iter().map(member).collect()

@@ -68,7 +68,7 @@ impl Loaded {
     pub(crate) fn of(parsed: Parsed) -> Result<Self, Error> {
         Ok(Self {
             calibration: Arc::new(parsed.calibration),
-            digest: parsed.digest.first_chunk().copied().unwrap_or_default(),
+            digest: parsed.digest.head(),
             unit: unit_id(&parsed.document.unit)?,
             warnings: parsed.warnings,
         })

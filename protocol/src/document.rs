@@ -40,7 +40,6 @@ use isotherm_correction::calibration::Calibration;
 pub use isotherm_document::Problem;
 use isotherm_document::{Form, Reader, file, published, unplaced};
 use serde_json::Value as Json;
-use sha2::{Digest, Sha256};
 
 pub use correction_change::{Side, correction_change, turn_rad};
 pub use curve::{Curve, Shape};
@@ -54,6 +53,8 @@ pub use types::{
     OrientationThermal, Origin, Residual, Sample, SelfTest, SelfTestCounter, SelfTestVoltage, Servo,
     ServoKind, Temperature, Trend,
 };
+
+use crate::digest::Digest;
 
 /// Oldest version of the document's form that is still read.
 ///
@@ -95,7 +96,7 @@ pub struct Parsed {
     /// The calibration.
     pub calibration: Calibration,
     /// SHA-256 of the text's bytes.
-    pub digest: [u8; 32],
+    pub digest: Digest,
     /// What is doubtful, though valid.
     pub warnings: Vec<Problem>,
 }
@@ -122,7 +123,7 @@ impl Document {
         let warnings = warnings::warnings(&reader, &document);
         match (reader.into_problems(), compiled) {
             (None, Ok(calibration)) => {
-                Ok(Parsed { document, calibration, digest: Sha256::digest(text.as_bytes()).into(), warnings })
+                Ok(Parsed { document, calibration, digest: Digest::of(text.as_bytes()), warnings })
             }
             (Some(problems), _) => Err(problems),
             // Every defect rests on a stand-in, and every stand-in has its problem: not to be reached, but if it is,

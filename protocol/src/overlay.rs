@@ -47,7 +47,7 @@ pub struct ParsedOverlay {
     /// What stands in it.
     pub overlay: Overlay,
     /// SHA-256 of the text's bytes.
-    pub digest: [u8; 32],
+    pub digest: Digest,
     /// Where each key stands, for problems that show only against the base.
     places: BTreeMap<String, (usize, usize)>,
     file: Option<String>,
@@ -87,7 +87,7 @@ impl Overlay {
         }
         let places = reader.positions();
         let overlay = reader.finish(overlay)?;
-        let digest = Digest::of(text.as_bytes()).0;
+        let digest = Digest::of(text.as_bytes());
         Ok(ParsedOverlay { overlay, digest, places, file: file.map(Into::into) })
     }
 

@@ -13,7 +13,6 @@ use isotherm_correction::units::Span;
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::corrected::Revision;
-use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::journal::JournalEvent;
 use isotherm_protocol::key::{Input, UnitId};
@@ -217,7 +216,7 @@ impl Script {
     /// Where the document is not sound.
     pub fn document(&mut self, text: &str, at: Schedule, slew: Span) {
         self.revision += 1;
-        let digest = Digest(Document::parse(text, None).expect("a sound document").digest);
+        let digest = Document::parse(text, None).expect("a sound document").digest;
         self.event(JournalEvent::Changed {
             revision: Revision { counter: self.revision, digest: digest.head() },
             at,

@@ -65,11 +65,9 @@ impl Written {
     }
 
     fn from_parts(name: String, text: String, parsed: Parsed) -> Result<Self, Error> {
-        let mut digest = [0; 8];
-        digest.copy_from_slice(parsed.digest.first_chunk::<8>().unwrap_or(&[0; 8]));
         let loaded = Loaded {
             calibration: Arc::new(parsed.calibration),
-            digest,
+            digest: parsed.digest.head(),
             unit: unit_id(&parsed.document.unit)?,
             warnings: parsed.warnings,
         };

@@ -2,7 +2,7 @@
 
 use super::{OVERLAY_OF, Overlay, ParsedOverlay};
 use crate::digest::Digest;
-use crate::document::{Curve, Document, GyroSensor, Origin, Problem, Shape};
+use crate::document::{Curve, Document, GyroSensor, Origin, Parsed, Problem, Shape};
 use isotherm_correction::thermal::Feature;
 use isotherm_document::{element, join};
 
@@ -10,7 +10,7 @@ use isotherm_document::{element, join};
 const DETAILS_KEY: &str = "overlays";
 
 impl ParsedOverlay {
-    /// The base with the overlay's changes; `base_digest` is the SHA-256 of the base's text.
+    /// The base with the overlay's changes.
     ///
     /// The change is added to all of a curve's values; a bias that the base leaves out becomes a constant.
     /// `origin.details.overlays` of the result names overlay and base.
@@ -18,12 +18,12 @@ impl ParsedOverlay {
     /// # Errors
     /// Everything in which the overlay does not fit the base: another digest, another unit, a gyro it does not have, a
     /// magnetic bias for an instrument without modes, temperatures of another number of gyros.
-    pub fn apply(&self, base_digest: &[u8; 32], base: &Document) -> Result<Document, Vec<Problem>> {
-        let problems = self.misfits(&Digest::from(*base_digest).to_string(), base);
+    pub fn apply(&self, base: &Parsed) -> Result<Document, Vec<Problem>> {
+        let problems = self.misfits(&base.digest.to_string(), &base.document);
         if !problems.is_empty() {
             return Err(problems);
         }
-        let mut document = base.clone();
+        let mut document = base.document.clone();
         for change in &self.overlay.gyro {
             let named = document.gyro.sensor.iter_mut().find(|sensor| sensor.name == change.name);
             let Some(sensor) = named else { continue };
@@ -31,7 +31,7 @@ impl ParsedOverlay {
             add(sensor, Feature::LasingMode, change.magnetic_bias_change_deg_per_h);
         }
         document.created = self.overlay.created.or(document.created);
-        record(document.origin.get_or_insert_default(), &self.overlay, &self.digest);
+        record(document.origin.get_or_insert_default(), &self.overlay, self.digest);
         Ok(document)
     }
 
@@ -130,10 +130,10 @@ fn add(sensor: &mut GyroSensor, bias: Feature, change: Option<f64>) {
 }
 
 /// Enters the overlay in the origin's details.
-fn record(origin: &mut Origin, overlay: &Overlay, digest: &[u8; 32]) {
+fn record(origin: &mut Origin, overlay: &Overlay, digest: Digest) {
     let details = origin.details.get_or_insert_default();
     let entry = toml::Table::from_iter([
-        ("sha256".to_owned(), toml::Value::String(Digest::from(*digest).to_string())),
+        ("sha256".to_owned(), toml::Value::String(digest.to_string())),
         ("overlay_of".to_owned(), toml::Value::String(overlay.overlay_of.clone())),
     ]);
     let listed = details.entry(DETAILS_KEY).or_insert_with(|| toml::Value::Array(Vec::new()));

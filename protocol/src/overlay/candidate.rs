@@ -18,9 +18,9 @@ pub struct Candidate {
     /// bytes.
     pub text: String,
     /// SHA-256 of that text: the digest of the revision.
-    pub digest: [u8; 32],
+    pub digest: Digest,
     /// SHA-256 of the document that the constants rest on: the base's for an overlay, else `digest`.
-    pub base_digest: [u8; 32],
+    pub base_digest: Digest,
     /// The overlay, where it is one.
     pub overlay: Option<ParsedOverlay>,
     /// What is doubtful, though valid.
@@ -37,8 +37,8 @@ impl Candidate {
     pub fn parse(text: &str, file: Option<&str>, active_base: Option<&str>) -> Result<Self, Vec<Problem>> {
         if !is_overlay(text) {
             let parsed = Document::parse(text, file)?;
-            let (digest, warnings) = (parsed.digest, parsed.warnings.clone());
-            return Ok(Self::new(parsed, text.to_owned(), digest, None, warnings));
+            let base_digest = parsed.digest;
+            return Ok(Self::new(parsed, text.to_owned(), base_digest, None));
         }
         let overlay = Overlay::parse(text, file)?;
         let Some(base_text) = active_base else {
@@ -46,9 +46,8 @@ impl Candidate {
                            overlay in force";
             return Err(vec![overlay.problem(super::OVERLAY_OF, message.to_owned())]);
         };
-        let base_digest = Digest::of(base_text.as_bytes()).0;
         let base = Document::parse(base_text, Some("document in force"))?;
-        let document = overlay.apply(&base_digest, &base.document)?;
+        let document = overlay.apply(&base)?;
         let failed =
             |error: String| vec![unplaced(file, format!("cannot be written out on its base: {error}"))];
         let effective = document.to_toml().map_err(|error| failed(error.to_string()))?;
@@ -60,22 +59,17 @@ impl Candidate {
             };
             problems.into_iter().map(place).collect()
         };
-        let parsed = Document::parse(&effective, None).map_err(on_overlay)?;
+        let mut parsed = Document::parse(&effective, None).map_err(on_overlay)?;
         let new = |warning: &Problem| {
             base.warnings.iter().all(|old| (&old.key, &old.message) != (&warning.key, &warning.message))
         };
-        let warnings = on_overlay(parsed.warnings.iter().filter(|warning| new(warning)).cloned().collect());
-        Ok(Self::new(parsed, effective, base_digest, Some(overlay), warnings))
+        parsed.warnings.retain(new);
+        parsed.warnings = on_overlay(parsed.warnings);
+        Ok(Self::new(parsed, effective, base.digest, Some(overlay)))
     }
 
-    fn new(
-        parsed: Parsed,
-        text: String,
-        base_digest: [u8; 32],
-        overlay: Option<ParsedOverlay>,
-        warnings: Vec<Problem>,
-    ) -> Self {
-        let Parsed { document, calibration, digest, .. } = parsed;
+    fn new(parsed: Parsed, text: String, base_digest: Digest, overlay: Option<ParsedOverlay>) -> Self {
+        let Parsed { document, calibration, digest, warnings } = parsed;
         Self { document, calibration, text, digest, base_digest, overlay, warnings }
     }
 }

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::{Label, MemoryError, UnitStream};
 use crate::corrected::Revision;
-use crate::digest::{Digest, Digits};
+use crate::digest::Digits;
 use crate::document::{Document, Problem};
 use crate::escape::clipped;
 use crate::journal::JournalEvent;
@@ -123,7 +123,7 @@ impl UnitStream {
                 };
                 let parsed = Document::parse(text, None)
                     .map_err(|problems| JournalError::Document { revision: revision.counter, problems })?;
-                let digest = Digest(parsed.digest);
+                let digest = parsed.digest;
                 if digest.head() != revision.digest {
                     let got = Digits(&digest.head()).to_string();
                     return Err(JournalError::OtherDocument { revision: *revision, got });

@@ -104,7 +104,6 @@ mod tests {
     use isotherm_correction::units::Span;
 
     use super::*;
-    use crate::digest::Digest;
     use crate::document::Document;
     use crate::key::UnitId;
     use crate::stream::Label;
@@ -113,7 +112,7 @@ mod tests {
     fn stream() -> UnitStream {
         let parsed =
             Document::parse(include_str!("../../../config/calibration/example-full.toml"), None).unwrap();
-        let label = Label::of(&parsed.document, Digest(parsed.digest), "a test");
+        let label = Label::of(&parsed.document, parsed.digest, "a test");
         let mut stream = UnitStream::new(UnitId::new("U-1").unwrap(), UnitSettings::default());
         let calibration = Arc::new(parsed.calibration);
         for (revision, at) in [(1, At::NextTick), (2, At::Sequence(900))] {

@@ -25,7 +25,7 @@ fn stream() -> UnitStream {
 
 fn full() -> (Arc<Calibration>, Label) {
     let parsed = Document::parse(FULL, None).unwrap();
-    let label = Label::of(&parsed.document, Digest(parsed.digest), "a test");
+    let label = Label::of(&parsed.document, parsed.digest, "a test");
     (Arc::new(parsed.calibration), label)
 }
 

@@ -120,8 +120,7 @@ pub(super) async fn fetch(bus: &Session, unit: &Unit) -> bool {
     while let Ok(reply) = replies.recv_async().await {
         let Ok(sample) = reply.into_result() else { continue };
         let Ok(parsed) = Document::parse_bytes(&sample.payload().to_bytes(), None) else { continue };
-        let digest = parsed.digest.first_chunk::<8>().copied().unwrap_or_default();
-        unit.know(Noise::of(&parsed.document, digest, &unit.mapping));
+        unit.know(Noise::of(&parsed.document, parsed.digest.head(), &unit.mapping));
         return true;
     }
     false

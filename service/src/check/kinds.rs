@@ -97,7 +97,7 @@ fn check_calibration(text: &str, file: &str, trusted: Option<&TrustedKeys>) -> C
         calibration.accel_count(),
         temperatures(&document.temperature.channel),
     );
-    Ok((summary(&words, document.unit, Digest(digest), signer), warnings))
+    Ok((summary(&words, document.unit, digest, signer), warnings))
 }
 
 /// An overlay by itself: whether it fits its base shows only beside that.
@@ -112,7 +112,7 @@ fn check_overlay(text: &str, file: &str, trusted: Option<&TrustedKeys>) -> Check
         gyros.join(", "),
         overlay.overlay_of.get(..16).unwrap_or_default(),
     );
-    Ok((summary(&words, overlay.unit, Digest(digest), signer), Vec::new()))
+    Ok((summary(&words, overlay.unit, digest, signer), Vec::new()))
 }
 
 /// What was parsed, with its signer; the problems of both.

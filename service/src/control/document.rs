@@ -77,7 +77,7 @@ impl Document {
             text: Compressed::new(bytes),
             digest: Digest::of(bytes),
         });
-        let label = Label::of(&document, Digest(digest), "");
+        let label = Label::of(&document, digest, "");
         let found = Self::new(shared(&calibration), label, Compressed::new(text.as_bytes()));
         let (unit, schema, created) = (document.unit, document.schema, document.created);
         Self { unit, schema, created, warnings, ..found }.over(layers)

@@ -8,7 +8,6 @@ use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
 use isotherm_protocol::codec::decode;
 use isotherm_protocol::control::Schedule;
-use isotherm_protocol::digest::Digest;
 use isotherm_protocol::document::Document;
 use isotherm_protocol::history::Source;
 use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
@@ -89,7 +88,7 @@ fn act(actor: &mut UnitActor, event: &JournalEvent, now: Instant) -> String {
         JournalEvent::Changed { revision, at, slew_ns, document, overlay, .. } => {
             let text = document.as_deref().unwrap();
             let parsed = Document::parse(text, None).unwrap();
-            let label = Label { overlay: *overlay, ..Label::of(&parsed.document, Digest(parsed.digest), "") };
+            let label = Label { overlay: *overlay, ..Label::of(&parsed.document, parsed.digest, "") };
             let (calibration, text) = (Arc::new(parsed.calibration), Compressed::new(text.as_bytes()));
             let document = Arc::new(document::Document::new(calibration, label, text));
             let next = Revision::new(revision.counter, document, &Source::Bus);

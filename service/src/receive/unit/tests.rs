@@ -60,13 +60,13 @@ const EXAMPLE: &str = include_str!("../../../../config/calibration/example-full.
 
 fn example() -> (Arc<Calibration>, [u8; 8]) {
     let parsed = Document::parse(EXAMPLE, None).unwrap();
-    (Arc::new(parsed.calibration), *parsed.digest.first_chunk().unwrap())
+    (Arc::new(parsed.calibration), parsed.digest.head())
 }
 
 /// The example with its text, and an overlay or none.
 fn compiled(overlay: Option<Digest>) -> Arc<Compiled> {
     let parsed = Document::parse(EXAMPLE, None).unwrap();
-    let label = Label { overlay, ..Label::of(&parsed.document, Digest(parsed.digest), "") };
+    let label = Label { overlay, ..Label::of(&parsed.document, parsed.digest, "") };
     Arc::new(Compiled::new(Arc::new(parsed.calibration), label, Compressed::new(EXAMPLE.as_bytes())))
 }
 
