@@ -2297,7 +2297,8 @@ static inline isotherm_result isotherm_decode_corrected(const uint8_t *frame, si
 
 /*
  * Writing a raw batch: begin with the number of ticks, add each, end. A producer has an isotherm_writer and a buffer; a gyro tick
- * takes at most 282 bytes. The end gives the frame's length, or 0 where something did not fit or ticks are not alike.
+ * takes at most 172 bytes, the rest of its frame 28. The end gives the frame's length, or 0 where something did not fit or ticks are
+ * not alike.
  */
 static inline isotherm_writer isotherm_begin(uint8_t *buffer, size_t size, unsigned kind, unsigned version, uint32_t ticks) {
     isotherm_writer w = {buffer, buffer, buffer, false, ticks, 0, false, false};
