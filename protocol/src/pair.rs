@@ -8,6 +8,8 @@ use std::cmp::Reverse;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::key::UnitId;
+
 /// Longest name of an instance, in characters.
 pub const MAX_NAME: usize = 32;
 
@@ -80,11 +82,10 @@ impl Member {
     }
 }
 
-/// Whether a text can be the name of an instance: 1…32 of `A-Z a-z 0-9 . _ -`.
+/// Whether a text can be the name of an instance: 1…32 of the characters of a serial.
 #[must_use]
 pub fn is_name(text: &str) -> bool {
-    (1..=MAX_NAME).contains(&text.len())
-        && text.chars().all(|c| c.is_ascii_alphanumeric() || "._-".contains(c))
+    text.len() <= MAX_NAME && UnitId::new(text).is_ok()
 }
 
 /// What an instance does for a unit.

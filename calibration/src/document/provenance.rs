@@ -64,7 +64,7 @@ fn of_file(path: &Path) -> Result<Digest, Error> {
             count => hash.update(&block[..count]),
         }
     }
-    Ok(Digest::from(<[u8; 32]>::from(hash.finalize())))
+    Ok(Digest(hash.finalize().into()))
 }
 
 /// The digest of what `sha256sum` prints of a folder's files, in the order of their names: of its recordings where it has some, else of
@@ -85,7 +85,7 @@ fn of_folder(folder: &Path) -> Result<Digest, Error> {
         let name = name_of(file);
         hash.update(format!("{}  {name}\n", of_file(file)?));
     }
-    Ok(Digest::from(<[u8; 32]>::from(hash.finalize())))
+    Ok(Digest(hash.finalize().into()))
 }
 
 /// The regular files of a folder, not those of folders in it.

@@ -11,6 +11,7 @@
 use thiserror::Error;
 
 use super::UnitStream;
+use crate::codec;
 
 /// Version of the program and of the form of its memory, in words.
 ///
@@ -63,8 +64,7 @@ impl UnitStream {
     pub fn memory(&self) -> Vec<u8> {
         // Writing to a vector does not fail; what is empty, no reader takes.
         let mut bytes = postcard::to_allocvec(&(MEMORY_VERSION, self)).unwrap_or_default();
-        let checksum = crc32fast::hash(&bytes);
-        bytes.extend(checksum.to_le_bytes());
+        codec::seal(&mut bytes);
         bytes
     }
 
