@@ -369,20 +369,10 @@ mod tests {
     use isotherm_protocol::control::Schedule;
 
     use super::*;
-    use crate::config::Settings;
-    use crate::control::revision::Calibrations;
-    use crate::control::store::{Opened, Store};
-    use crate::receive::intake::Intake;
+    use crate::control::fixture::worker;
 
     fn unit() -> UnitId {
         UnitId::new("U").unwrap()
-    }
-
-    fn worker() -> Worker {
-        let settings = Settings::default();
-        let outlets = Box::new(|_: &_| Err("there is none".into()));
-        let intake = Arc::new(Intake::new(settings.clone(), Calibrations::default(), outlets));
-        Worker::new(&settings, intake, Store::in_memory(), &Opened::default())
     }
 
     /// A set, of which the text says which it is.
@@ -508,5 +498,8 @@ mod tests {
         let forget = theirs(true, vec![ordered(Order::Forget)]);
         assert!(is_forgotten(&forget.entries) && worker.carry_entries(&forget).unwrap() == 1);
         assert_eq!(worker.store.forgotten().collect::<Vec<_>>(), [&unit()]);
+        worker.uncopied.insert(unit());
+        worker.let_go(&unit());
+        assert!(worker.uncopied.is_empty(), "nothing is wrong with a unit that is forgotten");
     }
 }

@@ -116,7 +116,8 @@ impl Folder {
     pub(super) fn unreadable(&mut self, path: &Path, reason: &str) -> Problem {
         let problem = unplaced(Some(&path.display().to_string()), format!("cannot be read: {reason}"));
         let file = self.files.entry(path.to_owned()).or_default();
-        (file.problems, file.digest, file.unwritten) = (vec![problem.clone()], None, false);
+        let (unit, hint, problems) = (file.unit.take(), file.hint.take(), vec![problem.clone()]);
+        *file = File { unit, hint, problems, ..File::default() };
         problem
     }
 
@@ -197,27 +198,27 @@ impl Worker {
 
     /// Takes a file that was entered; `at_start` where the service has just started. Whether it is in order.
     pub(super) fn take_file(&mut self, path: &Path, read: &Read, at_start: bool) -> bool {
-        let file = self.folder.files.get_mut(path);
-        let unit = file.and_then(|file| {
+        let named = self.folder.files.get_mut(path).and_then(|file| {
             (file.unwritten, file.left) = (false, false);
             file.unit.clone()
         });
-        let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
-        if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
-            self.refuse_rivals(&unit, &files, at_start);
-            return false;
-        }
-        let named = self.folder.files.get(path).and_then(|file| file.unit.clone());
-        if let Some((words, _)) = named.as_ref().and_then(|unit| self.intake.is_not_taken(unit)) {
-            tracing::info!("{} is left alone: {words}", path.display());
-            self.settle(path, Vec::new());
-            return true;
-        }
-        if let Some(unit) = named.filter(|unit| !self.intake.speaks_for(unit)) {
-            tracing::info!("{} is left to the instance that publishes its unit", path.display());
-            self.settle(path, Vec::new());
-            self.leave(&unit, path, read.digest, at_start);
-            return true;
+        if let Some(unit) = &named {
+            let files = self.folder.naming(unit);
+            if files.len() > 1 {
+                self.refuse_rivals(unit, &files, at_start);
+                return false;
+            }
+            if let Some((words, _)) = self.intake.is_not_taken(unit) {
+                tracing::info!("{} is left alone: {words}", path.display());
+                self.settle(path, Vec::new());
+                return true;
+            }
+            if !self.intake.speaks_for(unit) {
+                tracing::info!("{} is left to the instance that publishes its unit", path.display());
+                self.settle(path, Vec::new());
+                self.leave(unit, path, read.digest, at_start);
+                return true;
+            }
         }
         let problems = self.swap_file(path, read, at_start);
         let good = problems.is_empty();
@@ -480,6 +481,10 @@ mod tests {
         worker.judge_bad_again();
         worker.retry_files(worker.next_retry);
         assert_eq!(revision(&worker), 2, "left to the other instance");
+        let reason = "no permission".to_owned();
+        worker.folder_event(FolderEvent::Unreadable { file: file.clone(), reason });
+        assert_eq!(worker.folder.left(), [], "nothing to take while it cannot be read");
+        worker.folder_event(changed(text("0.6")));
         worker.intake = intake(&settings, true);
         worker.retry_files(worker.next_retry);
         assert_eq!(revision(&worker), 3);

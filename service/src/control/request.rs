@@ -157,17 +157,20 @@ impl Worker {
     /// Who asks, for the audit file: `CN=` and the common name of the certificate where access control gives each one keys of its own,
     /// else as stated.
     fn by(&self, key: &str, origin: Origin, stated: String) -> Result<String, String> {
-        match key::asker(key).1 {
-            Some(name) if self.certified_names => Ok(format!("{CERTIFIED}{name}")),
-            _ if stated.starts_with(CERTIFIED) => {
-                Err(format!("by is {stated:?}: {CERTIFIED} is reserved for names of certificates"))
-            }
-            None if self.certified_names && origin == Origin::Bus => Err(format!(
-                "the key must end with the name of your certificate, {key}/NAME (certified_names is set)"
-            )),
-            Some(name) => Ok(name.to_owned()),
-            None => Ok(stated),
+        let by = match key::asker(key).1 {
+            Some(name) if self.certified_names => return Ok(format!("{CERTIFIED}{name}")),
+            Some(name) => name.to_owned(),
+            None => stated,
+        };
+        if by.starts_with(CERTIFIED) {
+            return Err(format!("by is {by:?}: {CERTIFIED} is reserved for names of certificates"));
         }
+        if self.certified_names && origin == Origin::Bus {
+            return Err(format!(
+                "the key must end with the name of your certificate, {key}/NAME (certified_names is set)"
+            ));
+        }
+        Ok(by)
     }
 
     /// A query on `imu/*/command`.

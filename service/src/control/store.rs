@@ -340,6 +340,7 @@ impl Store {
         let mut log = Log::open(&path, &mut Opened::default(), &mut Index::default())?;
         let (lines, last_number, chain) = self.carried_lines(time)?;
         log.begin_anew(self.index.last_number, &lines, chain)?;
+        Mark::note_entry(&path, last_number);
         self.index.last_number = last_number;
         [self.documents, self.overlays] = shelves;
         self.journal = Journal::Folder { path, log, lock, mark };

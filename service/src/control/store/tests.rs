@@ -417,6 +417,25 @@ fn old_audit_files_and_documents_that_nothing_goes_back_to_are_removed() {
     assert_eq!((store.last_good(&one).unwrap().revision, opened.warnings().count()), (1, 0));
 }
 
+#[test]
+fn a_folder_in_the_place_of_the_state_folder_knows_the_last_entry_too() {
+    let place = TempDir::new().unwrap();
+    let folder = place.path().join("state");
+    let (mut store, _) = Store::open(&folder).unwrap();
+    for serial in ["ZLG-1", "ZLG-2", "ZLG-3"] {
+        accept(&mut store, serial, 1, "one", Source::Bus);
+    }
+    std::fs::rename(&folder, place.path().join("away")).unwrap();
+    std::fs::create_dir(&folder).unwrap();
+    assert!(store.keep(at(1), [b"one"], std::iter::empty::<Vec<u8>>()).unwrap());
+    drop(store);
+    assert_eq!(numbers(&folder), [4, 5, 6]);
+    let text = std::fs::read_to_string(folder.join("audit.jsonl")).unwrap();
+    std::fs::write(folder.join("audit.jsonl"), text.split_inclusive('\n').next().unwrap()).unwrap();
+    let cut = Store::open(&folder).unwrap().1.cut.unwrap();
+    assert_eq!((cut.last, cut.written), (4, 6));
+}
+
 /// What another instance says its stream was ordered is compared with it.
 #[test]
 fn the_last_command_of_a_stream_is_no_rollback_and_no_end_of_a_calibration() {
