@@ -19,6 +19,7 @@ use crate::control::revision::Calibrations;
 use crate::control::store::{Opened, Store};
 use crate::control::watch::{Known, Watcher};
 use crate::control::{Inbox, Message, SwapManager, Worker};
+use crate::observe::instance::Instance;
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
 use crate::observe::subscribers::Subscribers;
@@ -123,14 +124,12 @@ pub(crate) async fn start_on(
     let prepared = intake.prepare();
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
     let control_status = work.control_status();
-    let source =
-        Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
     let subscribers = Arc::<Subscribers>::default();
-    let source = source.at_work(Arc::clone(&pulse), Arc::clone(&subscribers));
+    let all = (Arc::clone(&intake), Arc::clone(&pair));
+    let instance = Arc::new(Instance::new(all, (control_status, Arc::clone(&subscribers)), settings.digest));
     let swap_manager = SwapManager::start(&inbox, work).map_err(ServiceError::Thread)?;
-    let said = (control_status, Arc::clone(&subscribers));
-    let status_publisher = StatusPublisher::start(&session, Arc::clone(&intake), said, &pair, &settings)
-        .map_err(ServiceError::Thread)?;
+    let status_publisher = StatusPublisher::start(&session, Arc::clone(&instance), &settings);
+    let status_publisher = status_publisher.map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let inbox = inbox.clone();
@@ -148,7 +147,7 @@ pub(crate) async fn start_on(
     let declared = Declared::new(&session, &intake, &status_publisher.bell(), &inbox, inputs).await?;
     let web = Web::start(&settings, &session, &intake)?;
     if let Some(metrics) = &metrics {
-        metrics.open(source, web);
+        metrics.open(Source::new(instance, Arc::clone(&pulse)), web);
     }
     let asking = subscribers.watch(&session);
     Ok(RunningService {
@@ -175,7 +174,7 @@ pub(crate) async fn open_state(
     settings: &Settings,
     waits_for: String,
 ) -> Result<((Store, Opened), Option<Endpoint>), ServiceError> {
-    let mut metrics = Endpoint::start(&settings.metrics, waits_for).await;
+    let mut metrics = Endpoint::start(settings, waits_for).await;
     if settings.state.as_deref().is_some_and(|folder| !folder.exists()) {
         metrics = Ok(metrics?);
     }
