@@ -77,16 +77,11 @@ impl Worker {
     /// A query with a document on `imu/*/calibration`: a swap.
     fn answer_swap(&mut self, query: &Query, origin: Origin) -> Result<(), String> {
         let key = query.key_expr().as_str();
-        let unit = one_unit(key, Asked::Calibration)?;
-        let options = SwapOptions::parse(query.parameters().as_str()).map_err(|error| error.to_string())?;
-        let by = self.by(key, origin, options.by.clone())?;
-        // The instance that speaks answers.
-        if self.is_ours(&unit)? {
-            let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
-            let reply = self.bus_swap(unit, &bytes, SwapOptions { by, ..options });
-            reply_json(query, key, &reply)?;
+        let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+        match self.bus_swap(key, origin, query.parameters().as_str(), &bytes)? {
+            Some(reply) => reply_json(query, key, &reply),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// A put on `imu/*/calibration`: a swap whose options stand in the attachment.
@@ -96,38 +91,39 @@ impl Worker {
             tracing::warn!("{key}: a deletion has no effect");
             return;
         }
-        let Ok(unit) = one_unit(key, Asked::Calibration) else {
-            tracing::warn!("{key} names no unit: the document is ignored");
-            return;
-        };
-        if let Some((words, is_left)) = self.intake.is_not_taken(&unit) {
-            if !is_left {
-                tracing::warn!(%unit, "a document is ignored: {words}");
+        let unit = one_unit(key, Asked::Calibration).ok();
+        let swapped = match unit.and_then(|unit| self.intake.is_not_taken(&unit)) {
+            Some((_, true)) => return,
+            Some((words, false)) => Err(words),
+            None => {
+                let attachment = sample.attachment().map(|bytes| bytes.to_bytes()).unwrap_or_default();
+                let options = std::str::from_utf8(&attachment).map_err(|error| error.to_string());
+                options.and_then(|options| {
+                    self.bus_swap(key, Origin::Bus, options, &sample.payload().to_bytes())
+                })
             }
-            return;
-        }
-        match self.is_ours(&unit) {
-            Ok(true) => {}
-            Ok(false) => return,
-            Err(words) => return tracing::warn!("a document is ignored: {words}"),
-        }
-        let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
-        let options = String::from_utf8(attachment).map_err(|error| error.to_string());
-        let options = options.and_then(|text| SwapOptions::parse(&text).map_err(|error| error.to_string()));
-        let options = options.map_err(|words| format!("attachment: {words}"));
-        let asked = options.and_then(|options| {
-            Ok(SwapOptions { by: self.by(key, Origin::Bus, options.by.clone())?, ..options })
-        });
-        match asked {
-            Ok(options) => drop(self.bus_swap(unit, &sample.payload().to_bytes(), options)),
-            Err(words) => tracing::warn!(%unit, "a document is ignored: {words}"),
+        };
+        if let Err(words) = swapped {
+            tracing::warn!("{key}: a document is ignored: {words}");
         }
     }
 
-    fn bus_swap(&mut self, unit: UnitId, bytes: &[u8], options: SwapOptions) -> SwapReply {
+    /// A swap with these options as text; `None` where another instance speaks for the unit: that one answers.
+    fn bus_swap(
+        &mut self,
+        key: &str,
+        origin: Origin,
+        options: &str,
+        bytes: &[u8],
+    ) -> Result<Option<SwapReply>, String> {
+        let unit = one_unit(key, Asked::Calibration)?;
+        let options = SwapOptions::parse(options).map_err(|error| error.to_string())?;
+        let options = SwapOptions { by: self.by(key, origin, options.by.clone())?, ..options };
         let name = key::calibration(&unit);
-        let request = Request { unit: Some(unit), name, source: Source::Bus, overlay: None, options };
-        self.swap(&request, bytes, None)
+        Ok(self.is_ours(&unit)?.then(|| {
+            let request = Request { unit: Some(unit), name, source: Source::Bus, overlay: None, options };
+            self.swap(&request, bytes, None)
+        }))
     }
 
     /// Replies with the text of what was accepted last for every unit that the query takes in.
