@@ -155,7 +155,7 @@ impl Worker {
         let unwritten = std::mem::take(&mut self.unwritten);
         let count = unwritten.len();
         for (file, problem) in unwritten {
-            self.folder.refuse(Path::new(&file), problem);
+            self.folder.settle(Path::new(&file), vec![problem]);
         }
         count
     }

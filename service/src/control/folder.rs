@@ -151,10 +151,10 @@ impl Folder {
         }
     }
 
-    /// Enters why the document of a file is not taken.
-    pub(super) fn refuse(&mut self, path: &Path, problem: Problem) {
+    /// Enters what was found wrong with a file that is the only one of its unit.
+    pub(super) fn settle(&mut self, path: &Path, problems: Vec<Problem>) {
         if let Some(file) = self.files.get_mut(path) {
-            file.problems = vec![problem];
+            (file.problems, file.rival) = (problems, false);
         }
     }
 }
@@ -210,27 +210,20 @@ impl Worker {
             }
             if let Some((words, _)) = self.intake.is_not_taken(unit) {
                 tracing::info!("{} is left alone: {words}", path.display());
-                self.settle(path, Vec::new());
+                self.folder.settle(path, Vec::new());
                 return true;
             }
             if !self.intake.speaks_for(unit) {
                 tracing::info!("{} is left to the instance that publishes its unit", path.display());
-                self.settle(path, Vec::new());
+                self.folder.settle(path, Vec::new());
                 self.leave(unit, path, read.digest, at_start);
                 return true;
             }
         }
         let problems = self.swap_file(path, read, at_start);
         let good = problems.is_empty();
-        self.settle(path, problems);
+        self.folder.settle(path, problems);
         good
-    }
-
-    /// Enters what was found wrong with a file that is the only one of its unit.
-    fn settle(&mut self, path: &Path, problems: Vec<Problem>) {
-        if let Some(file) = self.folder.files.get_mut(path) {
-            (file.problems, file.rival) = (problems, false);
-        }
     }
 
     /// Leaves a file to the instance that publishes its unit. What is new in it is taken when this one publishes; what was there when
