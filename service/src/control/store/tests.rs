@@ -397,7 +397,7 @@ fn old_audit_files_and_documents_that_nothing_goes_back_to_are_removed() {
     let [old, new] = ["old", "new"].map(|text| store.put_document(text.as_bytes()).unwrap());
     let day = Duration::from_secs(86_400);
     for (digest, days) in [(in_force, 200), (old, 91), (new, 89)] {
-        let file = store.document_file(&digest).unwrap();
+        let file = store.documents.file(&digest).unwrap();
         std::fs::File::options().write(true).open(file).unwrap().set_modified(at(0) - day * days).unwrap();
     }
     store.full_bytes = 1;
