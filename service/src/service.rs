@@ -16,7 +16,7 @@ use zenoh::Session;
 use crate::ServiceError;
 use crate::config::Settings;
 use crate::control::revision::Calibrations;
-use crate::control::store::{Opened, Store};
+use crate::control::store::{Loss, Store};
 use crate::control::watch::{Known, Watcher};
 use crate::control::{Inbox, Message, SwapManager, Worker};
 use crate::observe::instance::Instance;
@@ -88,11 +88,11 @@ pub fn start_with(
     })
 }
 
-/// Starts the service with a state folder that is open already, what it was found like, and an endpoint that answers already.
+/// Starts the service with a state folder that is open already, what it had lost, and an endpoint that answers already.
 pub(crate) async fn start_on(
     settings: Settings,
     calibrations: Calibrations,
-    (store, opened): (Store, Opened),
+    (store, losses): (Store, Vec<Loss>),
     metrics: Option<Endpoint>,
     session: Session,
 ) -> Result<RunningService, ServiceError> {
@@ -117,7 +117,7 @@ pub(crate) async fn start_on(
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
     let pulse = Arc::new(Pulse::new(settings.congestion));
 
-    let mut work = Worker::new(&settings, Arc::clone(&intake), store, &opened);
+    let mut work = Worker::new(&settings, Arc::clone(&intake), store, losses);
     work.take_over(&calibrations);
     work.restore();
     let found = read_folder(&mut work, &settings)?;
@@ -173,7 +173,7 @@ pub(crate) async fn start_on(
 pub(crate) async fn open_state(
     settings: &Settings,
     waits_for: String,
-) -> Result<((Store, Opened), Option<Endpoint>), ServiceError> {
+) -> Result<((Store, Vec<Loss>), Option<Endpoint>), ServiceError> {
     let mut metrics = Endpoint::start(settings, waits_for).await;
     if settings.state.as_deref().is_some_and(|folder| !folder.exists()) {
         metrics = Ok(metrics?);
@@ -183,17 +183,17 @@ pub(crate) async fn open_state(
 }
 
 /// Opens the state folder, or its stand-in.
-fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
-    let Some(folder) = folder else { return Ok((Store::in_memory(), Opened::default())) };
+fn open_store(folder: Option<&Path>) -> Result<(Store, Vec<Loss>), ServiceError> {
+    let Some(folder) = folder else { return Ok((Store::in_memory(), Vec::new())) };
     let (store, opened) = Store::open(folder)?;
     for warning in opened.warnings() {
         tracing::warn!("{warning}");
     }
-    for loss in opened.losses() {
+    for loss in &opened.losses {
         tracing::error!("{loss}");
     }
     tracing::info!(folder = %folder.display(), entries = opened.entries, "state folder opened");
-    Ok((store, opened))
+    Ok((store, opened.losses))
 }
 
 /// Says what a service without a state folder forgets. Who starts one with calibrations of its own, as the demo does, knows it.

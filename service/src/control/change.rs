@@ -226,7 +226,7 @@ impl Worker {
         record.accepted += u64::from(!first);
         self.accepted += u64::from(!first);
         let account = record.account();
-        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
+        self.losses.retain(|loss| loss.unit() != Some(unit));
         self.refusals.forget(unit);
         tracing::info!(%unit, revision, %digest, %source, by, "calibration accepted");
         if let Some(replaced) = self.intake.change(unit, change, account) {

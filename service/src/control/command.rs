@@ -107,7 +107,7 @@ impl Worker {
     /// Has nothing of a unit any more.
     pub(super) fn let_go(&mut self, unit: &UnitId) {
         self.records.remove(unit);
-        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
+        self.losses.retain(|loss| loss.unit() != Some(unit));
         self.followed.retain(|(concerned, _)| concerned != unit);
         self.uncopied.remove(unit);
         self.intake.forget(unit);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::manager::Worker;
 use super::revision::Calibrations;
-use super::store::{Opened, Store};
+use super::store::Store;
 use crate::config::Settings;
 use crate::receive::intake::Intake;
 
@@ -13,5 +13,5 @@ pub(super) fn worker() -> Worker {
     let settings = Settings::default();
     let outlets = Box::new(|_: &_| Err("there is none".into()));
     let intake = Arc::new(Intake::new(settings.clone(), Calibrations::default(), outlets));
-    Worker::new(&settings, intake, Store::in_memory(), &Opened::default())
+    Worker::new(&settings, intake, Store::in_memory(), Vec::new())
 }

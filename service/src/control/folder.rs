@@ -410,7 +410,7 @@ mod tests {
     use crate::config::Settings;
     use crate::control::Carried;
     use crate::control::revision::Calibrations;
-    use crate::control::store::{Opened, Store};
+    use crate::control::store::Store;
     use crate::pair::Pair;
     use crate::receive::intake::Intake;
 
@@ -442,8 +442,7 @@ mod tests {
         };
         let (old, theirs, new) = (text("0.41"), text("0.5"), text("0.6"));
         std::fs::write(&file, &old).unwrap();
-        let mut worker =
-            Worker::new(&settings, intake(&settings, false), Store::in_memory(), &Opened::default());
+        let mut worker = Worker::new(&settings, intake(&settings, false), Store::in_memory(), Vec::new());
         assert_eq!(worker.read_folder().unwrap().1, 0);
         worker.folder_event(changed(old.replace("smoothing_s", "smoothign_s")));
         assert_eq!(worker.folder.bad().count(), 1);
@@ -465,7 +464,7 @@ mod tests {
         assert!(worker.carry(&Carried { unit: unit.clone(), holds: true, entries, kept: BTreeMap::new() }));
         let revision = |worker: &Worker| worker.records[&unit].last().unwrap().number.counter;
         // Alone, with the folder as it was: after a restart, too.
-        let mut worker = Worker::new(&settings, intake(&settings, true), worker.store, &Opened::default());
+        let mut worker = Worker::new(&settings, intake(&settings, true), worker.store, Vec::new());
         worker.restore();
         worker.read_folder().unwrap();
         assert_eq!(revision(&worker), 2, "this file has not changed");
