@@ -97,7 +97,8 @@ impl Worker {
             Some((words, false)) => Err(words),
             None => {
                 let attachment = sample.attachment().map(|bytes| bytes.to_bytes()).unwrap_or_default();
-                let options = std::str::from_utf8(&attachment).map_err(|error| error.to_string());
+                let options =
+                    std::str::from_utf8(&attachment).map_err(|error| format!("attachment: {error}"));
                 options.and_then(|options| {
                     self.bus_swap(key, Origin::Bus, options, &sample.payload().to_bytes())
                 })
@@ -268,17 +269,17 @@ impl PartOfHistory {
     fn parse(parameters: &str) -> Result<Self, String> {
         let mut part = Self { limit: HISTORY_ENTRIES, after: 0, instance: None };
         for parameter in parameters.split(';').filter(|parameter| !parameter.is_empty()) {
-            let value = |name| parameter.strip_prefix(name).and_then(|value| value.parse::<u64>().ok());
-            if let Some(number) = value("after=") {
-                part.after = number;
-            } else if let Some(number) = value("limit=").filter(|number| *number > 0) {
-                part.limit = usize::try_from(number).unwrap_or(usize::MAX);
-            } else if let Some(instance) = parameter.strip_prefix("instance=") {
-                part.instance = Some(instance.to_owned());
-            } else {
-                return Err(format!(
-                    "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an entry"
-                ));
+            let (name, value) = parameter.split_once('=').unwrap_or((parameter, ""));
+            match (name, value.parse()) {
+                ("after", Ok(number)) => part.after = number,
+                ("limit", Ok(number @ 1..)) => part.limit = usize::try_from(number).unwrap_or(usize::MAX),
+                ("instance", _) => part.instance = Some(value.to_owned()),
+                _ => {
+                    return Err(format!(
+                        "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an \
+                         entry"
+                    ));
+                }
             }
         }
         Ok(part)
