@@ -102,20 +102,21 @@ impl Worker {
             tracing::info!(%unit, "forgotten, as the other instance was told to");
             return true;
         }
-        let before = self.records.get(unit);
-        let (accepted, refused) = before.map(|record| (record.accepted, record.refused)).unwrap_or_default();
-        let pre_launch = running(before.and_then(|record| record.pre_launch.clone()), entries);
-        self.plan_again(unit, Record { accepted, refused, pre_launch, ..self.restored(unit) });
+        let record = self.records.entry(unit.clone()).or_default();
+        record.pre_launch = running(record.pre_launch.take(), entries);
+        self.plan_again(unit, self.restored(unit));
         true
     }
 
-    /// Has a unit begin anew with what is written down of it.
-    pub(super) fn plan_again(&mut self, unit: &UnitId, record: Record) {
-        let plan = record.plan.clone();
-        for (_, words) in record.problems() {
+    /// Has a unit begin anew with what is written down of it; what was counted of it and asked for stays.
+    pub(super) fn plan_again(&mut self, unit: &UnitId, restored: Record) {
+        let plan = restored.plan.clone();
+        for (_, words) in restored.problems() {
             tracing::error!(%unit, "{words}");
         }
-        self.records.insert(unit.clone(), record);
+        let before = self.records.remove(unit).unwrap_or_default();
+        let Record { swaps, pre_launch, overlay, .. } = before;
+        self.records.insert(unit.clone(), Record { swaps, pre_launch, overlay, ..restored });
         self.intake.plan_again(unit, plan);
     }
 
@@ -354,6 +355,8 @@ mod tests {
     use std::time::SystemTime;
 
     use isotherm_protocol::control::Schedule;
+    use isotherm_protocol::corrected;
+    use isotherm_protocol::status::Swaps;
 
     use super::*;
     use crate::control::fixture::worker;
@@ -395,6 +398,27 @@ mod tests {
             AuditEntry { number, time, unit: Some("U".to_owned()), by: String::new(), event }
         });
         Carried { unit: unit(), holds, entries: entries.collect(), kept: BTreeMap::new() }
+    }
+
+    #[test]
+    fn what_was_counted_of_a_unit_outlives_what_another_instance_was_ordered() {
+        let mut worker = worker();
+        let swaps = Swaps { accepted: 2, refused: 1, last_refusal: Some("too old".to_owned()) };
+        worker.records.insert(unit(), Record { swaps: swaps.clone(), ..Record::default() });
+        let document = include_str!("../../../config/calibration/ZLG-0001.toml").to_owned();
+        let event = JournalEvent::Changed {
+            revision: corrected::Revision { counter: 7, digest: Digest::of(document.as_bytes()).head() },
+            at: Schedule::NextTick,
+            slew_ns: 0,
+            document: Some(document),
+            overlay: None,
+            source: "bus".to_owned(),
+        };
+        let (name, instance) = ("U".to_owned(), "other".to_owned());
+        let entry = JournalEntry { unit: name, instance, number: 1, heard: Default::default(), event };
+        worker.note_followed(&unit(), Box::new(entry));
+        let record = &worker.records[&unit()];
+        assert_eq!((record.last().unwrap().number.counter, &record.swaps), (7, &swaps));
     }
 
     #[test]

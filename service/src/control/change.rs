@@ -223,7 +223,7 @@ impl Worker {
             record.untrusted = None;
         }
         record.skipped = None;
-        record.accepted += u64::from(!first);
+        record.swaps.accepted += u64::from(!first);
         self.accepted += u64::from(!first);
         let account = record.account();
         self.losses.retain(|loss| loss.unit() != Some(unit));
