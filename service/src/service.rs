@@ -22,7 +22,6 @@ use crate::control::{Inbox, Message, SwapManager, Worker};
 use crate::observe::instance::Instance;
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
-use crate::observe::subscribers::Subscribers;
 use crate::observe::totals::Totals;
 use crate::observe::web::Web;
 use crate::pair::{Asker, Pair, Watch};
@@ -123,10 +122,8 @@ pub(crate) async fn start_on(
     let found = read_folder(&mut work, &settings)?;
     let prepared = intake.prepare();
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
-    let control_status = work.control_status();
-    let subscribers = Arc::<Subscribers>::default();
-    let all = (Arc::clone(&intake), Arc::clone(&pair));
-    let instance = Arc::new(Instance::new(all, (control_status, Arc::clone(&subscribers)), settings.digest));
+    let (of, among) = (Arc::clone(&intake), Arc::clone(&pair));
+    let instance = Arc::new(Instance::new(of, among, work.control_status(), settings.digest));
     let swap_manager = SwapManager::start(&inbox, work).map_err(ServiceError::Thread)?;
     let status_publisher = StatusPublisher::start(&session, Arc::clone(&instance), &settings);
     let status_publisher = status_publisher.map_err(ServiceError::Thread)?;
@@ -146,10 +143,10 @@ pub(crate) async fn start_on(
     let inputs = (&pair, settings.units.as_slice(), &pulse);
     let declared = Declared::new(&session, &intake, &status_publisher.bell(), &inbox, inputs).await?;
     let web = Web::start(&settings, &session, &intake)?;
+    let asking = instance.subscribers.watch(&session);
     if let Some(metrics) = &metrics {
         metrics.open(Source::new(instance, Arc::clone(&pulse)), web);
     }
-    let asking = subscribers.watch(&session);
     Ok(RunningService {
         session,
         settings,

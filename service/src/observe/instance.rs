@@ -24,18 +24,19 @@ pub(crate) struct Instance {
     pub(super) intake: Arc<Intake>,
     pub(super) pair: Arc<Pair>,
     pub(super) control_status: Arc<ControlStatus>,
-    subscribers: Arc<Subscribers>,
+    pub(crate) subscribers: Arc<Subscribers>,
     started: (Instant, i64),
     settings_digest: Option<Digest>,
 }
 
 impl Instance {
     pub(crate) fn new(
-        (intake, pair): (Arc<Intake>, Arc<Pair>),
-        (control_status, subscribers): (Arc<ControlStatus>, Arc<Subscribers>),
+        intake: Arc<Intake>,
+        pair: Arc<Pair>,
+        control_status: Arc<ControlStatus>,
         settings_digest: Option<Digest>,
     ) -> Self {
-        let started = (Instant::now(), unix_ms());
+        let (started, subscribers) = ((Instant::now(), unix_ms()), Arc::default());
         Self { intake, pair, control_status, subscribers, started, settings_digest }
     }
 

@@ -138,7 +138,6 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
     page.is_content(&stage.origin());
 }
 
-/// The connection goes and comes back; so does what was in force.
 /// What is written while the service is asked has to be looked at by itself.
 fn looks_at_what_was_written_meanwhile(page: &mut Browser) {
     page.press("Swap…");
@@ -155,6 +154,7 @@ fn looks_at_what_was_written_meanwhile(page: &mut Browser) {
     page.press("×");
 }
 
+/// The connection goes and comes back; so does what was in force.
 fn loses_the_connection(stage: &mut Stage, page: &mut Browser) {
     stage.stop_service();
     page.until(&has("#link", "Connection lost"));

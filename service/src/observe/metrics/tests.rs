@@ -42,7 +42,7 @@ fn on_loopback() -> MetricsSettings {
 
 fn source(settings: &Settings, intake: &Arc<Intake>) -> Source {
     let pair = Arc::new(Pair::new(settings, "test".to_owned(), 0, Vec::new()));
-    let instance = Instance::new((Arc::clone(intake), pair), Default::default(), None);
+    let instance = Instance::new(Arc::clone(intake), pair, Arc::default(), None);
     Source::new(Arc::new(instance), Arc::new(Pulse::new(settings.congestion)))
 }
 
