@@ -30,6 +30,8 @@ mod control_status;
 mod decision;
 pub mod document;
 mod file;
+#[cfg(test)]
+mod fixture;
 mod folder;
 mod jump;
 mod manager;

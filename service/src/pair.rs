@@ -16,7 +16,7 @@ mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Mutex, RwLock};
 use std::time::{Duration, Instant};
 
 use isotherm_bus::endpoint::address;
@@ -28,7 +28,7 @@ use zenoh::Session;
 
 use crate::ServiceError;
 use crate::config::{PairSettings, Settings};
-use crate::receive::intake::{Intake, lock};
+use crate::receive::intake::{Intake, lock, read, write};
 use crate::receive::unit::{Footing, Standing, UnitActor};
 pub(crate) use ask::{ASKS, Asker, Questions};
 use elsewhere::Elsewhere;
@@ -43,6 +43,17 @@ const MISSING: Duration = Duration::from_secs(5);
 /// Most such units.
 const MOST_PASSED_OVER: usize = 4096;
 
+/// The others of the pair.
+#[derive(Debug)]
+struct Others {
+    /// Those that are there, by instance.
+    there: BTreeMap<String, Member>,
+    /// Since when none is.
+    alone_since: Option<Instant>,
+    /// Whether one was there once.
+    were_there: bool,
+}
+
 /// This instance among the others.
 #[derive(Debug)]
 pub(crate) struct Pair {
@@ -51,10 +62,9 @@ pub(crate) struct Pair {
     takes: Vec<String>,
     /// Where others are, as configured, without what may be secret.
     addresses: Vec<String>,
-    others: RwLock<BTreeMap<String, Member>>,
+    others: RwLock<Others>,
     /// Whether another instance is meant to be there.
     is_meant: bool,
-    alone_since: Mutex<Option<Instant>>,
     /// Whether it is not known yet which units the others speak for.
     opening: AtomicBool,
     /// Whether [`Self::others`] has any: asked with every message.
@@ -64,8 +74,6 @@ pub(crate) struct Pair {
     beat: AtomicU64,
     /// For how long the process stood still before, where the units were not told yet (µs).
     still_us: AtomicU64,
-    /// Whether there were others once.
-    was_accompanied: AtomicBool,
     elsewhere: Elsewhere,
     passed_over: Mutex<BTreeMap<String, Instant>>,
 }
@@ -100,9 +108,11 @@ impl Pair {
             is_meant: settings.pair.is_meant(),
             opening: AtomicBool::new(!others.is_empty()),
             accompanied: AtomicBool::new(!others.is_empty()),
-            was_accompanied: AtomicBool::new(!others.is_empty()),
-            alone_since: Mutex::new(others.is_empty().then(Instant::now)),
-            others: RwLock::new(others.into_iter().map(|other| (other.instance.clone(), other)).collect()),
+            others: RwLock::new(Others {
+                alone_since: others.is_empty().then(Instant::now),
+                were_there: !others.is_empty(),
+                there: others.into_iter().map(|other| (other.instance.clone(), other)).collect(),
+            }),
             start: Instant::now(),
             beat: AtomicU64::new(0),
             still_us: AtomicU64::new(0),
@@ -118,12 +128,12 @@ impl Pair {
 
     /// The others that are there, by instance.
     pub(crate) fn others(&self) -> Vec<Member> {
-        self.others.read().unwrap_or_else(PoisonError::into_inner).values().cloned().collect()
+        read(&self.others).there.values().cloned().collect()
     }
 
     /// Whether another instance of the pair is there.
     fn is_there(&self, instance: &str) -> bool {
-        self.others.read().unwrap_or_else(PoisonError::into_inner).contains_key(instance)
+        read(&self.others).there.contains_key(instance)
     }
 
     /// Whether there are any.
@@ -150,35 +160,33 @@ impl Pair {
         if member.instance == self.me.instance || member.group != self.me.group {
             return false;
         }
-        *lock(&self.alone_since) = None;
-        let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
+        let mut others = write(&self.others);
+        (others.alone_since, others.were_there) = (None, true);
         if !self.accompanied.load(Ordering::Acquire) {
             // Looked seldom while it was alone.
             self.beat.store(self.since_start_us(Instant::now()), Ordering::Release);
         }
-        self.was_accompanied.store(true, Ordering::Release);
         self.accompanied.store(true, Ordering::Release);
-        others.insert(member.instance.clone(), member).is_none()
+        others.there.insert(member.instance.clone(), member).is_none()
     }
 
     /// An instance has gone, or the connection to it; whether it was there.
     fn go(&self, instance: &str) -> bool {
         self.elsewhere.go(instance);
-        let mut others = self.others.write().unwrap_or_else(PoisonError::into_inner);
-        let gone = others.remove(instance).is_some();
-        if gone && others.is_empty() {
+        let mut others = write(&self.others);
+        let gone = others.there.remove(instance).is_some();
+        if gone && others.there.is_empty() {
             // Whoever stood still for longer than the lease finds the others gone before it looks again.
             self.still_us.fetch_max(self.stands_still_us(Instant::now()), Ordering::AcqRel);
             self.accompanied.store(false, Ordering::Release);
-            *lock(&self.alone_since) = Some(Instant::now());
+            others.alone_since = Some(Instant::now());
         }
         gone
     }
 
     /// Whether some other instance goes before this one.
     fn yields(&self) -> bool {
-        let others = self.others.read().unwrap_or_else(PoisonError::into_inner);
-        others.values().any(|other| other.goes_before(&self.me))
+        read(&self.others).there.values().any(|other| other.goes_before(&self.me))
     }
 
     /// Whether a unit that nobody has heard before is this instance's to speak for.
@@ -193,18 +201,20 @@ impl Pair {
 
     /// That the other instance that is meant to be there has not been for a while.
     pub(crate) fn is_missing_other(&self, now: Instant) -> bool {
-        let since = self.standing().alone_since.filter(|_| self.is_meant);
+        let since = read(&self.others).alone_since.filter(|_| self.is_meant);
         since.is_some_and(|since| now.saturating_duration_since(since) >= MISSING)
     }
 
     /// What a unit needs to know of it.
     pub(crate) fn standing(&self) -> Standing {
+        let yields = self.yields();
+        let Others { alone_since, were_there, .. } = *read(&self.others);
         Standing {
             takeover: self.takeover,
             active: self.me.mode == Mode::Active,
-            yields: self.yields(),
-            alone_since: *lock(&self.alone_since),
-            deserted: !self.has_others() && self.was_accompanied.load(Ordering::Acquire),
+            yields,
+            alone_since,
+            deserted: alone_since.is_some() && were_there,
         }
     }
 

@@ -16,12 +16,12 @@ use zenoh::Session;
 use crate::ServiceError;
 use crate::config::Settings;
 use crate::control::revision::Calibrations;
-use crate::control::store::{Opened, Store};
+use crate::control::store::{Loss, Store};
 use crate::control::watch::{Known, Watcher};
 use crate::control::{Inbox, Message, SwapManager, Worker};
+use crate::observe::instance::Instance;
 use crate::observe::metrics::{Endpoint, Source};
 use crate::observe::status_publisher::StatusPublisher;
-use crate::observe::subscribers::Subscribers;
 use crate::observe::totals::Totals;
 use crate::observe::web::Web;
 use crate::pair::{Asker, Pair, Watch};
@@ -87,11 +87,11 @@ pub fn start_with(
     })
 }
 
-/// Starts the service with a state folder that is open already, what it was found like, and an endpoint that answers already.
+/// Starts the service with a state folder that is open already, what it had lost, and an endpoint that answers already.
 pub(crate) async fn start_on(
     settings: Settings,
     calibrations: Calibrations,
-    (store, opened): (Store, Opened),
+    (store, losses): (Store, Vec<Loss>),
     metrics: Option<Endpoint>,
     session: Session,
 ) -> Result<RunningService, ServiceError> {
@@ -116,21 +116,17 @@ pub(crate) async fn start_on(
     let intake = Arc::new(intake.paired_with(Arc::clone(&pair)));
     let pulse = Arc::new(Pulse::new(settings.congestion));
 
-    let mut work = Worker::new(&settings, Arc::clone(&intake), store, &opened);
+    let mut work = Worker::new(&settings, Arc::clone(&intake), store, losses);
     work.take_over(&calibrations);
     work.restore();
     let found = read_folder(&mut work, &settings)?;
     let prepared = intake.prepare();
     tracing::debug!(units = prepared, "publishers and keys of units with a calibration are declared");
-    let control_status = work.control_status();
-    let source =
-        Source::new(&settings, (Arc::clone(&intake), Arc::clone(&pair)), Arc::clone(&control_status));
-    let subscribers = Arc::<Subscribers>::default();
-    let source = source.at_work(Arc::clone(&pulse), Arc::clone(&subscribers));
+    let (of, among) = (Arc::clone(&intake), Arc::clone(&pair));
+    let instance = Arc::new(Instance::new(of, among, work.control_status(), settings.digest));
     let swap_manager = SwapManager::start(&inbox, work).map_err(ServiceError::Thread)?;
-    let said = (control_status, Arc::clone(&subscribers));
-    let status_publisher = StatusPublisher::start(&session, Arc::clone(&intake), said, &pair, &settings)
-        .map_err(ServiceError::Thread)?;
+    let status_publisher = StatusPublisher::start(&session, Arc::clone(&instance), &settings);
+    let status_publisher = status_publisher.map_err(ServiceError::Thread)?;
     let watcher = match &settings.calibrations {
         Some(folder) => {
             let inbox = inbox.clone();
@@ -147,10 +143,10 @@ pub(crate) async fn start_on(
     let inputs = (&pair, settings.units.as_slice(), &pulse);
     let declared = Declared::new(&session, &intake, &status_publisher.bell(), &inbox, inputs).await?;
     let web = Web::start(&settings, &session, &intake)?;
+    let asking = instance.subscribers.watch(&session);
     if let Some(metrics) = &metrics {
-        metrics.open(source, web);
+        metrics.open(Source::new(instance, Arc::clone(&pulse)), web);
     }
-    let asking = subscribers.watch(&session);
     Ok(RunningService {
         session,
         settings,
@@ -174,8 +170,8 @@ pub(crate) async fn start_on(
 pub(crate) async fn open_state(
     settings: &Settings,
     waits_for: String,
-) -> Result<((Store, Opened), Option<Endpoint>), ServiceError> {
-    let mut metrics = Endpoint::start(&settings.metrics, waits_for).await;
+) -> Result<((Store, Vec<Loss>), Option<Endpoint>), ServiceError> {
+    let mut metrics = Endpoint::start(settings, waits_for).await;
     if settings.state.as_deref().is_some_and(|folder| !folder.exists()) {
         metrics = Ok(metrics?);
     }
@@ -184,17 +180,17 @@ pub(crate) async fn open_state(
 }
 
 /// Opens the state folder, or its stand-in.
-fn open_store(folder: Option<&Path>) -> Result<(Store, Opened), ServiceError> {
-    let Some(folder) = folder else { return Ok((Store::in_memory(), Opened::default())) };
+fn open_store(folder: Option<&Path>) -> Result<(Store, Vec<Loss>), ServiceError> {
+    let Some(folder) = folder else { return Ok((Store::in_memory(), Vec::new())) };
     let (store, opened) = Store::open(folder)?;
     for warning in opened.warnings() {
         tracing::warn!("{warning}");
     }
-    for loss in opened.losses() {
+    for loss in &opened.losses {
         tracing::error!("{loss}");
     }
     tracing::info!(folder = %folder.display(), entries = opened.entries, "state folder opened");
-    Ok((store, opened))
+    Ok((store, opened.losses))
 }
 
 /// Says what a service without a state folder forgets. Who starts one with calibrations of its own, as the demo does, knows it.

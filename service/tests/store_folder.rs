@@ -11,7 +11,7 @@ use isotherm_protocol::control::Schedule;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key::UnitId;
-use isotherm_service::control::store::{Store, StoreError};
+use isotherm_service::control::store::{Flaw, Loss, Store, StoreError};
 use tempfile::TempDir;
 
 fn unit() -> UnitId {
@@ -190,7 +190,8 @@ fn entries_of_a_newer_version_are_left_alone_and_their_numbers_kept() {
     fs::write(&audit, &newer).unwrap();
     let (mut store, opened) = Store::open(folder.path()).unwrap();
     assert_eq!(opened.damaged, 1);
-    insta::assert_snapshot!(opened.damages[0].words);
+    let [Flaw::Damage { words, .. }] = &*opened.flaws else { panic!("{opened:?}") };
+    insta::assert_snapshot!(words);
     fill(&mut store, 1);
     assert_eq!(numbers(&store), [1, 41]);
 }
@@ -252,10 +253,9 @@ fn lines_that_are_missing_in_the_middle_are_told_with_their_numbers() {
     kept.drain(2..4);
     fs::write(folder.path().join("audit.jsonl"), kept.concat()).unwrap();
     let (_, opened) = Store::open(folder.path()).unwrap();
-    let [gap] = &*opened.gaps else { panic!("{opened:?}") };
-    assert_eq!((gap.line, gap.first, gap.last), (3, 3, 4));
+    let [Flaw::Gap { line: 3, first: 3, last: 4, .. }] = &*opened.flaws else { panic!("{opened:?}") };
     assert_eq!((opened.entries, opened.damaged, opened.warnings().count()), (4, 0, 1));
-    assert_eq!((opened.losses().count(), opened.cut.is_none()), (0, true));
+    assert_eq!(opened.losses, []);
 }
 
 #[test]
@@ -273,18 +273,21 @@ fn lines_that_are_missing_at_the_end_are_counted_and_no_revision_is_given_twice(
         let rest = all[4][..torn].to_owned();
         fs::write(folder.path().join("audit.jsonl"), all[..4].concat() + &rest).unwrap();
         let (mut store, opened) = Store::open(folder.path()).unwrap();
-        let cut = opened.cut.clone().unwrap();
-        assert_eq!((cut.last, cut.written, opened.torn.is_some()), (4, 7, torn > 0));
-        assert_eq!(opened.losses().count(), if mark == "whole" { 1 } else { 2 });
-        assert_eq!(opened.unmarked.map(|unmarked| unmarked.floor), (mark != "whole").then_some(1004));
+        assert_eq!(opened.torn.is_some(), torn > 0);
+        match &*opened.losses {
+            [Loss::Cut { last: 4, written: 7, .. }] if mark == "whole" => {}
+            [Loss::Cut { last: 4, written: 7, .. }, Loss::Unmarked { floor: 1004, .. }]
+                if mark != "whole" => {}
+            others => panic!("{others:?}"),
+        }
         assert_eq!(store.last_good(&unit()).unwrap().revision, 4);
         assert!(store.highest_revision(&unit()) >= 7);
         fill(&mut store, 1);
         assert_eq!(numbers(&store), [1, 2, 3, 4, 8]);
         drop(store);
         let (_, opened) = Store::open(folder.path()).unwrap();
-        assert_eq!((opened.cut, opened.gaps.len()), (None, 1), "from now on it is a gap");
-        assert_eq!(opened.unmarked, None, "it was written anew");
+        assert!(matches!(*opened.flaws, [Flaw::Gap { .. }]), "from now on it is a gap");
+        assert_eq!(opened.losses, [], "the file with the highest revision was written anew");
     }
 }
 
@@ -295,7 +298,7 @@ fn a_line_that_a_crash_cut_in_mid_write_is_no_loss() {
     text.push_str(&lines(folder.path())[2][..30]);
     fs::write(folder.path().join("audit.jsonl"), text).unwrap();
     let (store, opened) = Store::open(folder.path()).unwrap();
-    assert!(opened.torn.is_some() && opened.cut.is_none() && opened.gaps.is_empty(), "{opened:?}");
+    assert!(opened.torn.is_some() && opened.losses.is_empty() && opened.flaws.is_empty(), "{opened:?}");
     assert_eq!(store.highest_revision(&unit()), 3);
 }
 

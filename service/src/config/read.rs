@@ -15,31 +15,34 @@ use super::swap::Severity;
 
 static FORM: LazyLock<Form> = LazyLock::new(Form::of::<Settings>);
 
+/// Whether a path may be what a key states.
+type Fits = fn(&Path) -> bool;
+
 /// Reads a configuration; `None` where its text makes no sense. Relative paths count from `folder`.
 pub(super) fn settings(r: &mut Reader<'_>, folder: &Path) -> Option<Settings> {
     let mut settings: Settings = r.read(&FORM)?;
     let Settings { calibrations, state, swap, web, zenoh, .. } = &mut settings;
-    // With a state folder the folder of the documents may be missing: the last good sets hold until it is there.
-    if state.is_none() {
-        leads_to(r, "calibrations", calibrations.as_deref(), folder, Path::is_dir, "an existing folder");
-    }
+    let any: Fits = |_| true;
     // These are made where they are missing.
-    let may_be_folder: fn(&Path) -> bool = |path| path.is_dir() || !path.exists();
-    leads_to(r, "state", state.as_deref(), folder, may_be_folder, "a folder");
-    let may_be_file: fn(&Path) -> bool = |path| path.is_file() || !path.exists();
-    leads_to(r, "web.token_file", web.token_file.as_deref(), folder, may_be_file, "a file");
-    leads_to(
-        r,
-        "swap.trusted_keys",
-        swap.trusted_keys.as_deref(),
-        folder,
-        Path::is_dir,
-        "an existing folder",
-    );
-    leads_to(r, "zenoh.config", zenoh.session.config.as_deref(), folder, Path::is_file, "an existing file");
-    let paths: [&mut Option<PathBuf>; 5] =
-        [calibrations, state, &mut swap.trusted_keys, &mut web.token_file, &mut zenoh.session.config];
-    paths.into_iter().flatten().for_each(|path| *path = folder.join(&*path));
+    let may_be_folder: Fits = |path| path.is_dir() || !path.exists();
+    let may_be_file: Fits = |path| path.is_file() || !path.exists();
+    // With a state folder the folder of the documents may be missing: the last good sets hold until it is there.
+    let documents = if state.is_some() { any } else { Path::is_dir };
+    let paths: [(&str, &mut Option<PathBuf>, Fits, &str); 5] = [
+        ("calibrations", calibrations, documents, "an existing folder"),
+        ("state", state, may_be_folder, "a folder"),
+        ("web.token_file", &mut web.token_file, may_be_file, "a file"),
+        ("swap.trusted_keys", &mut swap.trusted_keys, Path::is_dir, "an existing folder"),
+        ("zenoh.config", &mut zenoh.session.config, Path::is_file, "an existing file"),
+    ];
+    for (key, path, fits, what) in paths {
+        let Some(path) = path else { continue };
+        let stated = std::mem::replace(path, folder.join(&*path));
+        if !fits(path) {
+            let (stated, whole) = (stated.display(), path.display());
+            r.refuse(key, format!("is \"{stated}\", must be {what}; looked for {whole}"));
+        }
+    }
     if swap.require_signature {
         if swap.trusted_keys.is_none() {
             let must = "is true: swap.trusted_keys must name the folder of the public keys";
@@ -86,22 +89,6 @@ fn session(r: &mut Reader<'_>, session: &SessionOptions) {
                 r.report(&element(key, index), format!("is {text:?}, {reason}"));
             }
         }
-    }
-}
-
-/// A path that must lead to something.
-fn leads_to(
-    r: &mut Reader<'_>,
-    key: &str,
-    path: Option<&Path>,
-    folder: &Path,
-    fits: fn(&Path) -> bool,
-    what: &str,
-) {
-    let Some(path) = path else { return };
-    let whole = folder.join(path);
-    if !fits(&whole) {
-        r.refuse(key, format!("is \"{}\", must be {what}; looked for {}", path.display(), whole.display()));
     }
 }
 

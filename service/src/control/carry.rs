@@ -13,7 +13,7 @@ use isotherm_correction::operation::Command;
 use isotherm_correction::units::Span;
 use isotherm_protocol::control::Order;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, CommandRecord, FirstTick, Source};
+use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, CommandRecord, Source};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent};
 use isotherm_protocol::key::{self, UnitId};
 use isotherm_protocol::overlay::{Candidate, base_of};
@@ -44,10 +44,8 @@ impl Worker {
     /// Documents and overlays that entries name and that are neither here nor carried with them.
     pub(super) fn lacking(&self, carried: &Carried) -> Vec<Digest> {
         let Carried { entries, kept, .. } = carried;
-        let accepted = entries.iter().filter_map(|entry| match &entry.event {
-            AuditEvent::Accepted(accepted) => Some([Some(accepted.digest), accepted.overlay]),
-            _ => None,
-        });
+        let accepted = entries.iter().filter_map(acceptance);
+        let accepted = accepted.map(|(_, accepted)| [Some(accepted.digest), accepted.overlay]);
         let sets = entries.iter().flat_map(|entry| match &entry.event {
             AuditEvent::CarriedUnit(unit) => unit.sets.as_slice(),
             _ => &[],
@@ -104,20 +102,21 @@ impl Worker {
             tracing::info!(%unit, "forgotten, as the other instance was told to");
             return true;
         }
-        let before = self.records.get(unit);
-        let (accepted, refused) = before.map(|record| (record.accepted, record.refused)).unwrap_or_default();
-        let pre_launch = running(before.and_then(|record| record.pre_launch.clone()), entries);
-        self.plan_again(unit, Record { accepted, refused, pre_launch, ..self.restored(unit) });
+        let record = self.records.entry(unit.clone()).or_default();
+        record.pre_launch = running(record.pre_launch.take(), entries);
+        self.plan_again(unit, self.restored(unit));
         true
     }
 
-    /// Has a unit begin anew with what is written down of it.
-    pub(super) fn plan_again(&mut self, unit: &UnitId, record: Record) {
-        let plan = record.plan.clone();
-        for (_, words) in record.problems() {
+    /// Has a unit begin anew with what is written down of it; what was counted of it and asked for stays.
+    pub(super) fn plan_again(&mut self, unit: &UnitId, restored: Record) {
+        let plan = restored.plan.clone();
+        for (_, words) in restored.problems() {
             tracing::error!(%unit, "{words}");
         }
-        self.records.insert(unit.clone(), record);
+        let before = self.records.remove(unit).unwrap_or_default();
+        let Record { swaps, pre_launch, overlay, .. } = before;
+        self.records.insert(unit.clone(), Record { swaps, pre_launch, overlay, ..restored });
         self.intake.plan_again(unit, plan);
     }
 
@@ -126,8 +125,7 @@ impl Worker {
         let own = if *holds { Vec::new() } else { self.store.history(Some(unit), usize::MAX)? };
         let holding = if *holds { entries } else { &own };
         let begin = holding.iter().rposition(is_forget).map_or(0, |place| place + 1);
-        let accepted = |entry: &&AuditEntry| matches!(entry.event, AuditEvent::Accepted(_));
-        let last = holding.iter().skip(begin).rfind(accepted);
+        let last = holding.iter().skip(begin).filter_map(acceptance).next_back();
         if !holds && last.is_none() {
             // Nothing to put them before.
             return Ok(0);
@@ -138,16 +136,11 @@ impl Worker {
                 fresh.push(entry);
             }
         }
-        if let Some((entry, AuditEvent::Accepted(set))) = last.map(|entry| (entry, &entry.event)) {
-            let written = fresh.iter().copied().rfind(accepted);
-            let is_last = match written.map(|entry| &entry.event) {
-                Some(AuditEvent::Accepted(written)) => is_same(written, set),
-                _ => self
-                    .store
-                    .last_good(unit)
-                    .is_some_and(|good| (good.revision, good.digest) == (set.revision, set.digest)),
-            };
-            if !is_last {
+        if let Some((entry, set)) = last {
+            let written = fresh.iter().copied().filter_map(acceptance).next_back();
+            let written = written.map(|(_, written)| (written.revision, written.digest));
+            let good = || self.store.last_good(unit).map(|good| (good.revision, good.digest));
+            if written.or_else(good) != Some((set.revision, set.digest)) {
                 // With its first tick: one that waited for its own does not wait again.
                 let of_set = |other: &&AuditEntry| match &other.event {
                     AuditEvent::InForce(first) => first.revision == set.revision,
@@ -174,8 +167,10 @@ impl Worker {
             }
         }
         for entry in &fresh {
-            if let AuditEvent::InForce(first) = &entry.event {
-                self.unclaimed.retain(|(of, unclaimed)| of != unit || unclaimed.revision != first.revision);
+            if let AuditEvent::InForce(first) = &entry.event
+                && self.unclaimed.get(unit).is_some_and(|unclaimed| unclaimed.revision == first.revision)
+            {
+                self.unclaimed.remove(unit);
             }
             self.store.append(entry.time.system_time(), Some(unit), &entry.by, entry.event.clone())?;
         }
@@ -188,23 +183,12 @@ impl Worker {
         self.store.by_revision(unit, accepted.revision).is_some_and(|set| set.digest == accepted.digest)
     }
 
-    /// The first tick of a revision, while another instance speaks: that one writes it down, and where it does not any more, this one
-    /// does when it speaks.
-    pub(super) fn leave_unclaimed(&mut self, unit: &UnitId, first: FirstTick) {
-        self.unclaimed.retain(|(of, _)| of != unit);
-        self.unclaimed.push((unit.clone(), first));
-    }
-
     /// This instance speaks for a unit from here on.
     pub(super) fn claim(&mut self, unit: &UnitId) {
-        let (mine, others) = std::mem::take(&mut self.unclaimed).into_iter().partition(|(of, _)| of == unit);
-        self.unclaimed = others;
-        let mine: Vec<(UnitId, FirstTick)> = mine;
-        for (_, first) in mine {
-            // What this one computed before it was in step with the other was published by nobody.
-            if self.store.by_revision(unit, first.revision).is_some_and(|set| !set.in_force) {
-                self.note(Some(unit), "", AuditEvent::InForce(first), "the first tick");
-            }
+        let Some(first) = self.unclaimed.remove(unit) else { return };
+        // What this one computed before it was in step with the other was published by nobody.
+        if self.store.by_revision(unit, first.revision).is_some_and(|set| !set.in_force) {
+            self.note(Some(unit), "", AuditEvent::InForce(first), "the first tick");
         }
     }
 
@@ -331,8 +315,12 @@ fn is_copied(event: &AuditEvent, holds: bool) -> bool {
     }
 }
 
-fn is_same(one: &Acceptance, other: &Acceptance) -> bool {
-    (one.revision, one.digest) == (other.revision, other.digest)
+/// An entry with the acceptance that it is.
+fn acceptance(entry: &AuditEntry) -> Option<(&AuditEntry, &Acceptance)> {
+    match &entry.event {
+        AuditEvent::Accepted(accepted) => Some((entry, accepted)),
+        _ => None,
+    }
 }
 
 /// The command of an entry that was carried out.
@@ -367,22 +355,14 @@ mod tests {
     use std::time::SystemTime;
 
     use isotherm_protocol::control::Schedule;
+    use isotherm_protocol::corrected;
+    use isotherm_protocol::status::Swaps;
 
     use super::*;
-    use crate::config::Settings;
-    use crate::control::revision::Calibrations;
-    use crate::control::store::{Opened, Store};
-    use crate::receive::intake::Intake;
+    use crate::control::fixture::worker;
 
     fn unit() -> UnitId {
         UnitId::new("U").unwrap()
-    }
-
-    fn worker() -> Worker {
-        let settings = Settings::default();
-        let outlets = Box::new(|_: &_| Err("there is none".into()));
-        let intake = Arc::new(Intake::new(settings.clone(), Calibrations::default(), outlets));
-        Worker::new(&settings, intake, Store::in_memory(), &Opened::default())
     }
 
     /// A set, of which the text says which it is.
@@ -418,6 +398,27 @@ mod tests {
             AuditEntry { number, time, unit: Some("U".to_owned()), by: String::new(), event }
         });
         Carried { unit: unit(), holds, entries: entries.collect(), kept: BTreeMap::new() }
+    }
+
+    #[test]
+    fn what_was_counted_of_a_unit_outlives_what_another_instance_was_ordered() {
+        let mut worker = worker();
+        let swaps = Swaps { accepted: 2, refused: 1, last_refusal: Some("too old".to_owned()) };
+        worker.records.insert(unit(), Record { swaps: swaps.clone(), ..Record::default() });
+        let document = include_str!("../../../config/calibration/ZLG-0001.toml").to_owned();
+        let event = JournalEvent::Changed {
+            revision: corrected::Revision { counter: 7, digest: Digest::of(document.as_bytes()).head() },
+            at: Schedule::NextTick,
+            slew_ns: 0,
+            document: Some(document),
+            overlay: None,
+            source: "bus".to_owned(),
+        };
+        let (name, instance) = ("U".to_owned(), "other".to_owned());
+        let entry = JournalEntry { unit: name, instance, number: 1, heard: Default::default(), event };
+        worker.note_followed(&unit(), Box::new(entry));
+        let record = &worker.records[&unit()];
+        assert_eq!((record.last().unwrap().number.counter, &record.swaps), (7, &swaps));
     }
 
     #[test]
@@ -508,5 +509,8 @@ mod tests {
         let forget = theirs(true, vec![ordered(Order::Forget)]);
         assert!(is_forgotten(&forget.entries) && worker.carry_entries(&forget).unwrap() == 1);
         assert_eq!(worker.store.forgotten().collect::<Vec<_>>(), [&unit()]);
+        worker.uncopied.insert(unit());
+        worker.let_go(&unit());
+        assert!(worker.uncopied.is_empty(), "nothing is wrong with a unit that is forgotten");
     }
 }

@@ -155,7 +155,7 @@ impl Worker {
         let unwritten = std::mem::take(&mut self.unwritten);
         let count = unwritten.len();
         for (file, problem) in unwritten {
-            self.folder.refuse(Path::new(&file), problem);
+            self.folder.settle(Path::new(&file), vec![problem]);
         }
         count
     }
@@ -223,10 +223,10 @@ impl Worker {
             record.untrusted = None;
         }
         record.skipped = None;
-        record.accepted += u64::from(!first);
+        record.swaps.accepted += u64::from(!first);
         self.accepted += u64::from(!first);
         let account = record.account();
-        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
+        self.losses.retain(|loss| loss.unit() != Some(unit));
         self.refusals.forget(unit);
         tracing::info!(%unit, revision, %digest, %source, by, "calibration accepted");
         if let Some(replaced) = self.intake.change(unit, change, account) {

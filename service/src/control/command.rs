@@ -6,7 +6,7 @@ use isotherm_correction::earth::Place;
 use isotherm_correction::operation::{Command, Refusal, State};
 use isotherm_correction::prelaunch::PreLaunchSettings;
 use isotherm_correction::units::Span;
-use isotherm_document::unplaced;
+use isotherm_document::{tidy, unplaced};
 use isotherm_protocol::control::{
     CommandOrder, CommandReply, Order, PlaceOrder, PreLaunchOrder, SwapOptions, SwapOutcome, SwapReply,
 };
@@ -107,8 +107,9 @@ impl Worker {
     /// Has nothing of a unit any more.
     pub(super) fn let_go(&mut self, unit: &UnitId) {
         self.records.remove(unit);
-        self.losses.retain(|(concerned, _)| concerned.as_ref() != Some(unit));
+        self.losses.retain(|loss| loss.unit() != Some(unit));
         self.followed.retain(|(concerned, _)| concerned != unit);
+        self.uncopied.remove(unit);
         self.intake.forget(unit);
     }
 
@@ -208,9 +209,16 @@ impl Worker {
     /// What is asked for, over what is configured.
     fn pre_launch_settings(&self, order: &PreLaunchOrder) -> Result<PreLaunchSettings, String> {
         let [shortest_s, longest_s] = DURATION_RANGE_S;
+        // A shorter one could only be refused at its end.
+        let shortest_s = shortest_s.max(tidy(self.pre_launch.limits.time_per_mode.as_s()));
         let duration = match order.duration_s {
             Some(s) if (shortest_s..=longest_s).contains(&s) => Span::from_s(s),
-            Some(s) => return Err(format!("duration_s is {s}, must be from {shortest_s} to {longest_s}")),
+            Some(s) => {
+                return Err(format!(
+                    "duration_s is {s}, must be from {shortest_s} to {longest_s}, and not below \
+                     pre_launch.min_time_per_mode_s"
+                ));
+            }
             None => self.pre_launch.duration,
         };
         Ok(PreLaunchSettings { duration, place: Some(place(&order.place)?), ..self.pre_launch })
@@ -262,5 +270,24 @@ pub(super) fn words(order: &Order) -> String {
         Order::Forget => "forget".to_owned(),
         Order::Rollback { revision: None, .. } => "rollback".to_owned(),
         Order::Rollback { revision: Some(revision), .. } => format!("rollback {revision}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::fixture::worker;
+
+    #[test]
+    fn a_pre_launch_calibration_that_is_too_short_for_its_modes_does_not_begin() {
+        let mut worker = worker();
+        worker.pre_launch.limits.time_per_mode = Span::from_s(120.0);
+        let refused = |duration_s| {
+            let place = PlaceOrder { latitude_deg: 50.0, heading_deg: 0.0, pitch_roll_deg: None };
+            let order = PreLaunchOrder { place, duration_s, install: true };
+            worker.core_command(&Order::PreLaunch(order)).is_err()
+        };
+        let cases = [None, Some(59.0), Some(119.0), Some(120.0), Some(7200.0), Some(7201.0)];
+        assert_eq!(cases.map(refused), [false, true, true, false, false, true]);
     }
 }

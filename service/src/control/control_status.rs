@@ -95,10 +95,10 @@ impl Worker {
             let words = format!("swaps are refused, the state folder cannot be written: {words}");
             add(STATE_FOLDER, 1, words);
         }
-        let losses =
-            self.losses.iter().map(|(_, words)| words.as_str()).chain(self.store.changed_by_others());
-        if let Some(words) = losses.clone().next() {
-            add("audit_file", losses.count(), words.to_owned());
+        let changed = self.store.changed_by_others().map(ToOwned::to_owned);
+        let mut losses = self.losses.iter().map(ToString::to_string).chain(changed);
+        if let Some(words) = losses.next() {
+            add("audit_file", 1 + losses.count(), words);
         }
         let skipped = self.records.iter().filter_map(|(unit, record)| Some((unit, record.skipped.as_ref()?)));
         if let Some((unit, first)) = skipped.clone().next() {

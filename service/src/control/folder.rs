@@ -116,7 +116,8 @@ impl Folder {
     pub(super) fn unreadable(&mut self, path: &Path, reason: &str) -> Problem {
         let problem = unplaced(Some(&path.display().to_string()), format!("cannot be read: {reason}"));
         let file = self.files.entry(path.to_owned()).or_default();
-        (file.problems, file.digest, file.unwritten) = (vec![problem.clone()], None, false);
+        let (unit, hint, problems) = (file.unit.take(), file.hint.take(), vec![problem.clone()]);
+        *file = File { unit, hint, problems, ..File::default() };
         problem
     }
 
@@ -150,10 +151,10 @@ impl Folder {
         }
     }
 
-    /// Enters why the document of a file is not taken.
-    pub(super) fn refuse(&mut self, path: &Path, problem: Problem) {
+    /// Enters what was found wrong with a file that is the only one of its unit.
+    pub(super) fn settle(&mut self, path: &Path, problems: Vec<Problem>) {
         if let Some(file) = self.files.get_mut(path) {
-            file.problems = vec![problem];
+            (file.problems, file.rival) = (problems, false);
         }
     }
 }
@@ -197,39 +198,32 @@ impl Worker {
 
     /// Takes a file that was entered; `at_start` where the service has just started. Whether it is in order.
     pub(super) fn take_file(&mut self, path: &Path, read: &Read, at_start: bool) -> bool {
-        let file = self.folder.files.get_mut(path);
-        let unit = file.and_then(|file| {
+        let named = self.folder.files.get_mut(path).and_then(|file| {
             (file.unwritten, file.left) = (false, false);
             file.unit.clone()
         });
-        let naming = unit.map(|unit| (self.folder.naming(&unit), unit));
-        if let Some((files, unit)) = naming.filter(|(files, _)| files.len() > 1) {
-            self.refuse_rivals(&unit, &files, at_start);
-            return false;
-        }
-        let named = self.folder.files.get(path).and_then(|file| file.unit.clone());
-        if let Some((words, _)) = named.as_ref().and_then(|unit| self.intake.is_not_taken(unit)) {
-            tracing::info!("{} is left alone: {words}", path.display());
-            self.settle(path, Vec::new());
-            return true;
-        }
-        if let Some(unit) = named.filter(|unit| !self.intake.speaks_for(unit)) {
-            tracing::info!("{} is left to the instance that publishes its unit", path.display());
-            self.settle(path, Vec::new());
-            self.leave(&unit, path, read.digest, at_start);
-            return true;
+        if let Some(unit) = &named {
+            let files = self.folder.naming(unit);
+            if files.len() > 1 {
+                self.refuse_rivals(unit, &files, at_start);
+                return false;
+            }
+            if let Some((words, _)) = self.intake.is_not_taken(unit) {
+                tracing::info!("{} is left alone: {words}", path.display());
+                self.folder.settle(path, Vec::new());
+                return true;
+            }
+            if !self.intake.speaks_for(unit) {
+                tracing::info!("{} is left to the instance that publishes its unit", path.display());
+                self.folder.settle(path, Vec::new());
+                self.leave(unit, path, read.digest, at_start);
+                return true;
+            }
         }
         let problems = self.swap_file(path, read, at_start);
         let good = problems.is_empty();
-        self.settle(path, problems);
+        self.folder.settle(path, problems);
         good
-    }
-
-    /// Enters what was found wrong with a file that is the only one of its unit.
-    fn settle(&mut self, path: &Path, problems: Vec<Problem>) {
-        if let Some(file) = self.folder.files.get_mut(path) {
-            (file.problems, file.rival) = (problems, false);
-        }
     }
 
     /// Leaves a file to the instance that publishes its unit. What is new in it is taken when this one publishes; what was there when
@@ -416,7 +410,7 @@ mod tests {
     use crate::config::Settings;
     use crate::control::Carried;
     use crate::control::revision::Calibrations;
-    use crate::control::store::{Opened, Store};
+    use crate::control::store::Store;
     use crate::pair::Pair;
     use crate::receive::intake::Intake;
 
@@ -448,8 +442,7 @@ mod tests {
         };
         let (old, theirs, new) = (text("0.41"), text("0.5"), text("0.6"));
         std::fs::write(&file, &old).unwrap();
-        let mut worker =
-            Worker::new(&settings, intake(&settings, false), Store::in_memory(), &Opened::default());
+        let mut worker = Worker::new(&settings, intake(&settings, false), Store::in_memory(), Vec::new());
         assert_eq!(worker.read_folder().unwrap().1, 0);
         worker.folder_event(changed(old.replace("smoothing_s", "smoothign_s")));
         assert_eq!(worker.folder.bad().count(), 1);
@@ -471,7 +464,7 @@ mod tests {
         assert!(worker.carry(&Carried { unit: unit.clone(), holds: true, entries, kept: BTreeMap::new() }));
         let revision = |worker: &Worker| worker.records[&unit].last().unwrap().number.counter;
         // Alone, with the folder as it was: after a restart, too.
-        let mut worker = Worker::new(&settings, intake(&settings, true), worker.store, &Opened::default());
+        let mut worker = Worker::new(&settings, intake(&settings, true), worker.store, Vec::new());
         worker.restore();
         worker.read_folder().unwrap();
         assert_eq!(revision(&worker), 2, "this file has not changed");
@@ -480,6 +473,10 @@ mod tests {
         worker.judge_bad_again();
         worker.retry_files(worker.next_retry);
         assert_eq!(revision(&worker), 2, "left to the other instance");
+        let reason = "no permission".to_owned();
+        worker.folder_event(FolderEvent::Unreadable { file: file.clone(), reason });
+        assert_eq!(worker.folder.left(), [], "nothing to take while it cannot be read");
+        worker.folder_event(changed(text("0.6")));
         worker.intake = intake(&settings, true);
         worker.retry_files(worker.next_retry);
         assert_eq!(revision(&worker), 3);

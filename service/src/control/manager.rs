@@ -24,7 +24,7 @@ use super::queue::{Inbox, Message, Notice, Stopped};
 use super::refusals::Refusals;
 use super::request::Request;
 use super::revision::Record;
-use super::store::{Opened, Store, StoreError};
+use super::store::{Loss, Store, StoreError};
 use crate::config::{Settings, SwapSettings};
 use crate::receive::intake::Intake;
 
@@ -93,12 +93,12 @@ pub(crate) struct Worker {
     pub(super) control_status: Arc<ControlStatus>,
     /// Why nothing can be written down.
     pub(super) lost: Option<String>,
-    /// What the state folder had lost when it was opened, with the unit that it concerns.
-    pub(super) losses: Vec<(Option<UnitId>, String)>,
+    /// What the state folder had lost when it was opened.
+    pub(super) losses: Vec<Loss>,
     /// Documents that were found good and are to be written down together; `None` where each goes by itself.
     pub(super) group: Option<Vec<(Request, Decision)>>,
     /// First ticks that another instance is to write down, and has not yet.
-    pub(super) unclaimed: Vec<(UnitId, FirstTick)>,
+    pub(super) unclaimed: BTreeMap<UnitId, FirstTick>,
     /// What other instances were ordered and this one goes on with, and could not write down.
     pub(super) followed: Vec<(UnitId, Box<JournalEntry>)>,
     /// Units whose history at the other instance could not be copied.
@@ -116,7 +116,7 @@ const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Worker {
     /// A swap manager that knows nothing yet; [`Worker::restore`] and [`Worker::read_folder`] tell it what holds.
-    pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, store: Store, opened: &Opened) -> Self {
+    pub(crate) fn new(settings: &Settings, intake: Arc<Intake>, store: Store, losses: Vec<Loss>) -> Self {
         Self {
             swap: settings.swap.clone(),
             pre_launch: settings.pre_launch,
@@ -130,9 +130,9 @@ impl Worker {
             refusals: Refusals::default(),
             control_status: Arc::default(),
             lost: None,
-            losses: losses(opened),
+            losses,
             group: None,
-            unclaimed: Vec::new(),
+            unclaimed: BTreeMap::new(),
             followed: Vec::new(),
             uncopied: BTreeSet::new(),
             unwritten: Vec::new(),
@@ -248,7 +248,8 @@ impl Worker {
                     first_end_time_ns: first.end_time_ns,
                 };
                 if !self.intake.speaks_for(unit) {
-                    self.leave_unclaimed(unit, tick);
+                    // That one writes it down, and where it does not any more, this one does when it speaks.
+                    self.unclaimed.insert(unit.clone(), tick);
                     return;
                 }
                 tracing::info!(%unit, revision, sequence = first.sequence, "calibration in force");
@@ -291,10 +292,4 @@ impl Worker {
             tracing::error!(unit, revision, "{what} is not in the audit file: {error}");
         }
     }
-}
-
-/// What was lost, in words, with the unit that it concerns.
-fn losses(opened: &Opened) -> Vec<(Option<UnitId>, String)> {
-    let lost = opened.lost.iter().map(|lost| (UnitId::new(&lost.unit).ok(), lost.to_string()));
-    lost.chain(opened.losses_of_all().map(|loss| (None, loss))).collect()
 }

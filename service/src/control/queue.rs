@@ -146,7 +146,8 @@ impl Inbox {
     /// Hands a request over, or tells its asker why it is not taken.
     fn hand_over(&self, unit: Option<UnitId>, message: Message, bytes: usize) {
         let shown = unit.as_ref().map(ToString::to_string).unwrap_or_default();
-        let Err(not_taken) = self.push(unit, message, bytes) else { return };
+        let lane = unit.map_or(Lane::Several, Lane::Unit);
+        let Err(not_taken) = self.push(lane, message, bytes) else { return };
         let (message, why) = *not_taken;
         let why = match why {
             Refused::Full => "too many requests are waiting, for this unit or for all",
@@ -169,30 +170,18 @@ impl Inbox {
         }
     }
 
-    /// Takes a request of `bytes` bytes for a unit, or for several; gives it back with the reason where it is not taken.
-    pub(super) fn push(&self, unit: Option<UnitId>, message: Message, bytes: usize) -> Result<(), NotTaken> {
-        let lane = |state: &State| match unit {
-            Some(unit) if state.known.contains(&unit) => Lane::Unit(unit),
-            Some(_) => Lane::Strangers,
-            None => Lane::Several,
-        };
-        self.enter(lane, message, bytes)
-    }
-
     /// Takes what the service itself has to tell; gives it back where there is no room.
     pub(crate) fn tell(&self, message: Message) -> Result<(), NotTaken> {
-        self.enter(|_| Lane::Own, message, 0)
+        self.push(Lane::Own, message, 0)
     }
 
-    /// Takes a request into a lane; gives it back with the reason where it is not taken.
-    fn enter(
-        &self,
-        lane: impl FnOnce(&State) -> Lane,
-        message: Message,
-        bytes: usize,
-    ) -> Result<(), NotTaken> {
+    /// Takes a request of `bytes` bytes into a lane; gives it back with the reason where it is not taken.
+    fn push(&self, lane: Lane, message: Message, bytes: usize) -> Result<(), NotTaken> {
         let mut state = self.lock();
-        let lane = lane(&state);
+        let lane = match lane {
+            Lane::Unit(unit) if !state.known.contains(&unit) => Lane::Strangers,
+            lane => lane,
+        };
         if state.ended || (state.stopping && lane != Lane::Own) {
             return Err(Box::new((message, Refused::Ended)));
         }

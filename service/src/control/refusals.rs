@@ -115,8 +115,8 @@ impl Worker {
             return;
         }
         let record = self.records.entry(unit.clone()).or_default();
-        record.refused += 1;
-        record.last_refusal = problem.map(ToString::to_string);
+        record.swaps.refused += 1;
+        record.swaps.last_refusal = problem.map(ToString::to_string);
         self.tell_account(unit);
     }
 }

@@ -77,16 +77,11 @@ impl Worker {
     /// A query with a document on `imu/*/calibration`: a swap.
     fn answer_swap(&mut self, query: &Query, origin: Origin) -> Result<(), String> {
         let key = query.key_expr().as_str();
-        let unit = one_unit(key, Asked::Calibration)?;
-        let options = SwapOptions::parse(query.parameters().as_str()).map_err(|error| error.to_string())?;
-        let by = self.by(key, origin, options.by.clone())?;
-        // The instance that speaks answers.
-        if self.is_ours(&unit)? {
-            let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
-            let reply = self.bus_swap(unit, &bytes, SwapOptions { by, ..options });
-            reply_json(query, key, &reply)?;
+        let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+        match self.bus_swap(key, origin, query.parameters().as_str(), &bytes)? {
+            Some(reply) => reply_json(query, key, &reply),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// A put on `imu/*/calibration`: a swap whose options stand in the attachment.
@@ -96,38 +91,40 @@ impl Worker {
             tracing::warn!("{key}: a deletion has no effect");
             return;
         }
-        let Ok(unit) = one_unit(key, Asked::Calibration) else {
-            tracing::warn!("{key} names no unit: the document is ignored");
-            return;
-        };
-        if let Some((words, is_left)) = self.intake.is_not_taken(&unit) {
-            if !is_left {
-                tracing::warn!(%unit, "a document is ignored: {words}");
+        let unit = one_unit(key, Asked::Calibration).ok();
+        let swapped = match unit.and_then(|unit| self.intake.is_not_taken(&unit)) {
+            Some((_, true)) => return,
+            Some((words, false)) => Err(words),
+            None => {
+                let attachment = sample.attachment().map(|bytes| bytes.to_bytes()).unwrap_or_default();
+                let options =
+                    std::str::from_utf8(&attachment).map_err(|error| format!("attachment: {error}"));
+                options.and_then(|options| {
+                    self.bus_swap(key, Origin::Bus, options, &sample.payload().to_bytes())
+                })
             }
-            return;
-        }
-        match self.is_ours(&unit) {
-            Ok(true) => {}
-            Ok(false) => return,
-            Err(words) => return tracing::warn!("a document is ignored: {words}"),
-        }
-        let attachment = sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
-        let options = String::from_utf8(attachment).map_err(|error| error.to_string());
-        let options = options.and_then(|text| SwapOptions::parse(&text).map_err(|error| error.to_string()));
-        let options = options.map_err(|words| format!("attachment: {words}"));
-        let asked = options.and_then(|options| {
-            Ok(SwapOptions { by: self.by(key, Origin::Bus, options.by.clone())?, ..options })
-        });
-        match asked {
-            Ok(options) => drop(self.bus_swap(unit, &sample.payload().to_bytes(), options)),
-            Err(words) => tracing::warn!(%unit, "a document is ignored: {words}"),
+        };
+        if let Err(words) = swapped {
+            tracing::warn!("{key}: a document is ignored: {words}");
         }
     }
 
-    fn bus_swap(&mut self, unit: UnitId, bytes: &[u8], options: SwapOptions) -> SwapReply {
+    /// A swap with these options as text; `None` where another instance speaks for the unit: that one answers.
+    fn bus_swap(
+        &mut self,
+        key: &str,
+        origin: Origin,
+        options: &str,
+        bytes: &[u8],
+    ) -> Result<Option<SwapReply>, String> {
+        let unit = one_unit(key, Asked::Calibration)?;
+        let options = SwapOptions::parse(options).map_err(|error| error.to_string())?;
+        let options = SwapOptions { by: self.by(key, origin, options.by.clone())?, ..options };
         let name = key::calibration(&unit);
-        let request = Request { unit: Some(unit), name, source: Source::Bus, overlay: None, options };
-        self.swap(&request, bytes, None)
+        Ok(self.is_ours(&unit)?.then(|| {
+            let request = Request { unit: Some(unit), name, source: Source::Bus, overlay: None, options };
+            self.swap(&request, bytes, None)
+        }))
     }
 
     /// Replies with the text of what was accepted last for every unit that the query takes in.
@@ -157,17 +154,20 @@ impl Worker {
     /// Who asks, for the audit file: `CN=` and the common name of the certificate where access control gives each one keys of its own,
     /// else as stated.
     fn by(&self, key: &str, origin: Origin, stated: String) -> Result<String, String> {
-        match key::asker(key).1 {
-            Some(name) if self.certified_names => Ok(format!("{CERTIFIED}{name}")),
-            _ if stated.starts_with(CERTIFIED) => {
-                Err(format!("by is {stated:?}: {CERTIFIED} is reserved for names of certificates"))
-            }
-            None if self.certified_names && origin == Origin::Bus => Err(format!(
-                "the key must end with the name of your certificate, {key}/NAME (certified_names is set)"
-            )),
-            Some(name) => Ok(name.to_owned()),
-            None => Ok(stated),
+        let by = match key::asker(key).1 {
+            Some(name) if self.certified_names => return Ok(format!("{CERTIFIED}{name}")),
+            Some(name) => name.to_owned(),
+            None => stated,
+        };
+        if by.starts_with(CERTIFIED) {
+            return Err(format!("by is {by:?}: {CERTIFIED} is reserved for names of certificates"));
         }
+        if self.certified_names && origin == Origin::Bus {
+            return Err(format!(
+                "the key must end with the name of your certificate, {key}/NAME (certified_names is set)"
+            ));
+        }
+        Ok(by)
     }
 
     /// A query on `imu/*/command`.
@@ -269,17 +269,17 @@ impl PartOfHistory {
     fn parse(parameters: &str) -> Result<Self, String> {
         let mut part = Self { limit: HISTORY_ENTRIES, after: 0, instance: None };
         for parameter in parameters.split(';').filter(|parameter| !parameter.is_empty()) {
-            let value = |name| parameter.strip_prefix(name).and_then(|value| value.parse::<u64>().ok());
-            if let Some(number) = value("after=") {
-                part.after = number;
-            } else if let Some(number) = value("limit=").filter(|number| *number > 0) {
-                part.limit = usize::try_from(number).unwrap_or(usize::MAX);
-            } else if let Some(instance) = parameter.strip_prefix("instance=") {
-                part.instance = Some(instance.to_owned());
-            } else {
-                return Err(format!(
-                    "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an entry"
-                ));
+            let (name, value) = parameter.split_once('=').unwrap_or((parameter, ""));
+            match (name, value.parse()) {
+                ("after", Ok(number)) => part.after = number,
+                ("limit", Ok(number @ 1..)) => part.limit = usize::try_from(number).unwrap_or(usize::MAX),
+                ("instance", _) => part.instance = Some(value.to_owned()),
+                _ => {
+                    return Err(format!(
+                        "parameter {parameter:?} must be limit=N, N a whole number from 1, or after=N, the number of an \
+                         entry"
+                    ));
+                }
             }
         }
         Ok(part)

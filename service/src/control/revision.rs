@@ -134,12 +134,8 @@ impl Calibrations {
 pub(super) struct Record {
     /// What it was given, and is to follow. What has come in force since may still stand there as what is to follow.
     pub(super) plan: Plan,
-    /// Swaps accepted since the service started: what a unit is given first, from its file, is none.
-    pub(super) accepted: u64,
-    /// Documents refused since the service started.
-    pub(super) refused: u64,
-    /// The last refusal in words.
-    pub(super) last_refusal: Option<String>,
+    /// Since the service started: what a unit is given first, from its file, is no swap.
+    pub(super) swaps: Swaps,
     /// The pre-launch calibration that was asked for last.
     pub(super) pre_launch: Option<PreLaunchRun>,
     /// The overlay that the last one was stored as.
@@ -190,8 +186,6 @@ impl Record {
 
     /// What the unit's status says of its swaps.
     pub(super) fn account(&self) -> SwapAccount {
-        let (accepted, refused) = (self.accepted, self.refused);
-        let swaps = Swaps { accepted, refused, last_refusal: self.last_refusal.clone() };
-        SwapAccount { swaps, overlay: self.overlay, problems: self.problems() }
+        SwapAccount { swaps: self.swaps.clone(), overlay: self.overlay, problems: self.problems() }
     }
 }

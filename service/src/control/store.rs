@@ -28,7 +28,7 @@ mod verify;
 
 pub use error::StoreError;
 pub(crate) use opened::instead;
-pub use opened::{Cut, Damage, Emptied, Gap, LostRevision, Opened, Torn, Unmarked};
+pub use opened::{Flaw, Loss, Opened, Torn};
 pub use verify::{Break, Lost, Verification, verify};
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -107,7 +107,8 @@ impl Store {
         let log = Log::open(folder, &mut opened, &mut index)?;
         // The last line alone may be missing after a crash in mid-write.
         let cut = Mark::last_entry(folder).filter(|written| *written > index.next_number());
-        let unmarked = |source| StoreError::Write { path: folder.to_owned(), source };
+        let unwritten = |source| StoreError::Write { path: folder.to_owned(), source };
+        let mut of_files = Vec::new();
         let mut mark = match Mark::read(folder) {
             Ok(Some(mark)) => mark,
             // No revision was given yet.
@@ -116,39 +117,35 @@ impl Store {
                 let reason = lost
                     .map_or_else(|error| format!("cannot be read ({error})"), |_| "is missing".to_owned());
                 let mark = Mark::beyond(index.highest());
-                mark.write(folder).map_err(unmarked)?;
-                opened.unmarked =
-                    Some(Unmarked { file: folder.join(folder::MARK), reason, floor: mark.floor });
+                mark.write(folder).map_err(unwritten)?;
+                of_files.push(Loss::Unmarked { file: folder.join(folder::MARK), reason, floor: mark.floor });
                 mark
             }
         };
         let has_older = log.is_empty_behind_a_full_one()? && !being_begun_anew;
         let kept = documents.count();
         if has_older || (opened.entries == 0 && kept > 0) {
-            mark.lose(folder).map_err(unmarked)?;
+            mark.lose(folder).map_err(unwritten)?;
             // The numbers of what is lost are missed.
             index.last_number = index.last_number.max(Mark::last_entry(folder).unwrap_or(0));
             let (folder, floor) = (folder.to_owned(), mark.floor);
-            opened.emptied = Some(Emptied { folder, documents: kept, has_older, floor });
+            of_files.insert(0, Loss::Emptied { folder, documents: kept, has_older, floor });
         } else if let Some(written) = cut {
-            mark.lose(folder).map_err(unmarked)?;
-            opened.cut = Some(Cut { last: index.last_number, written, floor: mark.floor });
+            mark.lose(folder).map_err(unwritten)?;
+            of_files.insert(0, Loss::Cut { last: index.last_number, written, floor: mark.floor });
             index.last_number = written;
         } else if index.highest() > 0 {
-            mark.reserve(folder, index.highest()).map_err(unmarked)?;
+            mark.reserve(folder, index.highest()).map_err(unwritten)?;
         }
         index.floor = mark.floor;
         // A calibration that never was a document is in force without an acceptance: that alone is no loss.
-        if opened.damaged > 0 {
-            let lost = index.lost().map(|(unit, revision)| LostRevision {
-                unit: unit.to_string(),
-                revision,
-                in_its_place: index.sets(unit).next_back().map(|set| set.revision),
-            });
-            opened.lost = lost.collect();
-        }
+        let lost = index.lost().filter(|_| opened.damaged > 0).map(|(unit, revision)| {
+            let in_its_place = index.sets(unit).next_back().map(|set| set.revision);
+            Loss::Revision { unit: unit.clone(), revision, in_its_place }
+        });
+        opened.losses = lost.chain(of_files).collect();
         let journal = Journal::Folder { path: folder.to_owned(), log, lock, mark };
-        let is_damaged = opened.losses().next().is_some() || opened.damaged > 0 || !opened.gaps.is_empty();
+        let is_damaged = !(opened.losses.is_empty() && opened.flaws.is_empty());
         let prune_due = true;
         let store = Self { journal, documents, overlays, index, prune_due, is_damaged, ..Self::in_memory() };
         Ok((store, opened))
@@ -340,6 +337,7 @@ impl Store {
         let mut log = Log::open(&path, &mut Opened::default(), &mut Index::default())?;
         let (lines, last_number, chain) = self.carried_lines(time)?;
         log.begin_anew(self.index.last_number, &lines, chain)?;
+        Mark::note_entry(&path, last_number);
         self.index.last_number = last_number;
         [self.documents, self.overlays] = shelves;
         self.journal = Journal::Folder { path, log, lock, mark };

@@ -34,7 +34,7 @@ use tokio::sync::Mutex;
 use tokio::task::JoinHandle;
 
 use crate::ServiceError;
-use crate::config::MetricsSettings;
+use crate::config::{MetricsSettings, Settings};
 use crate::observe::web::Web;
 pub(crate) use source::Source;
 
@@ -78,11 +78,8 @@ impl Endpoint {
     ///
     /// # Errors
     /// [`ServiceError::Metrics`] where others could reach it and that is not allowed, or it cannot be had.
-    pub(crate) async fn start(
-        settings: &MetricsSettings,
-        waits_for: String,
-    ) -> Result<Option<Self>, ServiceError> {
-        Self::start_within(settings, waits_for, Watch::default(), Limits::default()).await
+    pub(crate) async fn start(settings: &Settings, waits_for: String) -> Result<Option<Self>, ServiceError> {
+        Self::start_within(&settings.metrics, waits_for, Watch::of(&settings.unit), Limits::default()).await
     }
 
     async fn start_within(

@@ -3,7 +3,6 @@
 //! It may wait for a unit's lock or for a slow subscriber; the receive threads never wait for it.
 
 mod answer;
-mod instance;
 mod outlets;
 
 use std::sync::Arc;
@@ -15,13 +14,11 @@ use std::time::{Duration, Instant};
 use zenoh::Session;
 use zenoh::query::Query;
 
+use isotherm_protocol::service_status::ServiceStatus;
+
 use crate::config::Settings;
-use crate::control::ControlStatus;
-use crate::observe::subscribers::Subscribers;
-use crate::pair::Pair;
-use crate::receive::intake::Intake;
+use crate::observe::instance::Instance;
 use crate::receive::unit::UnitActor;
-use instance::{Instance, Look};
 use outlets::Outlets;
 
 /// Requests that may wait for the status publisher; what comes beyond is refused, which a query notices by its missing reply.
@@ -92,20 +89,17 @@ impl StatusPublisher {
     /// Where the system gives no thread.
     pub(crate) fn start(
         session: &Session,
-        intake: Arc<Intake>,
-        (control_status, subscribers): (Arc<ControlStatus>, Arc<Subscribers>),
-        pair: &Arc<Pair>,
+        instance: Arc<Instance>,
         settings: &Settings,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(WAITING_REQUESTS);
         let rung = Arc::new(AtomicBool::new(false));
-        let instance = Instance::new(session, settings.digest, control_status, subscribers);
         let mut work = Work {
             outlets: Outlets::new(session.clone()),
             instance,
+            said: None,
+            posted: Arc::default(),
             configuration: settings.to_toml(),
-            intake,
-            pair: Arc::clone(pair),
             rung: Arc::clone(&rung),
             units_changed: true,
             status_interval: settings.status_interval,
@@ -132,11 +126,13 @@ impl StatusPublisher {
 /// What the status publisher works with.
 struct Work {
     outlets: Outlets,
-    instance: Instance,
+    instance: Arc<Instance>,
+    /// What was said last of the service, as far as a change of it is news.
+    said: Option<ServiceStatus>,
+    /// What the swap manager had posted then.
+    posted: Arc<ServiceStatus>,
     /// Effective configuration of the service.
     configuration: String,
-    intake: Arc<Intake>,
-    pair: Arc<Pair>,
     rung: Arc<AtomicBool>,
     /// Some unit's status was due since the service's own was looked at.
     units_changed: bool,
@@ -161,7 +157,7 @@ impl Work {
             let now = Instant::now();
             if now >= next_look {
                 // A process that stood still knows nothing of streams that have stopped.
-                let still = self.pair.has_stood_still(now).is_some();
+                let still = self.instance.pair.has_stood_still(now).is_some();
                 self.publish(|actor| {
                     if !still {
                         actor.tend(now);
@@ -172,7 +168,7 @@ impl Work {
                 next_look = now + self.look_interval;
             }
             if now >= next_status {
-                self.intake.each_unit(|actor| actor.measure_rates(now));
+                self.instance.intake.each_unit(|actor| actor.measure_rates(now));
                 self.publish_all();
                 next_status = now + self.status_interval;
                 next_progress = now + PROGRESS_INTERVAL;
@@ -181,7 +177,7 @@ impl Work {
                 next_progress = now + PROGRESS_INTERVAL;
             }
         }
-        self.intake.each_unit(UnitActor::flush);
+        self.instance.intake.each_unit(UnitActor::flush);
         self.publish_all();
     }
 
@@ -191,7 +187,7 @@ impl Work {
             actor.take_status_due();
             true
         });
-        self.outlets.keep(|unit| self.intake.has(unit));
+        self.outlets.keep(|unit| self.instance.intake.has(unit));
         self.publish_own(true);
     }
 
@@ -199,10 +195,10 @@ impl Work {
     fn publish(&mut self, mut is_due: impl FnMut(&mut UnitActor) -> bool) {
         // Before the look: who rings from here on is heard again.
         self.rung.store(false, Ordering::Release);
-        let Self { instance, intake, outlets, .. } = self;
-        let name = instance.name();
+        let Self { instance, outlets, .. } = self;
+        let name = instance.id();
         // One after the other: the statuses of thousands of units are megabytes.
-        let told = intake.one_by_one(
+        let told = instance.intake.one_by_one(
             // The status of a unit is that of the instance that speaks for it.
             |actor| (is_due(actor) && actor.speaks()).then(|| (actor.id().clone(), actor.status(name))),
             |(unit, status)| {
@@ -217,14 +213,18 @@ impl Work {
 
     /// Publishes the service's own status where it has changed, or `always`.
     fn publish_own(&mut self, always: bool) {
-        let look = match (always, std::mem::take(&mut self.units_changed)) {
-            (true, _) => Look::Always,
-            (false, true) => Look::IfNews,
-            (false, false) => Look::IfPosted,
-        };
-        if let Some(status) = self.instance.status(&self.intake, look)
-            && let Err(error) = self.outlets.service(&status)
-        {
+        let posted = self.instance.control_status.read();
+        let may_be_news = std::mem::take(&mut self.units_changed) || !Arc::ptr_eq(&self.posted, &posted);
+        if !(always || may_be_news) {
+            return;
+        }
+        let news = self.instance.news(&posted);
+        self.posted = posted;
+        if !always && self.said.as_ref() == Some(&news) {
+            return;
+        }
+        self.said = Some(news.clone());
+        if let Err(error) = self.outlets.service(&self.instance.complete(news)) {
             tracing::warn!("cannot publish the service's status: {}", isotherm_bus::words(&error));
         }
     }

@@ -18,6 +18,9 @@ const INTERVAL: Duration = Duration::from_secs(2);
 /// Who has not taken within this what was published is behind.
 const LIMIT: Duration = Duration::from_secs(1);
 
+/// Kind of the fault of a subscriber that is behind.
+pub(super) const BEHIND: &str = "subscriber_behind";
+
 /// The subscriber that was behind last, in words, with the number of all receipts that came late.
 #[derive(Debug, Default)]
 pub(crate) struct Subscribers(Mutex<Option<Fault>>);
@@ -46,7 +49,7 @@ impl Subscribers {
         let mut latest = lock(&self.0);
         for of in behind {
             let receipts = latest.as_ref().map_or(0, |fault| fault.count) + 1;
-            *latest = Some(standing("subscriber_behind", receipts, words(of)));
+            *latest = Some(standing(BEHIND, receipts, words(of)));
         }
     }
 

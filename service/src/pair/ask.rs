@@ -106,34 +106,27 @@ impl Asker {
             let spoken = self.spoken().await;
             self.pair.opened(&self.intake, &spoken);
         }
-        // Histories are asked for when no entry has come for a while.
-        let mut due: BTreeMap<Option<UnitId>, Vec<Instant>> = BTreeMap::new();
+        // When histories are asked for, and of which unit.
+        let mut due: BTreeSet<(Instant, Option<UnitId>)> = BTreeSet::new();
         loop {
-            let next = due.values().flatten().min().copied();
-            let wait =
-                next.map_or(Duration::from_secs(3600), |next| next.saturating_duration_since(Instant::now()));
-            match tokio::time::timeout(wait, questions.recv()).await {
+            let next = due.first().map(|(at, _)| at.saturating_duration_since(Instant::now()));
+            match tokio::time::timeout(next.unwrap_or(Duration::from_secs(3600)), questions.recv()).await {
                 Ok(None) => break,
                 Ok(Some(unit)) => {
                     let now = Instant::now();
-                    due.entry(unit).or_default().extend(DELAYS.map(|delay| now + delay));
+                    due.extend(DELAYS.map(|delay| (now + delay, unit.clone())));
                 }
                 Err(_) => {
                     let now = Instant::now();
-                    let ripe: Vec<_> = due
-                        .iter()
-                        .filter(|(_, at)| at.iter().any(|at| *at <= now))
-                        .map(|(unit, _)| unit.clone())
-                        .collect();
+                    let later = due.split_off(&(now, None));
+                    let ripe: BTreeSet<_> =
+                        std::mem::replace(&mut due, later).into_iter().map(|(_, unit)| unit).collect();
                     for unit in ripe {
                         let done = self.records(unit.clone(), &mut copied).await;
-                        let at = due.entry(unit).or_default();
-                        at.retain(|at| *at > now);
-                        if !done && at.is_empty() {
-                            at.push(Instant::now() + AGAIN);
+                        if !done && due.iter().all(|(_, other)| *other != unit) {
+                            due.insert((Instant::now() + AGAIN, unit));
                         }
                     }
-                    due.retain(|_, at| !at.is_empty());
                 }
             }
         }

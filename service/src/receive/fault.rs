@@ -70,7 +70,16 @@ impl FaultKind {
     pub(crate) fn is_refusal(self) -> bool {
         use FaultKind as K;
 
-        !matches!(self, K::Unpublished | K::Alarm | K::OtherBits | K::TwoSpeak | K::TwoProducers | K::Unfit)
+        !matches!(
+            self,
+            K::Unpublished
+                | K::JournalUnpublished
+                | K::Alarm
+                | K::OtherBits
+                | K::TwoSpeak
+                | K::TwoProducers
+                | K::Unfit
+        )
     }
 
     /// Those that units count; the others belong to the service.

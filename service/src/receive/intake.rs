@@ -9,7 +9,7 @@ pub(crate) use paired::Answers;
 use std::any::Any;
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::Instant;
 
 use isotherm_protocol::control::Schedule;
@@ -40,8 +40,8 @@ pub struct Intake {
     inbox: Option<Inbox>,
     /// Where the journals of units go.
     journal: Option<Journal>,
-    /// Other instances.
-    pair: Option<Arc<Pair>>,
+    /// This instance among the others.
+    pair: Arc<Pair>,
     units: RwLock<Units>,
     faults: Mutex<FaultLog>,
     looked_for_room: Mutex<Option<Instant>>,
@@ -65,12 +65,13 @@ impl Intake {
         let calibrations = RwLock::new(calibrations);
         Self {
             taken: chunks(&settings.units),
+            // Alone, unless it is paired.
+            pair: Arc::new(Pair::new(&settings, String::new(), 0, Vec::new())),
             settings,
             calibrations,
             outlets: Outlets::new(outlets),
             inbox: None,
             journal: None,
-            pair: None,
             units: RwLock::default(),
             faults: Mutex::default(),
             looked_for_room: Mutex::default(),
@@ -122,7 +123,7 @@ impl Intake {
         let known = self.unit(serial);
         let Some(unit) = known.or_else(|| self.appear(serial, input, frame, arrival)) else { return false };
         let mut actor = lock(&unit);
-        if let Some(short) = self.pair.as_ref().and_then(|pair| pair.has_stood_still(arrival)) {
+        if let Some(short) = self.pair.has_stood_still(arrival) {
             actor.follow(arrival, Pair::footing(short));
         }
         // After a panic it is due.
@@ -131,9 +132,9 @@ impl Intake {
 
     /// Knows nothing more of a unit; it appears anew with its next message.
     pub(crate) fn forget(&self, unit: &UnitId) {
-        self.calibrations.write().unwrap_or_else(PoisonError::into_inner).plans.remove(unit);
+        write(&self.calibrations).plans.remove(unit);
         self.outlets.drop_prepared(unit);
-        let gone = self.units.write().unwrap_or_else(PoisonError::into_inner).remove(unit);
+        let gone = write(&self.units).remove(unit);
         if let Some(unit) = gone {
             guarded(&mut lock(&unit), |actor| {
                 actor.flush();
@@ -174,7 +175,7 @@ impl Intake {
     /// the revision counter of a change that was waiting and is replaced.
     pub(crate) fn change(&self, unit: &UnitId, change: Change, account: SwapAccount) -> Option<u64> {
         let before = {
-            let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+            let mut calibrations = write(&self.calibrations);
             calibrations.plans.entry(unit.clone()).or_default().change(change.clone())
         };
         // Behind the entry above: a unit that appears in between has been given it.
@@ -268,8 +269,13 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Locks for reading, likewise.
-fn read<T>(lock: &RwLock<T>) -> std::sync::RwLockReadGuard<'_, T> {
+pub(crate) fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
     lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Locks for writing, likewise.
+pub(crate) fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

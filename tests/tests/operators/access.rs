@@ -304,6 +304,9 @@ async fn names_are_those_of_certificates_only_where_the_service_is_told_so() {
             assert_eq!(read.into_result().unwrap().payload().to_bytes(), text.as_bytes());
         } else {
             assert_eq!(plain.unwrap().outcome, SwapOutcome::Accepted);
+            let key = key::by(&key::command(&unit), "CN=ann").unwrap();
+            let forged = order(session, &key, r#"{"command":"rollback"}"#).await;
+            assert!(matches!(&*forged, [Err(words)] if words.contains("CN=ann")), "{forged:?}");
         }
         assert!(forged.unwrap_err().contains("CN="), "a name that no certificate has said");
         let entries = audit(&folders.state);

@@ -61,6 +61,8 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
     page.until(&has(".temperatures tbody", "body"));
     page.until(&has(".history tbody", "accepted"));
 
+    looks_at_what_was_written_meanwhile(&mut page);
+
     // Swap: the difference first, then in force.
     page.press("Swap…");
     page.write("Text", &document(UNIT, 4.25));
@@ -134,6 +136,22 @@ async fn an_operator_opens_swaps_is_refused_rolls_back_commands_and_loses_the_co
     page.until(&has("h1", "<img src=x onerror=alert(1)>"));
     assert_eq!(page.value("document.querySelectorAll('main img').length"), 0);
     page.is_content(&stage.origin());
+}
+
+/// What is written while the service is asked has to be looked at by itself.
+fn looks_at_what_was_written_meanwhile(page: &mut Browser) {
+    page.press("Swap…");
+    page.write("Text", &document(UNIT, 4.25));
+    page.value("window.own = fetch; window.fetch = (...of) => new Promise(done => setTimeout(done, 700)).then(() => own(...of)); 0");
+    page.press("Show the difference");
+    page.write("Text", &document(UNIT, 4.5));
+    page.until(&has("dialog .answer", "show the difference again"));
+    assert_eq!(
+        page.value("[...document.querySelectorAll('dialog button')].find(b => b.textContent === 'Put in force').disabled"),
+        true
+    );
+    page.value("window.fetch = own; 0");
+    page.press("×");
 }
 
 /// The connection goes and comes back; so does what was in force.

@@ -8,6 +8,10 @@ fn unit(serial: &str) -> UnitId {
     UnitId::new(serial).unwrap()
 }
 
+fn of(serial: &str) -> Lane {
+    Lane::Unit(unit(serial))
+}
+
 /// A request that is known by its unit.
 fn request(serial: &str) -> Message {
     let revision = Revision::default();
@@ -30,13 +34,13 @@ fn a_flood_for_one_unit_or_for_invented_ones_makes_no_other_wait() {
     queue.know([unit("A"), unit("B")].iter());
     let mut refused = 0;
     for n in 0..1500 {
-        refused += usize::from(queue.push(Some(unit("A")), request("A"), 1 << 20).is_err());
+        refused += usize::from(queue.push(of("A"), request("A"), 1 << 20).is_err());
         let invented = format!("X{n}");
-        refused += usize::from(queue.push(Some(unit(&invented)), request(&invented), 1 << 20).is_err());
+        refused += usize::from(queue.push(of(&invented), request(&invented), 1 << 20).is_err());
     }
     assert_eq!(refused, 3000 - 16, "eight megabytes of each lane");
-    queue.push(Some(unit("B")), request("B"), 1 << 20).unwrap();
-    queue.push(None, request("all"), 10).unwrap();
+    queue.push(of("B"), request("B"), 1 << 20).unwrap();
+    queue.push(Lane::Several, request("all"), 10).unwrap();
     queue.tell(request("own")).unwrap();
     let order = served(&queue);
     assert_eq!(order.len(), 19);
@@ -49,9 +53,9 @@ fn a_flood_for_one_unit_or_for_invented_ones_makes_no_other_wait() {
 #[test]
 fn what_waits_is_finished_and_nothing_more_is_taken() {
     let queue = Inbox::default();
-    queue.push(Some(unit("A")), request("A"), 0).unwrap();
+    queue.push(of("A"), request("A"), 0).unwrap();
     queue.stop();
-    assert_eq!(queue.push(Some(unit("A")), request("A"), 0).unwrap_err().1, Refused::Ended);
+    assert_eq!(queue.push(of("A"), request("A"), 0).unwrap_err().1, Refused::Ended);
     queue.tell(request("own")).unwrap();
     assert_eq!(served(&queue), ["own", "A"]);
     assert_eq!(queue.take(Duration::ZERO).unwrap_err(), Stopped);

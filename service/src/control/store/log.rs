@@ -10,7 +10,7 @@ use isotherm_protocol::history::{AuditEntry, LineError};
 use isotherm_protocol::key::UnitId;
 
 use super::index::Index;
-use super::opened::{Damage, Gap, Opened, Torn};
+use super::opened::{Flaw, Opened, Torn};
 use super::read::{self, Extent, Line};
 use super::{StoreError, folder as files};
 use isotherm_document::file::check_regular;
@@ -238,14 +238,15 @@ fn take_in(
             Ok(entry) => {
                 opened.entries += 1;
                 if let Some(first) = next.filter(|next| entry.number > *next) {
-                    opened.gaps.push(Gap { file: path.to_owned(), line, first, last: entry.number - 1 });
+                    opened.note(Flaw::Gap { file: path.to_owned(), line, first, last: entry.number - 1 });
                 }
                 next = Some(entry.number.saturating_add(1));
                 index.apply(&entry);
             }
             Err(_) if may_be_torn && !ended && !rest_is_whole => {}
             Err(error) => {
-                opened.damage(Damage { file: path.to_owned(), line, words: error.to_string() });
+                opened.damaged += 1;
+                opened.note(Flaw::Damage { file: path.to_owned(), line, words: error.to_string() });
                 let number = if let LineError::Entry { number, .. } = error { number } else { None };
                 next = number.or(next).map(|number| number.saturating_add(1));
                 index.skip(number, acceptance_in(bytes));

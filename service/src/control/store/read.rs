@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use isotherm_document::file::check_regular;
 use isotherm_protocol::digest::Digest;
@@ -28,14 +28,9 @@ impl Store {
         self.overlays.get(digest)
     }
 
-    /// The file that a document is kept in; `None` where there is no state folder.
-    pub(crate) fn document_file(&self, digest: &Digest) -> Option<PathBuf> {
-        self.documents.file(digest)
-    }
-
     /// What problems of a document that is kept are to call it: its file, or what is given where there is no state folder.
     pub(crate) fn document_name(&self, digest: &Digest, otherwise: impl FnOnce() -> String) -> String {
-        self.document_file(digest).map_or_else(otherwise, |file| file.display().to_string())
+        self.documents.file(digest).map_or_else(otherwise, |file| file.display().to_string())
     }
 
     /// The newest entries of a unit, or of all, the oldest of them first: at most `limit`, and no more than 10 000. They are

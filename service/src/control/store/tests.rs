@@ -397,7 +397,7 @@ fn old_audit_files_and_documents_that_nothing_goes_back_to_are_removed() {
     let [old, new] = ["old", "new"].map(|text| store.put_document(text.as_bytes()).unwrap());
     let day = Duration::from_secs(86_400);
     for (digest, days) in [(in_force, 200), (old, 91), (new, 89)] {
-        let file = store.document_file(&digest).unwrap();
+        let file = store.documents.file(&digest).unwrap();
         std::fs::File::options().write(true).open(file).unwrap().set_modified(at(0) - day * days).unwrap();
     }
     store.full_bytes = 1;
@@ -415,6 +415,25 @@ fn old_audit_files_and_documents_that_nothing_goes_back_to_are_removed() {
     drop(store);
     let (store, opened) = Store::open(folder.path()).unwrap();
     assert_eq!((store.last_good(&one).unwrap().revision, opened.warnings().count()), (1, 0));
+}
+
+#[test]
+fn a_folder_in_the_place_of_the_state_folder_knows_the_last_entry_too() {
+    let place = TempDir::new().unwrap();
+    let folder = place.path().join("state");
+    let (mut store, _) = Store::open(&folder).unwrap();
+    for serial in ["ZLG-1", "ZLG-2", "ZLG-3"] {
+        accept(&mut store, serial, 1, "one", Source::Bus);
+    }
+    std::fs::rename(&folder, place.path().join("away")).unwrap();
+    std::fs::create_dir(&folder).unwrap();
+    assert!(store.keep(at(1), [b"one"], std::iter::empty::<Vec<u8>>()).unwrap());
+    drop(store);
+    assert_eq!(numbers(&folder), [4, 5, 6]);
+    let text = std::fs::read_to_string(folder.join("audit.jsonl")).unwrap();
+    std::fs::write(folder.join("audit.jsonl"), text.split_inclusive('\n').next().unwrap()).unwrap();
+    let (_, opened) = Store::open(&folder).unwrap();
+    assert!(matches!(*opened.losses, [Loss::Cut { last: 4, written: 6, .. }]), "{opened:?}");
 }
 
 /// What another instance says its stream was ordered is compared with it.

@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+use isotherm_correction::unit::UnitSettings;
 use serde::Serialize;
+
+use crate::receive::unit::pairing_window;
 
 /// Longest time that a unit may give nothing out while raw ticks come, what it holds back on purpose left out.
 const LONGEST_STALL: Duration = Duration::from_secs(10);
@@ -59,15 +62,6 @@ pub(super) struct Seen {
     pub(super) runs: bool,
 }
 
-/// How much a unit holds back on purpose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct HeldBack {
-    /// Raw ticks of a navigation step.
-    pub(super) ticks: u64,
-    /// The pairing window.
-    pub(super) window: Duration,
-}
-
 /// One unit from look to look.
 #[derive(Debug, Clone, Copy)]
 struct Progress {
@@ -84,19 +78,20 @@ struct Progress {
 /// Remembers the units from look to look.
 #[derive(Debug)]
 pub(super) struct Watch {
-    stall: Duration,
+    /// Longest time without output, and most raw ticks in it: what a unit holds back on purpose counts.
+    stall: (Duration, u64),
     alarm: Duration,
     units: BTreeMap<String, Progress>,
 }
 
-impl Default for Watch {
-    fn default() -> Self {
-        Self::new(LONGEST_STALL, ALARM_LASTS)
-    }
-}
-
 impl Watch {
-    pub(super) fn new(stall: Duration, alarm: Duration) -> Self {
+    /// For units that hold back a navigation step, and what waits for its accelerometer tick.
+    pub(super) fn of(settings: &UnitSettings) -> Self {
+        let stall = LONGEST_STALL + pairing_window(settings) * 2;
+        Self::new((stall, u64::from(settings.navigation.ticks()) * 2), ALARM_LASTS)
+    }
+
+    pub(super) fn new(stall: (Duration, u64), alarm: Duration) -> Self {
         Self { stall, alarm, units: BTreeMap::new() }
     }
 
@@ -127,17 +122,16 @@ impl Watch {
 
     /// How many ticks have come since one last went out, and in how long; `None` where ticks go out, are not to, or do not
     /// come.
-    pub(super) fn stall(&self, now: Instant, unit: &str, held_back: HeldBack) -> Option<(u64, Duration)> {
-        let progress = self.units.get(unit)?;
-        let longest = self.stall + held_back.window * 2;
+    pub(super) fn stall(&self, now: Instant, unit: &str) -> Option<(u64, Duration)> {
+        let (progress, (longest, most)) = (self.units.get(unit)?, self.stall);
         let since = now.saturating_duration_since(progress.went_at);
         let came = progress.seen.came - progress.came_then.min(progress.seen.came);
         let comes = now.saturating_duration_since(progress.came_at) < longest;
-        (since >= longest && comes && came > held_back.ticks * 2).then_some((came, since))
+        (since >= longest && comes && came > most).then_some((came, since))
     }
 
     /// What speaks against each unit.
-    pub(super) fn reasons(&self, now: Instant, held_back: HeldBack) -> Vec<Reason> {
+    pub(super) fn reasons(&self, now: Instant) -> Vec<Reason> {
         let mut reasons = Vec::new();
         for (unit, progress) in &self.units {
             let mut reason = |kind, words| reasons.push(Reason { kind, unit: Some(unit.clone()), words });
@@ -149,7 +143,7 @@ impl Watch {
                     format!("unit {unit}: an internal fault {since_s} s ago; {alarms} so far"),
                 );
             }
-            if let Some((ticks, since)) = self.stall(now, unit, held_back) {
+            if let Some((ticks, since)) = self.stall(now, unit) {
                 let since_s = since.as_secs();
                 reason(
                     Kind::NoOutput,

@@ -17,6 +17,7 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
+use isotherm_protocol::service_status::ServiceStatus;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::{AbortHandle, JoinSet};
 
@@ -200,7 +201,7 @@ async fn metrics(request: &Request<Incoming>, exporter: &Arc<Exporter>) -> Answe
 
 async fn healthz(exporter: &Arc<Exporter>) -> Answer {
     let stopping = exporter.stopping.load(Ordering::Relaxed);
-    let uptime = exporter.started.elapsed();
+    let uptime_s = exporter.started.elapsed().as_secs_f64();
     let verdict = match exporter.look(move |source, watch| source.judge(watch, stopping)).await {
         Ok(verdict) => verdict,
         Err(why) => {
@@ -215,7 +216,8 @@ async fn healthz(exporter: &Arc<Exporter>) -> Answer {
                     ),
                 ),
             };
-            Verdict::new(uptime, vec![Reason { kind, unit: None, words }])
+            let service = ServiceStatus { uptime_s, ..ServiceStatus::default() };
+            Verdict::new(service, vec![Reason { kind, unit: None, words }])
         }
     };
     let status = if verdict.is_healthy() { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };

@@ -6,52 +6,32 @@ use std::time::{Duration, Instant};
 
 use isotherm_protocol::pair::UnitRole;
 use isotherm_protocol::service_status::{ServiceStatus, UnitSummary};
-use isotherm_protocol::status::{Fault, Output, State, Status};
+use isotherm_protocol::status::{Output, State, Status};
 use serde::Serialize;
 
-use super::health::{HeldBack, Kind, Reason, STOPPING, Seen, Watch};
-use crate::config::Settings;
-use crate::control::{ControlStatus, OLDER, STATE_FOLDER, UNWRITTEN};
-use crate::observe::subscribers::Subscribers;
-use crate::pair::Pair;
+use super::health::{Kind, Reason, STOPPING, Seen, Watch};
+use crate::control::{OLDER, STATE_FOLDER, UNWRITTEN};
+use crate::observe::instance::{Instance, lost_log_lines};
 use crate::receive::fault::of_kind;
-use crate::receive::intake::Intake;
 use crate::receive::pulse::{Pulse, Stuck};
-use crate::receive::unit::{UnitActor, pairing_window};
-use isotherm_cli::stderr::dropped_lines;
+use crate::receive::unit::UnitActor;
 
 /// Where a look is taken from.
 #[derive(Debug)]
 pub(crate) struct Source {
-    intake: Arc<Intake>,
-    pair: Arc<Pair>,
-    control_status: Arc<ControlStatus>,
-    instance: String,
-    started: Instant,
-    held_back: HeldBack,
-    pulse: Option<Arc<Pulse>>,
-    subscribers: Arc<Subscribers>,
+    instance: Arc<Instance>,
+    pulse: Arc<Pulse>,
 }
 
 /// One look at everything.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Look {
-    /// The service's name for itself.
-    pub(super) instance: String,
-    /// Time since its start (s).
-    pub(super) uptime_s: f64,
+    /// What the service says of itself.
+    pub(super) service: ServiceStatus,
     /// Whether nothing speaks against its health.
     pub(super) healthy: bool,
     /// Instances for the same units, this one included.
     pub(super) instances: u64,
-    /// Faults that belong to no unit.
-    pub(super) faults: Vec<Fault>,
-    /// Log lines dropped so far.
-    pub(super) log_lines_dropped: u64,
-    /// Receipts of subscribers that came late.
-    pub(super) late_receipts: u64,
-    /// What the swap manager has posted.
-    pub(super) posted: Arc<ServiceStatus>,
     /// The units, in the order of their serials.
     pub(super) units: Vec<UnitLook>,
 }
@@ -89,27 +69,27 @@ pub(super) struct Verdict {
 impl Look {
     /// That of a service which is not at work yet.
     pub(super) fn starting(uptime: Duration) -> Self {
-        Self {
+        let service = ServiceStatus {
             instance: "starting".to_owned(),
             uptime_s: uptime.as_secs_f64(),
-            instances: 1,
-            log_lines_dropped: dropped_lines(),
-            ..Self::default()
-        }
+            faults: lost_log_lines().into_iter().collect(),
+            ..ServiceStatus::default()
+        };
+        Self { service, healthy: false, instances: 1, units: Vec::new() }
+    }
+
+    /// How often a fault of a kind occurred that belongs to no unit.
+    pub(super) fn count(&self, kind: &str) -> u64 {
+        of_kind(&self.service.faults, kind).map_or(0, |fault| fault.count)
     }
 }
 
 impl Verdict {
-    /// That of a service of which no unit was looked at.
-    pub(super) fn new(uptime: Duration, reasons: Vec<Reason>) -> Self {
-        Self {
-            status: if reasons.is_empty() { "ok" } else { "unhealthy" },
-            reasons,
-            instance: String::new(),
-            version: env!("CARGO_PKG_VERSION"),
-            uptime_s: uptime.as_secs_f64(),
-            units: Vec::new(),
-        }
+    /// What is said of a service, and what speaks against its health.
+    pub(super) fn new(service: ServiceStatus, reasons: Vec<Reason>) -> Self {
+        let ServiceStatus { instance, uptime_s, units, .. } = service;
+        let status = if reasons.is_empty() { "ok" } else { "unhealthy" };
+        Self { status, reasons, instance, version: env!("CARGO_PKG_VERSION"), uptime_s, units }
     }
 
     /// Whether nothing speaks against the service's health.
@@ -119,41 +99,19 @@ impl Verdict {
 }
 
 impl Source {
-    /// A service whose units are in `intake`, among others.
-    pub(crate) fn new(
-        settings: &Settings,
-        (intake, pair): (Arc<Intake>, Arc<Pair>),
-        control_status: Arc<ControlStatus>,
-    ) -> Self {
-        let instance = pair.me().instance.clone();
-        Self {
-            intake,
-            pair,
-            control_status,
-            instance,
-            started: Instant::now(),
-            held_back: HeldBack {
-                ticks: settings.unit.navigation.ticks().into(),
-                window: pairing_window(&settings.unit),
-            },
-            pulse: None,
-            subscribers: Arc::default(),
-        }
+    /// A service, and its receive path.
+    pub(crate) fn new(instance: Arc<Instance>, pulse: Arc<Pulse>) -> Self {
+        Self { instance, pulse }
     }
 
-    /// The same, of a service whose receive path is felt, and that asks for receipts.
-    pub(crate) fn at_work(self, pulse: Arc<Pulse>, subscribers: Arc<Subscribers>) -> Self {
-        Self { pulse: Some(pulse), subscribers, ..self }
-    }
-
-    /// Whether the receive path is alive, as far as it is felt.
+    /// Whether the receive path is alive.
     pub(super) fn receives(&self) -> Result<(), Stuck> {
-        self.pulse.as_ref().map_or(Ok(()), Pulse::look)
+        self.pulse.look()
     }
 
     /// Looks at the units for stalls and alarms.
     pub(super) fn watch_units(&self, watch: &mut Watch) {
-        let units = self.intake.each_unit(|actor| Some((actor.id().clone(), seen(actor)?)));
+        let units = self.instance.intake.each_unit(|actor| Some((actor.id().clone(), seen(actor)?)));
         let units: BTreeMap<_, _> = units.into_iter().flatten().collect();
         let now = Instant::now();
         for (unit, seen) in &units {
@@ -164,27 +122,23 @@ impl Source {
 
     /// Looks at everything.
     pub(super) fn look(&self, watch: &mut Watch, stopping: bool) -> Look {
-        let units = self.intake.each_unit(|actor| {
-            (seen(actor), (actor.status(&self.instance), actor.role()), actor.latency_sum_ns())
+        let instance = &self.instance;
+        let units = instance.intake.each_unit(|actor| {
+            (seen(actor), (actor.status(instance.id()), actor.role()), actor.latency_sum_ns())
         });
         let now = Instant::now();
         let units = units.into_iter().map(|(seen, (status, role), latency_sum_ns)| {
             if let Some(seen) = seen {
                 watch.see(now, &status.unit, seen);
             }
-            let stalled = watch.stall(now, &status.unit, self.held_back).is_some();
+            let stalled = watch.stall(now, &status.unit).is_some();
             UnitLook { status, role, latency_sum_ns, stalled }
         });
-        let units = units.collect();
+        let (units, service) = (units.collect(), instance.status());
         Look {
-            instance: self.instance.clone(),
-            uptime_s: self.started.elapsed().as_secs_f64(),
-            healthy: self.reasons(now, watch, stopping).is_empty(),
-            instances: self.pair.others().len() as u64 + 1,
-            faults: self.intake.faults(),
-            log_lines_dropped: dropped_lines(),
-            late_receipts: self.subscribers.fault().map_or(0, |fault| fault.count),
-            posted: self.control_status.read(),
+            healthy: reasons(&service, now, watch, stopping).is_empty(),
+            service,
+            instances: instance.pair.others().len() as u64 + 1,
             units,
         }
     }
@@ -192,26 +146,27 @@ impl Source {
     /// Judges the service's health.
     pub(super) fn judge(&self, watch: &mut Watch, stopping: bool) -> Verdict {
         self.watch_units(watch);
-        let units = self.intake.each_unit(|actor| actor.summary());
-        let reasons = self.reasons(Instant::now(), watch, stopping);
-        Verdict { instance: self.instance.clone(), units, ..Verdict::new(self.started.elapsed(), reasons) }
+        let service = self.instance.status();
+        let reasons = reasons(&service, Instant::now(), watch, stopping);
+        // All of them: the status has no more than a message may have.
+        let units = self.instance.intake.each_unit(|actor| actor.summary());
+        Verdict { units, ..Verdict::new(service, reasons) }
     }
+}
 
-    /// What speaks against the service's health.
-    fn reasons(&self, now: Instant, watch: &mut Watch, stopping: bool) -> Vec<Reason> {
-        let of_service = |kind, words: &str| Reason { kind, unit: None, words: words.to_owned() };
-        let stopping = stopping.then(|| of_service(Kind::Stopping, STOPPING));
-        let posted = self.control_status.read();
-        let standing = [
-            (STATE_FOLDER, Kind::StateFolder),
-            (UNWRITTEN, Kind::UnwrittenDocument),
-            (OLDER, Kind::OlderCalibration),
-        ];
-        let standing = standing
-            .into_iter()
-            .filter_map(|(told, kind)| Some(of_service(kind, &of_kind(&posted.faults, told)?.first)));
-        stopping.into_iter().chain(standing).chain(watch.reasons(now, self.held_back)).collect()
-    }
+/// What speaks against the service's health.
+fn reasons(service: &ServiceStatus, now: Instant, watch: &Watch, stopping: bool) -> Vec<Reason> {
+    let of_service = |kind, words: &str| Reason { kind, unit: None, words: words.to_owned() };
+    let stopping = stopping.then(|| of_service(Kind::Stopping, STOPPING));
+    let standing = [
+        (STATE_FOLDER, Kind::StateFolder),
+        (UNWRITTEN, Kind::UnwrittenDocument),
+        (OLDER, Kind::OlderCalibration),
+    ];
+    let standing = standing
+        .into_iter()
+        .filter_map(|(told, kind)| Some(of_service(kind, &of_kind(&service.faults, told)?.first)));
+    stopping.into_iter().chain(standing).chain(watch.reasons(now)).collect()
 }
 
 /// What the watch is told of a unit; nothing of one without a calibration: anybody can make such a unit appear.

@@ -5,6 +5,7 @@ use std::sync::{Mutex as StdMutex, PoisonError};
 use std::time::Instant;
 
 use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, TemperatureReading};
+use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec::encode;
 use isotherm_protocol::document::{Document, Parsed};
@@ -13,10 +14,11 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
 
 use super::*;
 use crate::config::Settings;
-use crate::control::ControlStatus;
 use crate::control::revision::Calibrations;
+use crate::observe::instance::Instance;
 use crate::pair::Pair;
 use crate::receive::intake::{Intake, OutletMaker};
+use crate::receive::pulse::Pulse;
 use checker::Page;
 use client::{connect, get, read};
 
@@ -38,8 +40,14 @@ fn on_loopback() -> MetricsSettings {
     MetricsSettings { listen: Some("127.0.0.1:0".parse().unwrap()), allow_remote: false }
 }
 
-fn pair(settings: &Settings) -> Arc<Pair> {
-    Arc::new(Pair::new(settings, "test".to_owned(), 0, Vec::new()))
+fn source(settings: &Settings, intake: &Arc<Intake>) -> Source {
+    let pair = Arc::new(Pair::new(settings, "test".to_owned(), 0, Vec::new()));
+    let instance = Instance::new(Arc::clone(intake), pair, Arc::default(), None);
+    Source::new(Arc::new(instance), Arc::new(Pulse::new(settings.congestion)))
+}
+
+fn watch() -> Watch {
+    Watch::of(&UnitSettings::default())
 }
 
 impl Stand {
@@ -55,9 +63,7 @@ impl Stand {
         let intake = Arc::new(Intake::new(settings.clone(), calibrations, outlets));
         let endpoint = Endpoint::start_within(&on_loopback(), String::new(), watch, limits).await;
         let endpoint = endpoint.unwrap().unwrap();
-        let source =
-            Source::new(&settings, (Arc::clone(&intake), pair(&settings)), Arc::<ControlStatus>::default());
-        endpoint.open(source, None);
+        endpoint.open(source(&settings, &intake), None);
         Self { intake, endpoint, shape, sequence: 0 }
     }
 
@@ -115,7 +121,7 @@ async fn an_alarm_is_told_and_passes() {
             Ok(())
         }))
     });
-    let watch = Watch::new(LIMIT, Duration::from_millis(300));
+    let watch = Watch::new((LIMIT, 2), Duration::from_millis(300));
     let mut stand = Stand::new(outlets, watch, Limits::default()).await;
     let verdict = stand.until(503);
     assert_eq!(verdict["status"], "unhealthy");
@@ -135,7 +141,7 @@ async fn a_unit_that_gives_nothing_out_is_told_until_it_does() {
         let failing = Arc::clone(&failing);
         Ok(Box::new(move |_| if failing.load(Ordering::Relaxed) { Err("no route".into()) } else { Ok(()) }))
     });
-    let watch = Watch::new(Duration::from_millis(300), LIMIT);
+    let watch = Watch::new((Duration::from_millis(300), 2), LIMIT);
     let mut stand = Stand::new(outlets, watch, Limits::default()).await;
     let verdict = stand.until(503);
     assert_eq!(verdict["reasons"][0]["kind"], "no-output", "{verdict}");
@@ -162,7 +168,7 @@ async fn a_unit_that_is_held_up_holds_one_look_up_and_nothing_else() {
         }))
     });
     let limits = Limits { look: Duration::from_millis(200), ..Limits::default() };
-    let stand = Stand::new(outlets, Watch::default(), limits).await;
+    let stand = Stand::new(outlets, watch(), limits).await;
     let (intake, (kind, sensors)) = (Arc::clone(&stand.intake), stand.shape);
     let receiving = std::thread::spawn(move || {
         for sequence in 0..20 {
@@ -192,7 +198,7 @@ async fn a_unit_that_is_held_up_holds_one_look_up_and_nothing_else() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_service_that_stops_is_not_healthy_and_still_tells_its_metrics() {
-    let stand = Stand::new(good(), Watch::default(), Limits::default()).await;
+    let stand = Stand::new(good(), watch(), Limits::default()).await;
     let address = stand.endpoint.address();
     assert_eq!(get(address, "/healthz").status, 200);
     stand.endpoint.stopping();
@@ -205,7 +211,7 @@ async fn a_service_that_stops_is_not_healthy_and_still_tells_its_metrics() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_unit_without_a_calibration_says_nothing_of_the_services_health() {
-    let watch = Watch::new(Duration::from_millis(100), LIMIT);
+    let watch = Watch::new((Duration::from_millis(100), 2), LIMIT);
     let limits = Limits { interval: Duration::from_millis(10), ..Limits::default() };
     let stand = Stand::new(good(), watch, limits).await;
     let address = stand.endpoint.address();
@@ -223,7 +229,8 @@ async fn a_unit_without_a_calibration_says_nothing_of_the_services_health() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_service_that_still_waits_is_alive_and_says_what_for() {
-    let endpoint = Endpoint::start(&on_loopback(), "a router".to_owned()).await.unwrap().unwrap();
+    let settings = Settings { metrics: on_loopback(), ..Settings::default() };
+    let endpoint = Endpoint::start(&settings, "a router".to_owned()).await.unwrap().unwrap();
     let address = endpoint.address();
     assert_eq!(get(address, "/livez").status, 200);
     let answer = get(address, "/readyz");
@@ -253,7 +260,7 @@ fn occupy(address: SocketAddr, count: usize, request: &[u8], path: &str) -> Vec<
 #[tokio::test(flavor = "multi_thread")]
 async fn connections_that_say_nothing_keep_nobody_out() {
     let limits = Limits { head: LIMIT, connection: LIMIT, ..Limits::default() };
-    let stand = Stand::new(good(), Watch::default(), limits).await;
+    let stand = Stand::new(good(), watch(), limits).await;
     let address = stand.endpoint.address();
     let request = b"GET /metrics HTTP/1.1\r\nHost: x\r\nX-Slow: ";
     let idle = occupy(address, http::MAX_CONNECTIONS * 3, request, "/healthz");
@@ -266,7 +273,7 @@ async fn connections_that_say_nothing_keep_nobody_out() {
 #[tokio::test(flavor = "multi_thread")]
 async fn connections_that_do_not_take_their_answer_keep_nobody_out() {
     let limits = Limits { head: LIMIT, connection: LIMIT, ..Limits::default() };
-    let endpoint = Endpoint::start_within(&on_loopback(), String::new(), Watch::default(), limits).await;
+    let endpoint = Endpoint::start_within(&on_loopback(), String::new(), watch(), limits).await;
     let endpoint = endpoint.unwrap().unwrap();
     let settings = Settings::default();
     // The system holds little of an answer that is not taken: a page of many units does not fit.
@@ -277,7 +284,7 @@ async fn connections_that_do_not_take_their_answer_keep_nobody_out() {
     let address = listener.local_addr().unwrap();
     let serving = tokio::spawn(http::serve(listener, Arc::clone(&endpoint.exporter)));
     let intake = fleet(include_str!("../../../../config/calibration/ZLG-0001.toml"), 200, 2);
-    endpoint.open(Source::new(&settings, (intake, pair(&settings)), Arc::<ControlStatus>::default()), None);
+    endpoint.open(source(&settings, &intake), None);
     let request = b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n";
     drop(occupy(address, http::MAX_CONNECTIONS + 8, request, "/livez"));
     serving.abort();
@@ -286,7 +293,7 @@ async fn connections_that_do_not_take_their_answer_keep_nobody_out() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_connection_ends_at_its_limit_whatever_goes_on() {
     let limits = Limits { connection: Duration::from_millis(300), head: LIMIT, ..Limits::default() };
-    let stand = Stand::new(good(), Watch::default(), limits).await;
+    let stand = Stand::new(good(), watch(), limits).await;
     let start = Instant::now();
     let mut stream = connect(stand.endpoint.address());
     stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: x\r\nX-Slow: ").unwrap();
@@ -297,7 +304,10 @@ async fn a_connection_ends_at_its_limit_whatever_goes_on() {
 #[tokio::test]
 async fn an_address_that_others_could_reach_is_not_taken() {
     let listen = Some("0.0.0.0:0".parse().unwrap());
-    let start = async |settings| Endpoint::start(&settings, String::new()).await;
+    let start = async |metrics| {
+        let settings = Settings { metrics, ..Settings::default() };
+        Endpoint::start(&settings, String::new()).await
+    };
     let error = start(MetricsSettings { listen, allow_remote: false }).await.unwrap_err();
     assert!(error.to_string().contains("0.0.0.0:0") && error.to_string().contains("allow_remote"), "{error}");
     assert!(start(MetricsSettings { listen, allow_remote: true }).await.unwrap().is_some());
@@ -347,9 +357,8 @@ fn fleet(document: &str, units: usize, ticks: u64) -> Arc<Intake> {
 fn two_hundred(document: &str) -> (String, Duration) {
     let intake = fleet(document, 200, 40);
     let settings = Settings::default();
-    let source =
-        Source::new(&settings, (Arc::clone(&intake), pair(&settings)), Arc::<ControlStatus>::default());
-    let mut watch = Watch::default();
+    let source = source(&settings, &intake);
+    let mut watch = Watch::of(&settings.unit);
     let (mut text, mut shortest) = (String::new(), Duration::MAX);
     for _ in 0..5 {
         let start = Instant::now();

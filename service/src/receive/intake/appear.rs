@@ -1,6 +1,6 @@
 //! The first message of a unit: whether there is a place for it, and the unit with what was written for it.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use isotherm_document::few;
@@ -10,7 +10,7 @@ use isotherm_protocol::raw::{AccelBatch, GyroBatch, HealthBatch, TemperatureBatc
 use isotherm_protocol::status::Fault;
 
 use super::units::{Unit, Units};
-use super::{Intake, lock, read};
+use super::{Intake, lock, read, write};
 use crate::control::revision::Calibrations;
 use crate::receive::fault::{FaultKind, standing};
 use crate::receive::unit::{Footing, Outlet, UnitActor};
@@ -44,7 +44,7 @@ impl Intake {
         if !self.has_place(&read(&self.units), calibrated) {
             self.make_room(calibrated, now);
         }
-        let mut units = self.units.write().unwrap_or_else(PoisonError::into_inner);
+        let mut units = write(&self.units);
         if let Some(unit) = units.by_serial.get(serial) {
             return Some(Arc::clone(unit));
         }
@@ -97,7 +97,7 @@ impl Intake {
     /// A unit that knows nothing yet.
     fn make(&self, id: &UnitId, outlet: Outlet) -> UnitActor {
         let mut actor = UnitActor::new(id.clone(), self.settings.unit, self.settings.tail_flush, outlet);
-        if self.pair.as_ref().is_some_and(|pair| !pair.speaks_first()) {
+        if !self.pair.speaks_first() {
             // The others may have heard more of it; where none speaks it does, after a while.
             actor.follow(Instant::now(), Footing::Nothing);
         }

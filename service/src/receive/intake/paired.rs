@@ -1,12 +1,12 @@
 //! What units have to do with other instances.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Fault;
 
-use super::{Intake, guarded, lock};
+use super::{Intake, guarded, lock, write};
 use crate::control::revision::Plan;
 use crate::pair::Pair;
 use crate::receive::fault::{FaultKind, standing};
@@ -31,42 +31,37 @@ pub(crate) enum Answers {
 impl Intake {
     /// Has units be silent while another instance speaks for them.
     pub(crate) fn paired_with(self, pair: Arc<Pair>) -> Self {
-        Self { pair: Some(pair), ..self }
+        Self { pair, ..self }
     }
 
     /// Where swaps and commands of a unit are for another service: what to tell whoever asks, and whether to leave that to the
     /// service that takes the unit.
     pub(crate) fn is_not_taken(&self, unit: &UnitId) -> Option<(String, bool)> {
-        let is_elsewhere = || self.pair.as_ref().is_some_and(|pair| pair.is_taken_elsewhere(unit));
         (!self.takes(unit)).then(|| {
             let units = &self.settings.units;
             let words = format!(
                 "unit {unit} is not taken by this service (units = {units:?}): ask the service that takes it"
             );
-            (words, is_elsewhere())
+            (words, self.pair.is_taken_elsewhere(unit))
         })
     }
 
     /// Whether swaps and commands of a unit are this instance's.
     pub(crate) fn speaks_for(&self, unit: &UnitId) -> bool {
-        let first = || self.pair.as_ref().is_none_or(|pair| pair.speaks_first());
-        self.with(unit, |actor| actor.speaks()).unwrap_or_else(first)
+        self.with(unit, |actor| actor.speaks()).unwrap_or_else(|| self.pair.speaks_first())
     }
 
     /// The same; waits where it is being found out, where this process stood still and the units do not know it yet, and where the
     /// instance that spoke is gone and this one is about to.
     pub(crate) fn answers_for(&self, unit: &UnitId) -> Answers {
         let since = Instant::now();
-        let pair = self.pair.as_ref();
-        let stood_still = || {
-            since.elapsed() < LONGEST_STILL
-                && pair.is_some_and(|pair| pair.has_stood_still(Instant::now()).is_some())
-        };
-        let is_alone = || pair.is_some_and(|pair| pair.standing().alone_since.is_some());
+        let pair = &self.pair;
+        let stood_still =
+            || since.elapsed() < LONGEST_STILL && pair.has_stood_still(Instant::now()).is_some();
         let is_open = || {
             let [doubts, speaks] =
                 self.with(unit, |actor| [actor.doubts(), actor.speaks()]).unwrap_or([false, true]);
-            stood_still() || doubts || (!speaks && is_alone())
+            stood_still() || doubts || (!speaks && pair.standing().alone_since.is_some())
         };
         let mut was_open = false;
         while since.elapsed() < LONGEST_DOUBT && is_open() {
@@ -89,13 +84,12 @@ impl Intake {
 
     /// This instance's name for itself: its Zenoh id as text.
     pub(crate) fn instance(&self) -> &str {
-        self.pair.as_ref().map_or("", |pair| &pair.me().instance)
+        &self.pair.me().instance
     }
 
     /// That the other instance of a pair is not there.
     pub(crate) fn missing_other(&self) -> Option<Fault> {
-        let is_missing = self.pair.as_ref().is_some_and(|pair| pair.is_missing_other(Instant::now()));
-        is_missing.then(|| {
+        self.pair.is_missing_other(Instant::now()).then(|| {
             let words = "the other instance is not there: nobody takes over from this one; start it, or mend the connection";
             standing("other_instance_missing", 1, words.to_owned())
         })
@@ -103,8 +97,8 @@ impl Intake {
 
     /// Another instance has published a frame of a unit.
     pub(crate) fn hear(&self, serial: &str, frame: &[u8], now: Instant) {
-        let Some((pair, unit)) = self.pair.as_ref().zip(self.unit(serial)) else { return };
-        let standing = pair.standing();
+        let Some(unit) = self.unit(serial) else { return };
+        let standing = self.pair.standing();
         guarded(&mut lock(&unit), |actor| actor.hear(frame, now, &standing));
     }
 
@@ -115,7 +109,7 @@ impl Intake {
 
     /// Has a unit, seen or not, begin with what it had before a restart, or with what another instance has written down.
     pub(crate) fn plan_again(&self, unit: &UnitId, plan: Plan) {
-        let mut calibrations = self.calibrations.write().unwrap_or_else(PoisonError::into_inner);
+        let mut calibrations = write(&self.calibrations);
         calibrations.plans.insert(unit.clone(), plan.clone());
         drop(calibrations);
         self.with(unit, |actor| actor.plan_again(plan));

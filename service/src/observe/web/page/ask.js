@@ -64,9 +64,14 @@ async function watch(every, signal, look) {
 
 function pause(ms, signal) {
   return new Promise(resolve => {
-    const done = () => { clearTimeout(timer); document.removeEventListener("visibilitychange", done); resolve(); };
+    const done = () => {
+      clearTimeout(timer);
+      signal.removeEventListener("abort", done);
+      document.removeEventListener("visibilitychange", done);
+      resolve();
+    };
     const timer = setTimeout(done, ms);
-    signal.addEventListener("abort", done, { once: true });
+    signal.addEventListener("abort", done);
     document.addEventListener("visibilitychange", done);
   });
 }

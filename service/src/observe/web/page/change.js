@@ -70,6 +70,7 @@ class Proposal {
 
   /** What was asked for is another thing now: it has to be looked at first. */
   renew() {
+    this.asked = null;
     this.act.disabled = true;
     this.line.renew();
     this.answer.replaceChildren();
@@ -80,12 +81,14 @@ class Proposal {
     try { asked = this.question(dryRun); } catch (error) { return this.say("bad", error.message); }
     const by = dryRun ? this.by.value.trim() : this.by.named();
     if (!dryRun && !by) return this.say("bad", NAMELESS);
+    this.asked = asked;
     this.look.disabled = this.act.disabled = true;
     this.say("", "Asking…");
     try {
       const [path, body] = asked;
       const reply = await ask(path, { ...body, by });
-      this.show(reply.swap === undefined && reply.allowed ? { refused: reply.reason } : reply.swap ?? reply);
+      if (dryRun && this.asked !== asked) this.say("", "That has changed meanwhile: show the difference again.");
+      else this.show(reply.swap === undefined && reply.allowed ? { refused: reply.reason } : reply.swap ?? reply);
     } catch (error) {
       this.say("bad", reason(error, ": look at the unit's history before you try again"));
     }

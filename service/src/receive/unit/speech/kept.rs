@@ -224,12 +224,8 @@ impl Kept {
     /// Whether a frame is what was heard, as far as it was.
     fn agrees(&self, frame: &Frame) -> bool {
         let Ok(batch) = codec::decode::<CorrectedBatch>(&frame.bytes) else { return false };
-        let heard = |tick: &CorrectedTick| self.heard.get(&id(tick)).map(|heard| (heard, tick.clone()));
-        batch
-            .ticks
-            .iter()
-            .filter_map(heard)
-            .all(|(heard, tick)| heard.revision == batch.revision && are_same(&heard.tick, &tick))
+        let same = |tick, heard: &Heard| heard.revision == batch.revision && are_same(&heard.tick, tick);
+        batch.ticks.iter().all(|tick| self.heard.get(&id(tick)).is_none_or(|heard| same(tick, heard)))
     }
 }
 

@@ -205,6 +205,7 @@ fn an_entry_that_cannot_be_published_is_counted() {
     actor.end();
     let counter = actor.status("a1").counters.into_iter().find(|c| c.name == "journal_entries_unpublished");
     assert_eq!(counter.map(|counter| counter.value), Some(2));
+    assert_eq!(actor.totals().bad, 0, "no message was refused");
     assert_eq!(actor.memory("a1").number, 2, "whoever reads misses them");
 }
 
