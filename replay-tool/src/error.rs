@@ -57,6 +57,16 @@ impl Error {
         isotherm_log::error::Error::file(path, action, source).into()
     }
 
+    /// Whether whoever read the results has gone away, as `head` does: who does has what was wanted.
+    pub(crate) fn is_reader_gone(&self) -> bool {
+        match self {
+            Self::Stdout(source) | Self::Log(isotherm_log::error::Error::File { source, .. }) => {
+                source.kind() == io::ErrorKind::BrokenPipe
+            }
+            _ => false,
+        }
+    }
+
     /// The exit code that this error stands for.
     #[must_use]
     pub fn exit(&self) -> Exit {

@@ -105,9 +105,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
             "neither log has corrected ticks: make them with isotherm-replay correct".to_owned(),
         ));
     }
-    for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
-        show::warn(&words);
-    }
+    [a.cut_short(), b.cut_short()].iter().flatten().for_each(show::warn);
     let within_tolerance = accounts.values().all(Account::is_identical);
     let identical = within_tolerance && accounts.values().all(|account| account.within_tolerance == 0);
     let name = |path: &Path| path.display().to_string();
@@ -119,7 +117,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         tolerance,
         units: &accounts,
     };
-    print(if args.json { show::json(&report) } else { human(&report, named) }.as_bytes())?;
+    print(&if args.json { show::json(&report) } else { human(&report, named) })?;
     Ok(if within_tolerance { Exit::Ok } else { Exit::Failed })
 }
 

@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use isotherm_cli::{Exit, Window};
-use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::write_whole;
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
 use isotherm_log::mapping::{Delimiter, Encoding, Mapping};
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{info, plot, print, show};
+use super::{check_outputs, info, plot, print, show};
 use crate::error::Error;
 
 /// Propose a column mapping for a text log of any maker, then show what the log contains
@@ -128,11 +128,8 @@ impl ImportArgs {
 pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
     let out = args.out.clone().unwrap_or_else(|| Mapping::path_beside(args.first()));
     let page = (!args.no_plot).then(|| args.plot.clone().unwrap_or_else(|| args.page()));
-    let inputs: Vec<_> = args.log.iter().map(PathBuf::as_path).collect();
-    for path in std::iter::once(&out).chain(&page) {
-        refuse_overwriting(path, &inputs)?;
-        refuse_replacing(path, args.overwrite)?;
-    }
+    let (outputs, inputs) = (std::iter::once(&out).chain(&page), &args.log);
+    check_outputs(outputs.map(PathBuf::as_path), inputs.iter().map(PathBuf::as_path), args.overwrite)?;
     let mut hints = args.hints();
     let mut proposal = settled(args, &mut hints)?;
     write(&out, &proposal)?;
@@ -165,7 +162,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
         let drawn = page.map_or_else(String::new, |page| format!("{page}: a first plot\n"));
         format!("{}\n{}: the mapping\n{notes}{drawn}", info::tables::of(&info), out.display())
     };
-    print(text.as_bytes())?;
+    print(&text)?;
     Ok(info::outcome(&info))
 }
 

@@ -110,23 +110,23 @@ impl LogArgs {
         Ok(LogFiles::Text { paths: self.log.clone(), mapping, unit, batch_ticks })
     }
 
-    /// Opens the log's part as messages: [`LogArgs::files`] and [`LogArgs::part`] in one.
+    /// Opens the log's part as messages, those of a text log of one tick each: [`LogArgs::files`] and [`LogArgs::part`] in one.
     ///
     /// # Errors
     /// As these.
-    pub(crate) fn messages(&self, batch_ticks: usize, unit: Option<&UnitId>) -> Result<Messages, Error> {
-        Ok(self.files(batch_ticks, unit)?.open(&self.part()?)?)
+    pub(crate) fn messages(&self) -> Result<Messages, Error> {
+        Ok(self.files(1, unnamed().as_ref())?.open(&self.part()?)?)
     }
 
-    /// Opens a part of a text log as events.
+    /// The files that the log is read from: those of a folder are the mapping's.
     ///
     /// # Errors
-    /// As [`LogArgs::files`], and where the log is a recording.
-    pub(crate) fn events(&self, part: &Part) -> Result<LogReader, Error> {
+    /// As [`LogArgs::files`].
+    pub(crate) fn log_files(&self) -> Result<Vec<PathBuf>, Error> {
         if self.is_recording()? {
-            return Err(Error::Usage("this needs a text log, the log is recordings".to_owned()));
+            return Ok(self.log.clone());
         }
-        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.within(part))
+        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.paths().to_vec())
     }
 
     /// The file of a text log's mapping: the one given, else the one beside the log.
@@ -154,8 +154,9 @@ impl LogArgs {
         )))
     }
 
-    /// Every file that is read, for outputs that must not fall on one.
+    /// Every file that is read, for outputs that must not fall on one; what cannot be opened is said where it is read.
     pub(crate) fn inputs(&self) -> Vec<PathBuf> {
-        self.log.iter().cloned().chain(self.mapping_file()).collect()
+        let files = self.log_files().unwrap_or_else(|_| self.log.clone());
+        files.into_iter().chain(self.mapping_file()).collect()
     }
 }

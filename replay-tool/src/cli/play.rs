@@ -256,11 +256,9 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     // What Zenoh may still do is not waited for.
     runtime.shutdown_background();
     let Played { report: play, log, ended } = played?;
-    for warning in tables::warnings(&play) {
-        show::warn(&warning);
-    }
+    tables::warnings(&play).iter().for_each(show::warn);
     let report = Report { play: &play, log: &log };
-    print(if args.json { show::json(&report) } else { tables::human(&report, &options) }.as_bytes())?;
+    print(&if args.json { show::json(&report) } else { tables::human(&report, &options) })?;
     ended?;
     let lost = play.lost_data() || log.lost_data();
     // What `--loss` withholds was there.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use isotherm_cli::{Bar, Exit};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::write_whole;
 use isotherm_log::offline::read_document;
 use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
@@ -15,7 +15,7 @@ use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 use super::log_args::{LogArgs, unnamed};
-use super::{print, show};
+use super::{check_outputs, print, show};
 use crate::error::Error;
 
 /// Ticks in one batch of a text log.
@@ -89,7 +89,7 @@ impl PlotArgs {
 pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
+    print(&if args.json { show::json(&report) } else { human(&report) })?;
     let lost = summary.reading.iter().any(LogReport::lost_data);
     Ok(Exit::of_loss(lost))
 }
@@ -126,8 +126,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let mut inputs = args.log.inputs();
     inputs.extend(other.iter().flat_map(LogArgs::inputs));
     inputs.extend(args.calibration.clone());
-    refuse_overwriting(&args.out, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    refuse_replacing(&args.out, args.overwrite)?;
+    check_outputs([args.out.as_path()], inputs.iter().map(PathBuf::as_path), args.overwrite)?;
     let calibration = args.calibration.as_deref();
     let calibration = calibration.map(read_document).transpose()?;
 

@@ -197,24 +197,24 @@ pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
     let report = recorded.map_err(|error| table::advise(error, &options))?;
     live.warn(&report);
     if let Some(failure) = &report.done.failure {
-        show::warn(&format!("recording has stopped: {failure}; everything before that is in the file"));
+        show::warn(format_args!("recording has stopped: {failure}; everything before that is in the file"));
     }
     if report.lost > 0 {
-        show::warn(&format!("{} of {} messages are lost", report.lost, report.received));
+        show::warn(format_args!("{} of {} messages are lost", report.lost, report.received));
     }
     if !report.done.units_without_memory.is_empty() {
         let units = report.done.units_without_memory.join(", ");
-        show::warn(&format!(
+        show::warn(format_args!(
             "no memory or journal of {units} from before the recording: its output cannot be reproduced to the bit"
         ));
     }
     if args.topic.is_empty() && !report.done.units_without_raw.is_empty() {
         let units = report.done.units_without_raw.join(", ");
-        show::warn(&format!(
+        show::warn(format_args!(
             "no raw messages of {units} were received: producers do not reach this recorder; give one --connect, to \
              the service or a router, and no --listen"
         ));
     }
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
+    print(&if args.json { show::json(&report) } else { human(&report) })?;
     Ok(Exit::of_loss(report.lost_data()))
 }

@@ -45,10 +45,8 @@ pub(super) struct RecoverArgs {
 pub(super) fn run(args: &RecoverArgs) -> Result<Exit, Error> {
     let recovery = Recovery::open(&args.input)?;
     if is_being_written(&args.input) {
-        show::warn(&format!(
-            "{} is still being written: later messages are not recovered",
-            args.input.display()
-        ));
+        let recording = args.input.display();
+        show::warn(format_args!("{recording} is still being written: later messages are not recovered"));
     }
     let options = RecordingOptions {
         compress: args.compression.compresses(),
@@ -61,7 +59,7 @@ pub(super) fn run(args: &RecoverArgs) -> Result<Exit, Error> {
     });
     bar.finish();
     let report = recovered?;
-    print(if args.json { show::json(&report) } else { human(&report, &args.out) }.as_bytes())?;
+    print(&if args.json { show::json(&report) } else { human(&report, &args.out) })?;
     Ok(Exit::of_loss(report.lost_data()))
 }
 

@@ -63,7 +63,7 @@ impl Live {
     /// Prints warnings that have not been printed.
     pub(super) fn warn(&mut self, report: &RecordReport) {
         let new = report.warnings.get(self.warned..).unwrap_or_default();
-        self.drawn.suspend(|| new.iter().for_each(|words| show::warn(words)));
+        self.drawn.suspend(|| new.iter().for_each(show::warn));
         self.warned = report.warnings.len();
     }
 
