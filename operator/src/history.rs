@@ -149,7 +149,7 @@ fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
     #[expect(clippy::cast_precision_loss, reason = "at most an hour")]
     let seconds = slew_ms as f64 / 1000.0;
     if schedule != Schedule::NextTick || slew_ms > 0 {
-        words = format!("{words} ({})", show::schedule(schedule, seconds));
+        words = format!("{words} ({})", page::schedule(schedule, seconds));
     }
     words
 }

@@ -12,7 +12,7 @@ use super::ConsoleError;
 use super::client::{self, Client, ClientArgs};
 use super::command::give;
 use super::follow::Follow;
-use super::page::{of, short};
+use super::page::{of, schedule, short};
 use super::show;
 
 /// Arguments of `swap`.
@@ -223,7 +223,7 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
             "{}: accepted as revision {} ({digest}), {}\n",
             reply.unit,
             reply.revision,
-            show::schedule(reply.schedule, reply.slew_s)
+            schedule(reply.schedule, reply.slew_s)
         ),
     };
     print(&line, exit)
@@ -252,15 +252,21 @@ fn confirm(serial: &str, preview: &SwapReply) -> Result<(), ConsoleError> {
 
 /// Waits until the unit says that the revision is in force, or that it waits for its tick; in words.
 async fn wait(follow: &mut Follow, reply: &SwapReply, timeout: std::time::Duration) -> String {
-    let revision = reply.revision;
+    let (revision, is_known) = (reply.revision, follow.first.is_some());
     let seen = follow.until(timeout, |status| {
         if status.revision().counter >= revision {
             return Some(format!("revision {} is in force", status.revision().counter));
         }
         let pending = status.pending.as_ref().filter(|pending| pending.revision.counter == revision)?;
-        Some(format!("revision {revision} waits: {}", show::schedule(pending.schedule, pending.slew_s)))
+        Some(format!("revision {revision} waits: {}", schedule(pending.schedule, pending.slew_s)))
     });
     seen.await.unwrap_or_else(|| {
+        if is_known {
+            return format!(
+                "{} has sent no status since: isotherm status shows when revision {revision} is in force",
+                reply.unit
+            );
+        }
         format!("{} has not appeared yet: revision {revision} is in force from its first tick on", reply.unit)
     })
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use isotherm_cli::{Exit, Window};
+use isotherm_cli::{Exit, Window, number};
 use isotherm_log::file::write_whole;
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
@@ -56,7 +56,7 @@ pub(super) struct ImportArgs {
     #[arg(long, value_name = "SERIAL")]
     serial: Option<String>,
     /// Ticks per second, for a log without usable time (Hz)
-    #[arg(long, value_name = "HZ", value_parser = rate)]
+    #[arg(long, value_name = "HZ", value_parser = number("", 1e-3..=1e6))]
     rate_hz: Option<f64>,
     /// Delimiter (default: detected)
     #[arg(long, value_name = "WORD", value_parser = PossibleValuesParser::new(Delimiter::ALL.map(Delimiter::word)))]
@@ -79,11 +79,6 @@ struct Report<'a> {
     plot: Option<String>,
     notes: &'a [String],
     info: &'a LogInfo,
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate: &f64| (1e-3..=1e6).contains(rate));
-    rate.ok_or_else(|| "must be a number from 0.001 to 1000000".to_owned())
 }
 
 impl ImportArgs {

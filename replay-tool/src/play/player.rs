@@ -183,29 +183,16 @@ impl<'a, W: Watch> Player<'a, W> {
     /// Waits until a message is due and sends it, unless somebody would rather be elsewhere by then.
     async fn play(&mut self, next: (Turn, Leaving)) -> Result<(), Error> {
         // A step does not wait for its time.
-        let mut due = if self.steps > 0 { None } else { self.pacer.due(next.0.0) };
-        while let Some(at) = due.filter(|at| *at > Instant::now()) {
-            let command = tokio::select! {
+        let due = if self.steps > 0 { None } else { self.pacer.due(next.0.0) };
+        if let Some(at) = due.filter(|at| *at > Instant::now()) {
+            tokio::select! {
                 biased;
-                command = obey::command(&mut self.commands) => Some(command),
-                () = sleep_until(at) => None,
-            };
-            let Some(command) = command else { break };
-            let (seeks, speed) = (self.seeks, self.pacer.speed());
-            self.obey(command)?;
-            if self.seeks != seeks {
-                return Ok(());
-            }
-            if self.stage != Stage::Playing || self.paused.is_some() || self.steps > 0 {
-                self.waiting.extend([next]);
-                return Ok(());
-            }
-            if self.pacer.speed() != speed {
-                // The rest of the wait counts from the last message, at the new speed.
-                if let Some(last) = self.last_at {
-                    self.pacer.due(last);
+                command = obey::command(&mut self.commands) => {
+                    // Whatever is asked for, the message waits among the others for its turn.
+                    self.waiting.extend([next]);
+                    return self.obey(command);
                 }
-                due = self.pacer.due(next.0.0);
+                () = sleep_until(at) => {}
             }
         }
         self.send(next, due).await

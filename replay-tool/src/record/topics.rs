@@ -62,7 +62,7 @@ pub fn key_expressions(filters: &[TopicFilter], units: &[UnitId]) -> Vec<OwnedKe
 
 /// A key expression of all units narrowed to some; as it is where none is named, or where it is of no unit.
 pub(super) fn of_units(keys: &str, units: &[UnitId]) -> Vec<OwnedKeyExpr> {
-    let narrowed: Vec<_> = if units.is_empty() || keys == key::ALL_SERVICE_STATUS {
+    let narrowed: Vec<_> = if units.is_empty() || !keys.starts_with("imu/") {
         vec![keys.to_owned()]
     } else {
         units.iter().map(|unit| keys.replacen('*', unit.as_str(), 1)).collect()
