@@ -154,15 +154,12 @@ fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
     words
 }
 
-/// The last part of a path.
-fn file_name(path: &str) -> String {
-    path.rsplit('/').next().unwrap_or(path).to_owned()
-}
-
 /// Where a calibration came from, in words.
 fn source(source: &Source) -> String {
     match source {
-        Source::Folder { path } | Source::Start { path } => file_name(path),
+        Source::Folder { path } | Source::Start { path } => {
+            path.rsplit('/').next().unwrap_or(path).to_owned()
+        }
         Source::Bus => "bus".to_owned(),
         Source::Rollback { to } => format!("rollback to {to}"),
         Source::PreLaunch => "pre-launch".to_owned(),

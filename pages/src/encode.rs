@@ -118,3 +118,29 @@ impl Store {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+
+    use super::*;
+
+    #[test]
+    fn a_spike_takes_nothing_from_the_values_beside_it() {
+        let values = [9.8065, 9.8066, 1e300, 9.8067, f64::NAN, -1e12, 9.8068];
+        let mut store = Store::default();
+        let middle = store.values(&values)["middle"].as_f64().unwrap();
+        let packed = Base64Unpadded::decode_vec(&store.lists[0].1).unwrap();
+        let mut planes = Vec::new();
+        flate2::read::ZlibDecoder::new(&packed[..]).read_to_end(&mut planes).unwrap();
+        let count = values.len();
+        let back = |place| {
+            let bytes: [u8; 4] = std::array::from_fn(|byte| planes[byte * count + place]);
+            f64::from(f32::from_le_bytes(bytes)) + middle
+        };
+        for place in [0, 1, 3, 6] {
+            assert!((back(place) - values[place]).abs() < 1e-9, "{} for {}", back(place), values[place]);
+        }
+        assert!(back(4).is_nan() && back(2).is_finite() && back(2) > 1e38 && back(5) < -0.99e12);
+    }
+}

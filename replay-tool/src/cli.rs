@@ -20,7 +20,7 @@ use std::io::Write;
 use std::path::Path;
 
 use clap::{Parser, Subcommand};
-use isotherm_cli::{Common, Exit, coloured, failed_lines, parse, to_stdout};
+use isotherm_cli::{Common, Exit, coloured, failed_lines, parse};
 use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 
 use crate::error::Error;
@@ -79,11 +79,6 @@ fn run(cli: Cli) -> Result<Exit, Error> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Common(common) => Ok(common.run::<Cli>()),
     }
-}
-
-/// Writes a result to standard output; a reader that has gone away is no error.
-fn print(text: &str) -> Result<(), Error> {
-    to_stdout(coloured(text).as_bytes()).map_err(Error::Stdout)
 }
 
 /// Writes one of many results; what nobody reads any more ends the command.

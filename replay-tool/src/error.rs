@@ -5,7 +5,6 @@ use std::path::Path;
 
 use isotherm_bus::BusError;
 use isotherm_cli::Exit;
-use isotherm_log::text::LogError;
 use thiserror::Error;
 
 /// Why a command ended early.
@@ -77,11 +76,5 @@ impl Error {
             Self::Scenario(_) => Exit::BadConfiguration,
             _ => Exit::Failed,
         }
-    }
-}
-
-impl From<LogError> for Error {
-    fn from(error: LogError) -> Self {
-        isotherm_log::error::Error::Log(error).into()
     }
 }

@@ -15,7 +15,7 @@ mod told;
 mod topics;
 mod writer;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -217,11 +217,8 @@ async fn on_session(
     }
     fill(&mut report, &queue, begun);
     let lost_thread = || Error::Runtime(std::io::Error::other("the writing thread has ended"));
-    finish(
-        &mut report,
-        done.ok().and_then(Result::ok).ok_or_else(lost_thread)?,
-        options.service != ServiceWait::Without,
-    );
+    let done = done.ok().and_then(Result::ok).ok_or_else(lost_thread)?;
+    finish(&mut report, done, options.service != ServiceWait::Without);
     Ok(report)
 }
 
@@ -277,21 +274,18 @@ impl Silence {
 }
 
 /// What a recording says of how it was made; nothing of the computer that it was made on.
-fn described(options: &RecordOptions) -> BTreeMap<String, String> {
+fn described(options: &RecordOptions) -> Vec<(&'static str, String)> {
     let join = |texts: Vec<String>| if texts.is_empty() { "all".to_owned() } else { texts.join(" ") };
     let topics = key_expressions(&options.topics, &options.units).iter().map(ToString::to_string).collect();
-    let mut described = BTreeMap::from([
-        ("compression".to_owned(), if options.writing.compress { "zstd" } else { "none" }.to_owned()),
-        ("chunk_s".to_owned(), options.bounds.chunk.as_secs_f64().to_string()),
-        ("units".to_owned(), join(options.units.iter().map(ToString::to_string).collect())),
-        ("topics".to_owned(), join(topics)),
-        ("with_service".to_owned(), (options.service != ServiceWait::Without).to_string()),
-    ]);
-    if let Some(bytes) = options.bounds.file_bytes {
-        described.insert("max_size_bytes".to_owned(), bytes.to_string());
-    }
-    if let Some(time) = options.bounds.file_time {
-        described.insert("max_duration_s".to_owned(), time.as_secs_f64().to_string());
-    }
+    let Bounds { chunk, file_bytes, file_time } = options.bounds;
+    let mut described = vec![
+        ("compression", if options.writing.compress { "zstd" } else { "none" }.to_owned()),
+        ("chunk_s", chunk.as_secs_f64().to_string()),
+        ("units", join(options.units.iter().map(ToString::to_string).collect())),
+        ("topics", join(topics)),
+        ("with_service", (options.service != ServiceWait::Without).to_string()),
+    ];
+    described.extend(file_bytes.map(|bytes| ("max_size_bytes", bytes.to_string())));
+    described.extend(file_time.map(|time| ("max_duration_s", time.as_secs_f64().to_string())));
     described
 }

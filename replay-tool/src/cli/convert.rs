@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::Exit;
+use isotherm_cli::{Exit, print};
 use isotherm_log::offline::read_document;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
 use super::record::Compression;
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 use isotherm_convert::{self as convert, Conversion, Place, Ros2Options, Target};
 
@@ -172,8 +172,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Exit, Error> {
     let outcome = conversion.run()?;
     outcome.converted.notes.iter().for_each(show::warn);
     let report = Report { target: conversion.target, outcome: &outcome };
-    print(&if args.json { show::json(&report) } else { human(&outcome) })?;
-    Ok(Exit::of_loss(outcome.lost_data()))
+    let text = if args.json { show::json(&report) } else { human(&outcome) };
+    Ok(print(&text, Exit::of_loss(outcome.lost_data())))
 }
 
 /// The summary as tables.

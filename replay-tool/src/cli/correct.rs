@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit, say_lines};
+use isotherm_cli::{Bar, Exit, print, say_lines};
 use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
@@ -18,7 +18,7 @@ use isotherm_log::offline::{Loaded, RunOptions, UnitPlan, UnitReport, correct, l
 use isotherm_log::part::LogFiles;
 use isotherm_log::source::LogReport;
 
-use super::{LogArgs, print, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use sink::{Format, Sink};
 
@@ -106,12 +106,12 @@ impl CorrectArgs {
 }
 
 /// Prints the summary: on standard error where the ticks go to standard output.
-fn print_summary(args: &CorrectArgs, text: &str) -> Result<(), Error> {
+fn print_summary(args: &CorrectArgs, text: &str, exit: Exit) -> Exit {
     if args.out.as_deref() == Some(Path::new("-")) {
         say_lines(text.trim_end_matches('\n'));
-        return Ok(());
+        return exit;
     }
-    print(text)
+    print(text, exit)
 }
 
 /// Reads a calibration document and says what is doubtful about it.

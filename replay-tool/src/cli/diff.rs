@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::Part;
@@ -19,7 +19,7 @@ use serde::Serialize;
 
 pub(super) use show_difference::first_difference;
 
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 
 /// Compare two corrected logs tick by tick, and show the first difference
@@ -117,8 +117,8 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         tolerance,
         units: &accounts,
     };
-    print(&if args.json { show::json(&report) } else { human(&report, named) })?;
-    Ok(if within_tolerance { Exit::Ok } else { Exit::Failed })
+    let exit = if within_tolerance { Exit::Ok } else { Exit::Failed };
+    Ok(print(&if args.json { show::json(&report) } else { human(&report, named) }, exit))
 }
 
 /// The unit that a CSV is of, where it is not said: the only one of the other log.

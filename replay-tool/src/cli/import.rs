@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use isotherm_cli::{Exit, Window, number};
+use isotherm_cli::{Exit, Window, number, print};
 use isotherm_log::file::write_whole;
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
@@ -13,7 +13,7 @@ use isotherm_log::mapping::{Delimiter, Encoding, Mapping};
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{check_outputs, info, plot, print, show};
+use super::{check_outputs, info, plot, show};
 use crate::error::Error;
 
 /// Propose a column mapping for a text log of any maker, then show what the log contains
@@ -157,8 +157,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
         let drawn = page.map_or_else(String::new, |page| format!("{page}: a first plot\n"));
         format!("{}\n{}: the mapping\n{notes}{drawn}", info::tables::of(&info), out.display())
     };
-    print(&text)?;
-    Ok(info::outcome(&info))
+    Ok(print(&text, info::outcome(&info)))
 }
 
 /// A proposal in which nothing is open: what is, is asked on a terminal.

@@ -4,11 +4,11 @@ mod readings;
 pub(super) mod tables;
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
 
 use super::log_args::{LogArgs, unnamed};
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 
 /// Ticks in one batch of a text log.
@@ -31,8 +31,7 @@ pub(super) struct InfoArgs {
 /// Runs the command.
 pub(super) fn run(args: &InfoArgs) -> Result<Exit, Error> {
     let info = survey(&args.log)?;
-    print(&if args.json { show::json(&info) } else { tables::of(&info) })?;
-    Ok(outcome(&info))
+    Ok(print(&if args.json { show::json(&info) } else { tables::of(&info) }, outcome(&info)))
 }
 
 /// Reads the log to its end.

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
 use super::play::key_expression;
-use super::{LogArgs, print, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use crate::play::wanted;
 
@@ -65,8 +65,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Exit, Error> {
     } else {
         human(&topics)
     };
-    print(&text)?;
-    Ok(Exit::of_loss(report.lost_data()))
+    Ok(print(&text, Exit::of_loss(report.lost_data())))
 }
 
 /// The distance of two moments (s), negative where the second is the earlier.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::ClientOptions;
 use isotherm_bus::outlet::least_in_flight;
-use isotherm_cli::{Exit, duration, number};
+use isotherm_cli::{Exit, duration, number, print};
 use isotherm_correction::sample::ChannelName;
 use isotherm_document::few;
 use isotherm_log::faults::FaultOptions;
@@ -21,7 +21,7 @@ use isotherm_protocol::raw::{HealthReading, MAX_HEALTH};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::{LogArgs, print, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
@@ -249,13 +249,14 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     let Played { report: play, log, ended } = played?;
     tables::warnings(&play).iter().for_each(show::warn);
     let report = Report { play: &play, log: &log };
-    print(&if args.json { show::json(&report) } else { tables::human(&report, &options) })?;
-    ended?;
     let lost = play.lost_data() || log.lost_data();
+    let text = if args.json { show::json(&report) } else { tables::human(&report, &options) };
+    let exit = print(&text, Exit::of_loss(lost));
+    ended?;
     // What `--loss` withholds was there.
     let found = |unit: &UnitReport| unit.counts.messages_sent + unit.counts.messages_withheld > 0;
     if !lost && !play.stopped && !play.units.iter().any(found) {
         return Err(Error::Nothing("played", "raw message"));
     }
-    Ok(Exit::of_loss(lost))
+    Ok(exit)
 }

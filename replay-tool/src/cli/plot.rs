@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::diff::is_csv;
 use isotherm_log::file::write_whole;
 use isotherm_log::offline::read_document;
@@ -15,7 +15,7 @@ use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 use super::log_args::{LogArgs, unnamed};
-use super::{check_outputs, print, show};
+use super::{check_outputs, show};
 use crate::error::Error;
 
 /// Ticks in one batch of a text log.
@@ -89,9 +89,8 @@ impl PlotArgs {
 pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
-    print(&if args.json { show::json(&report) } else { human(&report) })?;
-    let lost = summary.reading.iter().any(LogReport::lost_data);
-    Ok(Exit::of_loss(lost))
+    let exit = Exit::of_loss(summary.reading.iter().any(LogReport::lost_data));
+    Ok(print(&if args.json { show::json(&report) } else { human(&report) }, exit))
 }
 
 /// Draws a text log that a mapping reads.

@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use isotherm_bus::ClientOptions;
-use isotherm_cli::{Exit, duration};
+use isotherm_cli::{Exit, duration, print};
 use isotherm_log::offline::unit_id;
 use isotherm_log::recording::RecordingOptions;
 
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 use crate::record::{Bounds, RecordOptions, ServiceWait, TopicFilter, record};
 
@@ -189,6 +189,6 @@ pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
              the service or a router, and no --listen"
         ));
     }
-    print(&if args.json { show::json(&report) } else { human(&report) })?;
-    Ok(Exit::of_loss(report.lost_data()))
+    let text = if args.json { show::json(&report) } else { human(&report) };
+    Ok(print(&text, Exit::of_loss(report.lost_data())))
 }

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
-use isotherm_cli::{Bar, Exit, seconds};
+use isotherm_cli::{Bar, Exit, print, seconds};
 use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
 use serde::Serialize;
 
-use super::{check_outputs, print, show};
+use super::{check_outputs, show};
 use crate::error::Error;
 use crate::simulated::{LogWriter, write_truth, write_truth_header};
 use isotherm_log::file::{Sink, read_small_text, write_whole};
@@ -149,12 +149,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     if args.list_presets {
         let rows: Vec<_> =
             PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
-        return print(&rows.concat()).map(|()| Exit::Ok);
+        return Ok(print(&rows.concat(), Exit::Ok));
     }
     if args.print_preset.is_some() {
         let text =
             toml::to_string(&args.scenario()?).map_err(|error| Error::Scenario(vec![error.to_string()]))?;
-        return print(&text).map(|()| Exit::Ok);
+        return Ok(print(&text, Exit::Ok));
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
     let scenario = args.scenario()?;
@@ -199,8 +199,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     write_whole(&mapping, rows.mapping().as_bytes(), true)
         .map_err(|source| Error::file(&mapping, "write", source))?;
     log.keep()?;
-    print(&if args.json { show::json(&report) } else { human(&report) })?;
-    Ok(Exit::Ok)
+    Ok(print(&if args.json { show::json(&report) } else { human(&report) }, Exit::Ok))
 }
 
 /// The summary as a table.

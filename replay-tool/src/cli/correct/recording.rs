@@ -32,7 +32,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     without.iter().for_each(show::warn);
     let documents: Vec<_> = documents.into_values().collect();
     let (units, log) = corrected(args, files, plans, &documents)?;
-    let outcome = report::print(args, &units, &log)?;
+    let outcome = report::print(args, &units, &log);
     Ok(if without.is_some() { Exit::DataLoss } else { outcome })
 }
 

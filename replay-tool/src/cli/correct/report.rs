@@ -11,14 +11,13 @@ use serde::Serialize;
 use super::{CorrectArgs, print_summary};
 use crate::cli::diff::first_difference;
 use crate::cli::show;
-use crate::error::Error;
 
 /// Says what the units came to, and how that went.
-pub(super) fn print(args: &CorrectArgs, units: &[UnitReport], log: &LogReport) -> Result<Exit, Error> {
+pub(super) fn print(args: &CorrectArgs, units: &[UnitReport], log: &LogReport) -> Exit {
     let report = Report::new(units, log);
     report.warn();
-    print_summary(args, &if args.json { show::json(&report) } else { report.human() })?;
-    Ok(Exit::of_loss(report.lost_data()))
+    let text = if args.json { show::json(&report) } else { report.human() };
+    print_summary(args, &text, Exit::of_loss(report.lost_data()))
 }
 
 /// Everything that the summary says.

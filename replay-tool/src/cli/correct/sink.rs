@@ -1,6 +1,6 @@
 //! Where the corrected ticks of a log's units go.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use isotherm_log::file::{self, Partial};
 use isotherm_log::offline::rows::write_header;
 use isotherm_log::offline::{Form, Made};
-use isotherm_log::recording::{Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
+use isotherm_log::recording::{Documents, Metadata, RecordingOptions, RecordingWriter};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 
@@ -148,9 +148,7 @@ impl Sink {
                     ("made_by", concat!("isotherm-replay correct ", env!("CARGO_PKG_VERSION")).to_owned()),
                     ("made_of", inputs.join(", ")),
                 ];
-                let values: BTreeMap<_, _> =
-                    values.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-                writer.metadata(&Metadata { name: METADATA.to_owned(), values })?;
+                writer.metadata(&Metadata::of(values))?;
                 writer.finish()?;
                 Ok(partial.keep()?)
             }

@@ -60,16 +60,16 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let plan = UnitPlan { id: unit.clone(), basis, compare: false };
     let (units, log) = corrected(args, files, vec![plan], &[path])?;
     let ([corrected], false) = (units.as_slice(), args.out.as_deref().is_some_and(sink::is_recording)) else {
-        return report::print(args, &units, &log);
+        return Ok(report::print(args, &units, &log));
     };
     let summary = &corrected.summary;
     corrected.troubles.iter().for_each(show::warn);
     summary.doubts().iter().for_each(show::warn);
     let (unit, counters) = (unit.as_str(), &corrected.counters);
     let report = Report { unit, calibration_digest, summary, counters, log: &log };
-    print_summary(args, &if args.json { show::json(&report) } else { human(&report) })?;
+    let text = if args.json { show::json(&report) } else { human(&report) };
     // What went in did not all go out corrected, though the log has it.
-    Ok(Exit::of_loss(log.lost_data() || corrected.unanswered() > 0))
+    Ok(print_summary(args, &text, Exit::of_loss(log.lost_data() || corrected.unanswered() > 0)))
 }
 
 /// The summary as tables.
