@@ -185,11 +185,6 @@ fn unread<E: std::fmt::Display>(key: &str) -> impl Fn(E) -> ConsoleError {
     move |error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() }
 }
 
-/// The serial that was given.
-pub(super) fn unit(serial: &str) -> Result<UnitId, ConsoleError> {
-    UnitId::new(serial).map_err(|source| ConsoleError::Serial { serial: serial.to_owned(), source })
-}
-
 /// Reads a file, or standard input where it is `-`, no further than a document may be long.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, ConsoleError> {
     let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };

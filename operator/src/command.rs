@@ -26,7 +26,8 @@ Examples:
 A command that the unit's state does not allow is refused with a list of those allowed, exit code 1.")]
 pub struct CommandArgs {
     /// Serial of the unit
-    pub unit: String,
+    #[arg(value_parser = UnitId::new)]
+    pub unit: UnitId,
     /// Command
     #[command(subcommand)]
     pub action: Action,
@@ -136,26 +137,26 @@ impl Action {
 
 /// Gives the command and follows what it begins.
 pub(super) async fn run(args: &CommandArgs) -> Result<Exit, ConsoleError> {
-    let unit = client::unit(&args.unit)?;
+    let unit = &args.unit;
     let client = Client::open(&args.client).await?;
     let order = args.action.order();
     // Before the command is given, so that what it begins cannot end before the watch does begin.
     let follow = match order {
-        Order::SelfTest | Order::PreLaunch(_) if !args.detach => Some(Follow::start(&client, &unit).await?),
+        Order::SelfTest | Order::PreLaunch(_) if !args.detach => Some(Follow::start(&client, unit).await?),
         _ => None,
     };
     let by = client::by(args.by.as_deref());
-    let reply = give(&client, &unit, &CommandOrder { by: by.clone(), order: order.clone() }).await?;
+    let reply = give(&client, unit, &CommandOrder { by: by.clone(), order: order.clone() }).await?;
     let follow = follow.filter(|_| reply.accepted);
     let exit = match (follow, order) {
         (Some(follow), Order::SelfTest) => {
             say(in_words(&reply));
-            self_test::follow(follow, &client, &unit, &reply, args.json).await?
+            self_test::follow(follow, &client, unit, &reply, args.json).await?
         }
         (Some(follow), Order::PreLaunch(_)) => {
             say(in_words(&reply));
             let abort = CommandOrder { by, order: Order::Abort };
-            pre_launch::follow(follow, &client, &unit, &abort, args.json).await?
+            pre_launch::follow(follow, &client, unit, &abort, args.json).await?
         }
         _ => answer(&reply, args.json),
     };

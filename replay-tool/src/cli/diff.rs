@@ -39,8 +39,8 @@ pub(super) struct DiffArgs {
     #[arg(value_name = "B")]
     b: PathBuf,
     /// Unit serial, repeatable (default: all). CSV: the serial to assign
-    #[arg(long, short, value_name = "SERIAL")]
-    unit: Vec<String>,
+    #[arg(long, short, value_name = "SERIAL", value_parser = UnitId::new)]
+    unit: Vec<UnitId>,
     /// Tolerance of angle increments (rad)
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_angle: f64,
@@ -81,7 +81,7 @@ struct Report<'r> {
 
 /// Runs the command.
 pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
-    let units = args.unit.iter().map(|serial| unit_id(serial)).collect::<Result<BTreeSet<_>, _>>()?;
+    let units: BTreeSet<_> = args.unit.iter().cloned().collect();
     for recording in [&args.a, &args.b].into_iter().filter(|path| is_recording(path)) {
         check_units(std::slice::from_ref(recording), &units)?;
     }

@@ -39,8 +39,8 @@ pub(super) struct PlotArgs {
     #[arg(long, value_name = "FILE", requires = "beside")]
     beside_mapping: Option<PathBuf>,
     /// Unit of the second log (default: --unit)
-    #[arg(long, value_name = "SERIAL", requires = "beside")]
-    beside_unit: Vec<String>,
+    #[arg(long, value_name = "SERIAL", requires = "beside", value_parser = UnitId::new)]
+    beside_unit: Vec<UnitId>,
     /// Calibration document (TOML) that corrects a text log and scales counts (recordings: as recorded)
     #[arg(long, short, value_name = "FILE")]
     calibration: Option<PathBuf>,
@@ -115,7 +115,7 @@ fn corrected(log: &LogArgs, unnamed: Option<&UnitId>) -> Result<Option<Messages>
     if !is_csv(path) {
         return Ok(None);
     }
-    let unit = log.units()?.pop_first().or_else(|| unnamed.cloned());
+    let unit = log.units().pop_first().or_else(|| unnamed.cloned());
     unit.map(|unit| Ok(Messages::of_corrected(path, &unit, &log.part()?)?)).transpose()
 }
 
@@ -130,7 +130,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let calibration = calibration.map(read_document).transpose()?;
 
     let unnamed = unnamed();
-    let first_units = args.log.units()?;
+    let first_units = args.log.units();
     let mut logs = Vec::new();
     let mut bar = None;
     for log in std::iter::once(&args.log).chain(&other) {
@@ -152,7 +152,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
         // Units of different serials are compared where each log has one that was asked for.
         let one =
             |units: &std::collections::BTreeSet<UnitId>| units.first().filter(|_| units.len() == 1).cloned();
-        let shown_as = one(&first_units).filter(|_| log.units().is_ok_and(|units| units.len() == 1));
+        let shown_as = one(&first_units).filter(|_| log.units().len() == 1);
         logs.push(PlotLog { name, messages, shown_as, correct_from });
     }
     let options = PlotOptions { detail: usize::try_from(args.detail).unwrap_or(usize::MAX), calibration };

@@ -6,8 +6,8 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use isotherm_bus::ClientOptions;
 use isotherm_cli::{Exit, duration, print};
-use isotherm_log::offline::unit_id;
 use isotherm_log::recording::RecordingOptions;
+use isotherm_protocol::key::UnitId;
 
 use super::show;
 use crate::error::Error;
@@ -40,8 +40,8 @@ pub(super) struct RecordArgs {
     #[command(flatten)]
     session: ClientOptions,
     /// Unit serial, repeatable (default: all)
-    #[arg(long, short, value_name = "SERIAL")]
-    unit: Vec<String>,
+    #[arg(long, short, value_name = "SERIAL", value_parser = UnitId::new)]
+    unit: Vec<UnitId>,
     /// raw, reference, corrected, status, service, journal, or a key expression; repeatable (default: all of these)
     #[arg(long, short, value_name = "TOPIC")]
     topic: Vec<TopicFilter>,
@@ -136,7 +136,7 @@ impl RecordArgs {
         Ok(RecordOptions {
             out: self.out.clone(),
             session: self.session.clone(),
-            units: self.unit.iter().map(|serial| unit_id(serial)).collect::<Result<_, _>>()?,
+            units: self.unit.clone(),
             topics: self.topic.clone(),
             service,
             query_limit: self.timeout,

@@ -73,7 +73,7 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
     let files = args.log.files(1, None)?;
     let mut outlines = scan(&args.log.log, files.end_ns(&args.log.part()?)?)?;
     outlines.damaged.iter().for_each(show::warn);
-    let wanted = args.log.units()?;
+    let wanted = args.log.units();
     let holds = |unit: &UnitId| wanted.is_empty() || wanted.contains(unit);
     let units: Vec<_> = outlines
         .units

@@ -42,7 +42,7 @@ fn plans(
     outlines: Outlines,
     mut calibrations: BTreeMap<UnitId, Loaded>,
 ) -> Result<(Vec<UnitPlan>, Option<String>), Error> {
-    let wanted = args.log.units()?;
+    let wanted = args.log.units();
     let (mut plans, mut without) = (Vec::new(), Vec::new());
     for (id, outline) in outlines.units {
         if !outline.has_raw || !(wanted.is_empty() || wanted.contains(&id)) {
