@@ -1,6 +1,5 @@
 //! `isotherm-replay play`.
 
-mod screen;
 mod tables;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,8 +24,7 @@ use super::{LogArgs, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
-use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, UnitReport, play, wanted};
-use screen::Screen;
+use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, Screen, UnitReport, play, wanted};
 
 /// Most copies of a unit.
 const MAX_COPIES: u32 = 999;

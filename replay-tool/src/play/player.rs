@@ -16,9 +16,10 @@ use tokio::time::{Instant, sleep_until};
 use zenoh::Session;
 
 use super::playlist::{Frame, Load, Playlist};
+use super::screen::Screen;
 use super::silence::Shared;
 use super::units::{PlayedUnit, Units};
-use super::{Acknowledge, Command, PlayOptions, Watch};
+use super::{Acknowledge, Command, PlayOptions};
 use crate::error::Error;
 use crate::pace::Pacer;
 
@@ -42,10 +43,10 @@ enum Stage {
 }
 
 /// Plays.
-pub(super) struct Player<'a, W> {
+pub(super) struct Player<'a> {
     session: &'a Session,
     options: &'a PlayOptions,
-    watch: &'a W,
+    screen: &'a Screen,
     /// Whoever is at the keyboard; `None` once nobody is.
     commands: Option<UnboundedReceiver<Command>>,
     pub(super) playlist: Playlist<'a>,
@@ -80,18 +81,18 @@ pub(super) struct Player<'a, W> {
     ticks_sent: u64,
 }
 
-impl<'a, W: Watch> Player<'a, W> {
+impl<'a> Player<'a> {
     /// Opens the log; nothing is sent.
     pub(super) fn new(
         session: &'a Session,
         options: &'a PlayOptions,
         commands: UnboundedReceiver<Command>,
-        watch: &'a W,
+        screen: &'a Screen,
     ) -> Result<Self, Error> {
         Ok(Self {
             session,
             options,
-            watch,
+            screen,
             commands: Some(commands),
             playlist: Playlist::new(options)?,
             units: Units::new(options),

@@ -54,17 +54,17 @@ impl Item {
 
 /// Messages of one topic.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct TopicCount {
+pub(crate) struct TopicCount {
     /// The key, without namespace.
-    pub topic: String,
+    pub(crate) topic: String,
     /// Messages that came in.
-    pub received: u64,
+    pub(crate) received: u64,
     /// Of these, in a file.
-    pub written: u64,
+    pub(crate) written: u64,
     /// Of these, not in a file: the queue was full, or writing failed.
-    pub lost: u64,
+    pub(crate) lost: u64,
     /// Their bytes that came in.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 /// The queue between the receive threads, which never wait for it, and the thread that writes.

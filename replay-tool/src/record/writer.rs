@@ -21,13 +21,13 @@ const IDLE: Duration = Duration::from_millis(200);
 
 /// When files and chunks end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// A chunk ends after this long at the latest: what a kill can cost.
-    pub chunk: Duration,
+    pub(crate) chunk: Duration,
     /// A file ends with the chunk that makes it this long (bytes).
-    pub file_bytes: Option<u64>,
+    pub(crate) file_bytes: Option<u64>,
     /// A file ends with the first message this long after its beginning.
-    pub file_time: Option<Duration>,
+    pub(crate) file_time: Option<Duration>,
 }
 
 /// What the thread tells.

@@ -6,9 +6,9 @@ use tokio::time::Instant;
 use super::{Player, Stage};
 use crate::error::Error;
 use crate::pace::Speed;
-use crate::play::{Command, Watch};
+use crate::play::Command;
 
-impl<W: Watch> Player<'_, W> {
+impl Player<'_> {
     /// Does what somebody asked for meanwhile.
     pub(super) fn obey_all(&mut self) -> Result<(), Error> {
         while let Some(Ok(command)) = self.commands.as_mut().map(UnboundedReceiver::try_recv) {
@@ -45,11 +45,6 @@ impl<W: Watch> Player<'_, W> {
         }
         self.show();
         Ok(())
-    }
-
-    pub(super) fn show(&mut self) {
-        self.shown = Some(Instant::now());
-        self.watch.at(&self.position());
     }
 
     fn pause(&mut self, pause: bool) {
