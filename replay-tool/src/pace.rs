@@ -135,9 +135,9 @@ pub(crate) struct Lateness {
     /// Messages that went out later than that.
     pub(crate) misses: u64,
     /// Half of them were not later than this (ms).
-    pub p50_ms: f64,
+    pub(crate) p50_ms: f64,
     /// 99 % of them were not later than this (ms).
-    pub p99_ms: f64,
+    pub(crate) p99_ms: f64,
     /// The latest (ms).
     pub(crate) max_ms: f64,
 }
