@@ -143,7 +143,7 @@ impl ConvertArgs {
         }
         let documents = self.calibration.iter().map(|path| Ok(read_document(path)?.document));
         let documents = documents.collect::<Result<_, Error>>()?;
-        let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
+        let mut sources: Vec<_> = vec![("log".to_owned(), show::names(&log.log))];
         sources
             .extend(log.mapping_file().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())));
         Ok(Conversion {
@@ -158,12 +158,6 @@ impl ConvertArgs {
             ros2: Ros2Options { raw: self.raw, frame: self.frame.clone(), documents },
         })
     }
-}
-
-/// Files by their names.
-fn names(paths: &[PathBuf]) -> String {
-    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
-    names.join(", ")
 }
 
 /// Runs the command.

@@ -2,6 +2,7 @@
 
 use std::fmt::{Display, Write};
 use std::ops::RangeBounds;
+use std::path::PathBuf;
 
 use comfy_table::Row;
 use isotherm_cli::say_lines;
@@ -40,6 +41,17 @@ pub(super) fn warn(words: impl Display) {
 pub(super) fn json(value: &impl Serialize) -> String {
     // The values are plain structures of numbers and texts, which always serialise.
     serde_json::to_string(value).map(|text| text + "\n").unwrap_or_default()
+}
+
+/// Files by their names.
+pub(super) fn names(paths: &[PathBuf]) -> String {
+    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// The head of a document's digest.
+pub(super) fn hexadecimal(digest: [u8; 8]) -> String {
+    format!("{:016x}", u64::from_be_bytes(digest))
 }
 
 /// What reading a log came to, in words; empty where there is nothing to say.

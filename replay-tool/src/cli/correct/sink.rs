@@ -13,7 +13,7 @@ use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 
 use super::CorrectArgs;
-use crate::cli::check_outputs;
+use crate::cli::{check_outputs, show};
 use crate::error::Error;
 
 /// How corrected ticks are written.
@@ -143,10 +143,9 @@ impl Sink {
             Self::None => Ok(()),
             Self::Files(files) => files.into_iter().try_for_each(|file| Ok(file.finish()?.keep()?)),
             Self::Recording { mut writer, partial, .. } => {
-                let inputs: Vec<_> = inputs.iter().map(|path| path.display().to_string()).collect();
                 let values = [
                     ("made_by", concat!("isotherm-replay correct ", env!("CARGO_PKG_VERSION")).to_owned()),
-                    ("made_of", inputs.join(", ")),
+                    ("made_of", show::names(inputs)),
                 ];
                 writer.metadata(&Metadata::of(values))?;
                 writer.finish()?;

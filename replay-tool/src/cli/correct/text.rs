@@ -55,7 +55,7 @@ pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let unit = loaded.unit.clone();
     args.log.refuse_document_of_another(unit.as_str())?;
     let files = args.log.files(BATCH, Some(&unit))?;
-    let calibration_digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
+    let calibration_digest = show::hexadecimal(loaded.digest);
     let basis = Basis::Given { settings, calibration: Some(loaded) };
     let plan = UnitPlan { id: unit.clone(), basis, compare: false };
     let (units, log) = corrected(args, files, vec![plan], &[path])?;
