@@ -29,7 +29,7 @@ use crate::stop::Stop;
 use player::Player;
 pub(crate) use playlist::wanted;
 
-pub(crate) use report::{Counts, PlayReport, Returned, UnitReport};
+pub(crate) use report::{PlayReport, UnitReport};
 pub(crate) use screen::Screen;
 
 /// How long a session may take to close.

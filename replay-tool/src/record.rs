@@ -41,7 +41,7 @@ use services::{await_service, follow_services, note, open, start_asker};
 use writer::{FileWriter, Told};
 
 pub(crate) use queue::TopicCount;
-pub(crate) use report::{Done, EndedBy, RecordReport};
+pub(crate) use report::{EndedBy, RecordReport};
 pub(crate) use topics::{TopicFilter, is_first, key_expressions};
 pub(crate) use writer::Bounds;
 

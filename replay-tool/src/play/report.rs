@@ -56,6 +56,7 @@ impl Counts {
 
 /// What became of gyro ticks, of a unit or of all; everything is `None` without acknowledgement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[expect(clippy::struct_field_names, reason = "they are the names of the JSON")]
 pub(crate) struct Returned {
     /// Gyro ticks between the first and the last of a run that were never sent, because the log does not have them, or
     /// because they were passed over or withheld: the service announces them as missing.
