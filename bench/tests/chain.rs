@@ -51,8 +51,8 @@ fn every_tick_that_is_sent_is_counted() {
 
 #[test]
 fn figures_that_no_round_can_have_are_refused() {
-    for wrong in [["--seconds", "nan"], ["--seconds", "-100"], ["--rounds", "0"]] {
-        let (well, _, words) = chain(&[&["--measure", "latency", "--subject", "relay"], &wrong[..]].concat());
+    for wrong in ["--seconds=nan", "--seconds=-100", "--rounds=0"] {
+        let (well, _, words) = chain(&["--measure", "latency", "--subject", "relay", wrong]);
         assert!(!well && words.contains("error: invalid value"), "{words}");
     }
 }
