@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`advanced`] | the command line, with a short and a long help |
 //! | [`program`] | completions and manual pages |
-//! | [`number`] | numbers of a command line |
+//! | [`mod@number`] | numbers of a command line |
 //! | [`mod@print`] | results on stdout |
 //! | [`stderr`] | words on stderr, through a queue where a blocked reader must not hold the program up |
 //! | [`bar`] | progress |
