@@ -104,7 +104,7 @@ pub(crate) struct RecordOptions {
 /// # Errors
 /// [`Error::Usage`] and [`Error::Log`] where the file cannot be begun, [`Error::Bus`] where the session cannot be opened or
 /// no service answers, [`Error::Stopped`] where it was stopped before it began. A disk that is full later is no error: see
-/// [`Done::failure`].
+/// [`report::Done::failure`].
 pub(crate) async fn record(
     options: &RecordOptions,
     mut watch: impl FnMut(&RecordReport),
