@@ -15,7 +15,7 @@ mod swap;
 mod table;
 
 use clap::builder::RangedU64ValueParser;
-use isotherm_cli::Bar;
+use isotherm_cli::{Bar, number};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use case::{Beside, Case, Pace};
@@ -26,6 +26,7 @@ pub(crate) use table::table;
 
 use crate::error::Error;
 use crate::machine::Machine;
+use crate::rounds::rounds;
 
 /// What of a chain is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
@@ -63,10 +64,10 @@ pub(crate) struct ChainArgs {
     #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=4096))]
     batch: Vec<usize>,
     /// Rounds; every subject runs once in each
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, value_parser = rounds())]
     rounds: usize,
     /// How long a round of latency is measured (s)
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, default_value_t = 3.0, value_parser = number(" of seconds", 0.05..=600.0))]
     seconds: f64,
     /// One round of a second for each case: whether all works, not how fast
     #[arg(long)]
@@ -193,7 +194,7 @@ pub(crate) fn measure(args: &ChainArgs) -> Report {
         .flat_map(|measure| args.cases(measure).into_iter().map(move |variants| (measure, variants)));
     let cases = cases.map(|(measure, variants)| (measure, runs(&variants, &args.profile, &subjects)));
     let cases: Vec<_> = cases.collect();
-    let rounds = if args.quick { 1 } else { args.rounds.max(1) };
+    let rounds = if args.quick { 1 } else { args.rounds };
     let bar = Bar::counting("", cases.iter().map(|(_, runs)| runs.len() * rounds).sum());
     for (measure, runs) in cases {
         let outcomes = match take_turns(&runs, rounds, &bar) {

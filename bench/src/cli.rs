@@ -11,6 +11,7 @@ use crate::instructions::{self, Figures};
 use crate::kernel;
 use crate::offline;
 use crate::part::{self, Role};
+use crate::rounds::rounds;
 
 /// How fast Isotherm is, as ratios to named references
 #[derive(Debug, Parser)]
@@ -25,7 +26,7 @@ enum Command {
     /// Time per tick of every kernel, beside what an autopilot does per sample
     Kernel {
         /// Rounds; every kernel runs once in each
-        #[arg(long, default_value_t = 101)]
+        #[arg(long, default_value_t = 101, value_parser = rounds())]
         rounds: usize,
         /// Print JSON
         #[arg(long)]
@@ -48,7 +49,7 @@ enum Command {
     /// Ticks per second that `isotherm-replay correct` does on one core
     Offline {
         /// Rounds
-        #[arg(long, default_value_t = 3)]
+        #[arg(long, default_value_t = 3, value_parser = rounds())]
         rounds: usize,
         /// One round of a short log: whether all works, not how fast
         #[arg(long)]

@@ -2,6 +2,13 @@
 
 use std::time::Instant;
 
+use clap::builder::RangedU64ValueParser;
+
+/// For `value_parser`: how many rounds.
+pub(crate) fn rounds() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..=10_000)
+}
+
 /// A quantile (0…1) of sorted figures.
 #[expect(
     clippy::cast_precision_loss,

@@ -50,6 +50,14 @@ fn every_tick_that_is_sent_is_counted() {
 }
 
 #[test]
+fn figures_that_no_round_can_have_are_refused() {
+    for wrong in ["--seconds=nan", "--seconds=-100", "--rounds=0"] {
+        let (well, _, words) = chain(&["--measure", "latency", "--subject", "relay", wrong]);
+        assert!(!well && words.contains("error: invalid value"), "{words}");
+    }
+}
+
+#[test]
 fn a_profile_reaches_the_one_in_the_middle() {
     let brief =
         ["--measure", "latency", "--units", "1", "--rate", "200", "--rounds", "1", "--seconds", "0.1"];

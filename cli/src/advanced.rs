@@ -1,9 +1,12 @@
 //! `--help` with the options that most calls need, `--help-advanced` with all of them, for every command of a program.
 
+use std::io;
+
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgAction, Command, CommandFactory, Error, FromArgMatches};
 
-use crate::stderr::PROGRAM;
+use crate::exit::Exit;
+use crate::stderr::{PROGRAM, failed};
 
 /// Reads the command line of a program; options with `hide_short_help` are rare ones.
 #[must_use]
@@ -12,8 +15,21 @@ pub fn parse<P: CommandFactory + FromArgMatches>() -> P {
     // A second command line in one process is a test's.
     let _ = PROGRAM.set(command.get_name().to_owned());
     let matches = command.clone().try_get_matches();
-    let matches = matches.unwrap_or_else(|error| listing_commands(error, &command, std::env::args()).exit());
-    P::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit())
+    // An argument that is no text is none of a command's name.
+    let arguments = std::env::args_os().filter_map(|argument| argument.into_string().ok());
+    let matches = matches.unwrap_or_else(|error| end(&listing_commands(error, &command, arguments)));
+    P::from_arg_matches(&matches).unwrap_or_else(|error| end(&error.format(&mut command)))
+}
+
+/// Prints help or what is wrong with a command line, and ends the program.
+fn end(error: &Error) -> ! {
+    let code = match error.print() {
+        Err(full) if !error.use_stderr() && full.kind() != io::ErrorKind::BrokenPipe => {
+            failed(format_args!("cannot write to standard output: {full}"), Exit::Failed) as i32
+        }
+        _ => error.exit_code(),
+    };
+    std::process::exit(code)
 }
 
 /// The command line with both kinds of help.

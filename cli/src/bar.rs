@@ -77,6 +77,12 @@ impl Bar {
         Self::new(None, "{spinner} {msg}", message)
     }
 
+    /// Lines instead of a bar: those that are said last.
+    #[must_use]
+    pub fn lines() -> Self {
+        Self::new(None, "{msg}", "")
+    }
+
     /// That nobody sees, for what is done beside other things.
     #[must_use]
     pub fn hidden() -> Self {

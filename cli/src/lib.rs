@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`advanced`] | the command line, with a short and a long help |
 //! | [`program`] | completions and manual pages |
+//! | [`mod@number`] | numbers of a command line |
 //! | [`mod@print`] | results on stdout |
 //! | [`stderr`] | words on stderr, through a queue where a blocked reader must not hold the program up |
 //! | [`bar`] | progress |
@@ -16,6 +17,7 @@
 pub mod advanced;
 pub mod bar;
 pub mod exit;
+pub mod number;
 pub mod print;
 pub mod program;
 mod queue;
@@ -26,8 +28,9 @@ pub mod window;
 pub use advanced::parse;
 pub use bar::Bar;
 pub use exit::Exit;
+pub use number::{duration, number, seconds};
 pub use print::{coloured, grouped, json, print, print_within, to_stdout};
 pub use program::Common;
 pub use stderr::{failed, failed_lines, say, say_lines, say_warning};
 pub use table::table;
-pub use window::{Window, seconds};
+pub use window::Window;

@@ -3,6 +3,8 @@
 use clap::Args;
 use isotherm_correction::units::Span;
 
+use crate::number::seconds;
+
 /// The part of a log's time that is read.
 #[derive(Debug, Clone, Default, Args)]
 pub struct Window {
@@ -32,16 +34,5 @@ impl Window {
                 Err(format!("--end is {end} s, must not be before --start, {start} s"))
             }
         }
-    }
-}
-
-/// Reads seconds.
-///
-/// # Errors
-/// In words, for what is no number from 0 to 10⁹.
-pub fn seconds(text: &str) -> Result<Span, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=1e9).contains(&seconds) => Ok(Span::from_s(seconds)),
-        _ => Err("must be a number of seconds from 0 to 1000000000".into()),
     }
 }

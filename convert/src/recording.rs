@@ -1,9 +1,9 @@
 //! A text log as a recording.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use isotherm_log::message::Topic;
-use isotherm_log::recording::{METADATA, Metadata, RecordingOptions, RecordingWriter};
+use isotherm_log::recording::{Metadata, RecordingOptions, RecordingWriter};
 
 use super::{Conversion, Converted, Outcome, Written};
 use isotherm_log::error::Error;
@@ -18,9 +18,8 @@ pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
         ..RecordingOptions::default()
     };
     let mut writer = RecordingWriter::create(partial.writing(), options)?;
-    let mut values: BTreeMap<_, _> = conversion.provenance().into_iter().collect();
-    values.insert("origin".to_owned(), "converted from a text log".to_owned());
-    writer.metadata(&Metadata { name: METADATA.to_owned(), values })?;
+    let origin = ("origin".to_owned(), "converted from a text log".to_owned());
+    writer.metadata(&Metadata::of(conversion.provenance().into_iter().chain([origin])))?;
     let mut topics = BTreeSet::<Topic>::new();
     let log = conversion.read("writing", |message, _| {
         if !topics.contains(&message.topic) {

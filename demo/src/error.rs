@@ -49,9 +49,6 @@ pub enum DemoError {
         /// Why.
         source: std::io::Error,
     },
-    /// The figures cannot be written as JSON.
-    #[error("cannot write the figures as JSON: {0}")]
-    Json(#[source] serde_json::Error),
 }
 
 fn words(problems: &[Problem]) -> String {

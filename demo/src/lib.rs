@@ -73,7 +73,11 @@ async fn show(args: DemoArgs) -> Result<Exit, DemoError> {
     let write = |path: &Path, source| DemoError::Write { path: path.to_owned(), source };
     if let Some(path) = &report {
         // Tried now: nobody wants to learn after half a minute that the folder does not exist.
+        let is_new = !path.exists();
         OpenOptions::new().create(true).append(true).open(path).map_err(|source| write(path, source))?;
+        if is_new {
+            std::fs::remove_file(path).map_err(|source| write(path, source))?;
+        }
     }
     let fleet = fleet::fleet(args.seed)?;
     let (units, watched) = play(&fleet, f64::from(args.seconds)).await?;
@@ -83,7 +87,7 @@ async fn show(args: DemoArgs) -> Result<Exit, DemoError> {
         std::fs::write(path, html).map_err(|source| write(path, source))?;
     }
     let exit = if summary.units.iter().all(UnitSummary::is_whole) { Exit::Ok } else { Exit::DataLoss };
-    Ok(print(&(text(&summary, args.json)? + "\n"), exit))
+    Ok(print(&(text(&summary, args.json) + "\n"), exit))
 }
 
 /// Plays all units at once, each within `seconds`, and gives the figures and the curves of each.
@@ -120,19 +124,17 @@ async fn all(mut producers: JoinSet<Result<(), DemoError>>) -> Result<(), DemoEr
 }
 
 /// The figures as they are printed.
-fn text(summary: &Summary, json: bool) -> Result<String, DemoError> {
-    let mut text = if json {
-        serde_json::to_string(summary).map_err(DemoError::Json)?
-    } else {
-        format!(
-            "{}\nraw: nominal scale factor and input axes only. rms over the three axes, peak to peak of the worst one.",
-            summary.table()
-        )
-    };
-    if let (false, Some(path)) = (json, &summary.report) {
-        text = format!("{text}\nreport: {}", path.display());
+fn text(summary: &Summary, json: bool) -> String {
+    if json {
+        // A plain structure of numbers and texts, which always serialises.
+        return serde_json::to_string(summary).unwrap_or_default();
     }
-    Ok(text)
+    let report =
+        summary.report.as_ref().map_or_else(String::new, |path| format!("\nreport: {}", path.display()));
+    format!(
+        "{}\nraw: nominal scale factor and input axes only. rms over the three axes, peak to peak of the worst one.{report}",
+        summary.table()
+    )
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use isotherm_correction::sample::{AccelTick, GyroTick};
 use isotherm_fuzz::{frames, journal, logs, operators, stream, texts};
 use isotherm_log::message::{Message, Topic};
-use isotherm_log::recording::{Attachment, METADATA, Metadata, RecordingOptions, RecordingWriter};
+use isotherm_log::recording::{Attachment, Metadata, RecordingOptions, RecordingWriter};
 use isotherm_protocol::key::{RawStream, UnitId};
 
 fn root() -> PathBuf {
@@ -117,8 +117,7 @@ fn record(path: &Path, options: RecordingOptions) {
         };
         writer.write(&Message { topic, received_ns, frame }).unwrap();
     }
-    let values = [("version".to_owned(), "1".to_owned())].into();
-    writer.metadata(&Metadata { name: METADATA.to_owned(), values }).unwrap();
+    writer.metadata(&Metadata::of([("version", "1".to_owned())])).unwrap();
     writer.finish().unwrap();
 }
 

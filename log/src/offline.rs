@@ -95,7 +95,7 @@ pub fn unit_id(serial: &str) -> Result<UnitId, Error> {
 }
 
 /// Counters of a unit that are not zero.
-pub fn counters(stream: &UnitStream) -> impl Iterator<Item = (String, u64)> + use<> {
+fn counters(stream: &UnitStream) -> impl Iterator<Item = (String, u64)> + use<> {
     let counters = stream.counters().into_iter();
     counters.filter(|counter| counter.value > 0).map(|counter| (counter.name, counter.value))
 }

@@ -88,3 +88,12 @@ pub struct Metadata {
     /// What it says.
     pub values: BTreeMap<String, String>,
 }
+
+impl Metadata {
+    /// What a program of this project says of a recording.
+    #[must_use]
+    pub fn of<N: Into<String>>(values: impl IntoIterator<Item = (N, String)>) -> Self {
+        let values = values.into_iter().map(|(name, value)| (name.into(), value)).collect();
+        Self { name: METADATA.to_owned(), values }
+    }
+}

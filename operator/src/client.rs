@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::inquiry::{Unanswered, ask};
 use isotherm_bus::{BusError, ClientOptions, Role};
+use isotherm_cli::duration;
 use isotherm_protocol::codec::{self, Message};
 use isotherm_protocol::escape::is_unfit;
 use isotherm_protocol::key::{self, UnitId};
@@ -25,17 +26,8 @@ pub struct ClientArgs {
     #[command(flatten)]
     pub session: ClientOptions,
     /// Longest wait for an answer (s)
-    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds(3600.0), hide_short_help = true)]
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = duration(0.1..=3600.0), hide_short_help = true)]
     pub timeout: Duration,
-}
-
-/// Reads a time: 0.1 s to so many.
-pub(super) fn seconds(most: f64) -> impl Fn(&str) -> Result<Duration, String> + Clone {
-    move |text| {
-        let seconds: f64 = text.parse().map_err(|_| "must be a number of seconds".to_owned())?;
-        let is_sane = (0.1..=most).contains(&seconds);
-        is_sane.then(|| Duration::from_secs_f64(seconds)).ok_or_else(|| format!("must be from 0.1 to {most}"))
-    }
 }
 
 /// A session to ask on.
@@ -191,11 +183,6 @@ impl Client {
 /// For `map_err`: an answer that cannot be read.
 fn unread<E: std::fmt::Display>(key: &str) -> impl Fn(E) -> ConsoleError {
     move |error| ConsoleError::Answer { key: key.to_owned(), reason: error.to_string() }
-}
-
-/// The serial that was given.
-pub(super) fn unit(serial: &str) -> Result<UnitId, ConsoleError> {
-    UnitId::new(serial).map_err(|source| ConsoleError::Serial { serial: serial.to_owned(), source })
 }
 
 /// Reads a file, or standard input where it is `-`, no further than a document may be long.

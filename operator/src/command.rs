@@ -4,7 +4,7 @@ mod pre_launch;
 mod self_test;
 
 use clap::{Args, Subcommand};
-use isotherm_cli::{Exit, failed, print, say};
+use isotherm_cli::{Exit, failed, number, print, say};
 use isotherm_protocol::control::{CommandOrder, CommandReply, Order, PlaceOrder, PreLaunchOrder};
 use isotherm_protocol::key::{self, UnitId};
 
@@ -26,7 +26,8 @@ Examples:
 A command that the unit's state does not allow is refused with a list of those allowed, exit code 1.")]
 pub struct CommandArgs {
     /// Serial of the unit
-    pub unit: String,
+    #[arg(value_parser = UnitId::new)]
+    pub unit: UnitId,
     /// Command
     #[command(subcommand)]
     pub action: Action,
@@ -66,7 +67,7 @@ pub enum Action {
         #[command(flatten)]
         place: PlaceArgs,
         /// Time to accumulate (s, 60…7200; default: 600)
-        #[arg(long, value_name = "SECONDS")]
+        #[arg(long, value_name = "SECONDS", value_parser = number(" of seconds", 60.0..=7200.0))]
         duration: Option<f64>,
         /// Store and print the result, but do not put it in force
         #[arg(long)]
@@ -90,23 +91,17 @@ pub enum Action {
 #[derive(Debug, Clone, Args)]
 pub struct PlaceArgs {
     /// Geodetic latitude (°, −90…90)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0))]
     pub latitude: f64,
     /// Heading of the case's x axis from north (°)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0))]
     pub heading: f64,
     /// Pitch of the case (°) (default: levelled by the accelerometers)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees, requires = "roll")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0), requires = "roll")]
     pub pitch: Option<f64>,
     /// Roll of the case (°) (default: levelled by the accelerometers)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees, requires = "pitch")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0), requires = "pitch")]
     pub roll: Option<f64>,
-}
-
-/// Reads an angle.
-fn degrees(text: &str) -> Result<f64, String> {
-    let degrees = text.parse().ok().filter(|degrees: &f64| degrees.abs() <= 360.0);
-    degrees.ok_or_else(|| "must be a number of degrees from -360 to 360".to_owned())
 }
 
 impl PlaceArgs {
@@ -142,26 +137,26 @@ impl Action {
 
 /// Gives the command and follows what it begins.
 pub(super) async fn run(args: &CommandArgs) -> Result<Exit, ConsoleError> {
-    let unit = client::unit(&args.unit)?;
+    let unit = &args.unit;
     let client = Client::open(&args.client).await?;
     let order = args.action.order();
     // Before the command is given, so that what it begins cannot end before the watch does begin.
     let follow = match order {
-        Order::SelfTest | Order::PreLaunch(_) if !args.detach => Some(Follow::start(&client, &unit).await?),
+        Order::SelfTest | Order::PreLaunch(_) if !args.detach => Some(Follow::start(&client, unit).await?),
         _ => None,
     };
     let by = client::by(args.by.as_deref());
-    let reply = give(&client, &unit, &CommandOrder { by: by.clone(), order: order.clone() }).await?;
+    let reply = give(&client, unit, &CommandOrder { by: by.clone(), order: order.clone() }).await?;
     let follow = follow.filter(|_| reply.accepted);
     let exit = match (follow, order) {
         (Some(follow), Order::SelfTest) => {
             say(in_words(&reply));
-            self_test::follow(follow, &client, &unit, &reply, args.json).await?
+            self_test::follow(follow, &client, unit, &reply, args.json).await?
         }
         (Some(follow), Order::PreLaunch(_)) => {
             say(in_words(&reply));
             let abort = CommandOrder { by, order: Order::Abort };
-            pre_launch::follow(follow, &client, &unit, &abort, args.json).await?
+            pre_launch::follow(follow, &client, unit, &abort, args.json).await?
         }
         _ => answer(&reply, args.json),
     };

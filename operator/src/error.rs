@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use isotherm_bus::BusError;
 use isotherm_cli::Exit;
-use isotherm_protocol::key::{self, UnitIdError};
+use isotherm_protocol::key;
 use isotherm_protocol::pair::{PairReport, Role};
 use isotherm_protocol::status::Status;
 use thiserror::Error;
@@ -104,14 +104,6 @@ pub enum ConsoleError {
         /// Why.
         source: std::io::Error,
     },
-    /// A serial is none.
-    #[error("unit {serial:?} {source}")]
-    Serial {
-        /// What was given.
-        serial: String,
-        /// What is wrong with it.
-        source: UnitIdError,
-    },
     /// There is nobody to ask, and `--yes` was not given.
     #[error("standard input is not a terminal: give --yes to proceed without confirmation, or --dry-run")]
     Unasked,
@@ -163,7 +155,7 @@ impl ConsoleError {
     #[must_use]
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Serial { .. } | Self::Unasked | Self::NoTerminal => Exit::Usage,
+            Self::Unasked | Self::NoTerminal => Exit::Usage,
             Self::Bus(error) => Exit::blaming(error.is_usage(), error.is_configuration()),
             _ => Exit::Failed,
         }

@@ -7,9 +7,9 @@ use isotherm_cli::{Exit, print};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
-use isotherm_protocol::key;
+use isotherm_protocol::key::{self, UnitId};
 
-use super::client::{self, Client, ClientArgs};
+use super::client::{Client, ClientArgs};
 use super::page::{self, of, short};
 use super::status::or_none;
 use super::{ConsoleError, show};
@@ -34,8 +34,8 @@ Examples:
   isotherm history --verify /var/lib/isotherm")]
 pub struct HistoryArgs {
     /// Serial of the unit
-    #[arg(required_unless_present = "verify")]
-    pub unit: Option<String>,
+    #[arg(required_unless_present = "verify", value_parser = UnitId::new)]
+    pub unit: Option<UnitId>,
     /// Verify the chain of the audit files in this state folder, without a service
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["unit", "limit", "all"])]
     pub verify: Option<PathBuf>,
@@ -58,11 +58,12 @@ pub struct HistoryArgs {
 
 /// Prints a unit's history.
 pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
-    let unit = client::unit(args.unit.as_deref().unwrap_or_default())?;
+    // Without one the command line verifies a folder.
+    let Some(unit) = &args.unit else { return Ok(Exit::Usage) };
     let client = Client::open(&args.client).await?;
     // Calibrations stand among the other entries, how far apart nobody knows.
     let parameters = format!("limit={}", if args.all { args.limit } else { MOST_ENTRIES });
-    let mut entries: Vec<AuditEntry> = client.json(&key::history(&unit), &parameters, None).await?;
+    let mut entries: Vec<AuditEntry> = client.json(&key::history(unit), &parameters, None).await?;
     if entries.is_empty() {
         let (statuses, instances) = (client.statuses().await?, or_none(client.pairs().await)?);
         if !statuses.iter().any(|status| status.unit == unit.as_str()) {
@@ -149,20 +150,17 @@ fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
     #[expect(clippy::cast_precision_loss, reason = "at most an hour")]
     let seconds = slew_ms as f64 / 1000.0;
     if schedule != Schedule::NextTick || slew_ms > 0 {
-        words = format!("{words} ({})", show::schedule(schedule, seconds));
+        words = format!("{words} ({})", page::schedule(schedule, seconds));
     }
     words
-}
-
-/// The last part of a path.
-fn file_name(path: &str) -> String {
-    path.rsplit('/').next().unwrap_or(path).to_owned()
 }
 
 /// Where a calibration came from, in words.
 fn source(source: &Source) -> String {
     match source {
-        Source::Folder { path } | Source::Start { path } => file_name(path),
+        Source::Folder { path } | Source::Start { path } => {
+            path.rsplit('/').next().unwrap_or(path).to_owned()
+        }
         Source::Bus => "bus".to_owned(),
         Source::Rollback { to } => format!("rollback to {to}"),
         Source::PreLaunch => "pre-launch".to_owned(),

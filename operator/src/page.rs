@@ -32,7 +32,7 @@ pub use figure::fit;
 pub(crate) use figure::{deg_per_h, of, short};
 pub use pairs::{name, pairs, said as said_of_pairs};
 pub(crate) use remark::schedule;
-pub use remark::{Level, Remark, is_running, knows_rates, state_word};
+pub use remark::{Level, Remark, knows_rates, state_word};
 pub use services::{services, tally};
 pub use sheet::sheet;
 pub use units::{applied, channel_in_view, range, units};

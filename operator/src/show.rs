@@ -3,11 +3,9 @@
 use std::fmt::Write;
 
 use comfy_table::{Table, TableComponent};
-use isotherm_protocol::control::{CorrectionChange, Difference, Schedule};
+use isotherm_protocol::control::{CorrectionChange, Difference};
 use isotherm_protocol::document::Problem;
 use isotherm_protocol::escape::escaped;
-
-use crate::page;
 
 /// A table with a line under its header; columns from `right` on are aligned to the right.
 pub(super) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>, right: usize) -> Table {
@@ -29,15 +27,6 @@ pub(super) fn problem(problem: &Problem, sent: Option<(&str, &str)>) -> String {
     let Some(place) = &problem.file else { return escaped(&problem.message).into_owned() };
     let name = sent.filter(|(key, _)| place == key).map_or(place.as_str(), |(_, name)| name);
     Problem { file: Some(name.to_owned()), ..problem.clone() }.to_string()
-}
-
-/// When a change takes effect, and how long it takes.
-pub(super) fn schedule(schedule: Schedule, slew_s: f64) -> String {
-    let mut words = page::schedule(schedule);
-    if slew_s > 0.0 {
-        let _ = write!(words, ", over {} s", (slew_s * 1e3).round() / 1e3);
-    }
-    words
 }
 
 /// Entries of a document that are shown of those that change.

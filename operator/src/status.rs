@@ -5,6 +5,7 @@ use std::time::SystemTime;
 
 use clap::Args;
 use isotherm_cli::{Exit, print};
+use isotherm_protocol::key::UnitId;
 use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
 use isotherm_protocol::status::Status;
@@ -12,7 +13,7 @@ use ratatui::text::Line;
 use serde::Serialize;
 
 use super::ConsoleError;
-use super::client::{self, Client, ClientArgs};
+use super::client::{Client, ClientArgs};
 use super::page::{self, Unit, tone};
 
 /// Width of a unit's page where no terminal limits it.
@@ -42,8 +43,8 @@ Columns:
   p99      latency added by the service, 99th percentile")]
 pub struct StatusArgs {
     /// Serials: one shows everything about it (default: all units)
-    #[arg(value_name = "UNIT")]
-    pub units: Vec<String>,
+    #[arg(value_name = "UNIT", value_parser = UnitId::new)]
+    pub units: Vec<UnitId>,
     /// Print services and units as JSON on stdout
     #[arg(long)]
     pub json: bool,
@@ -76,9 +77,6 @@ impl Report {
 
 /// Prints how units and services are.
 pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
-    for serial in &args.units {
-        client::unit(serial)?;
-    }
     let client = Client::open(&args.client).await?;
     let (units, services, instances) = tokio::join!(client.statuses(), client.services(), client.pairs());
     let tried = client.tried().to_owned();
@@ -108,15 +106,15 @@ pub(super) fn or_none<T>(answers: Result<Vec<T>, ConsoleError>) -> Result<Vec<T>
 }
 
 /// Keeps the units that were asked for, and their services.
-fn select(report: &mut Report, serials: &[String], tried: &str) -> Result<(), ConsoleError> {
-    if serials.is_empty() {
+fn select(report: &mut Report, units: &[UnitId], tried: &str) -> Result<(), ConsoleError> {
+    if units.is_empty() {
         return Ok(());
     }
-    let known = |serial: &&String| report.units.iter().any(|status| status.unit == **serial);
-    if let Some(unknown) = serials.iter().find(|serial| !known(serial)) {
-        return Err(ConsoleError::unlisted(unknown, tried, &report.units, &report.instances));
+    let known = |unit: &&UnitId| report.units.iter().any(|status| status.unit == unit.as_str());
+    if let Some(unknown) = units.iter().find(|unit| !known(unit)) {
+        return Err(ConsoleError::unlisted(unknown.as_str(), tried, &report.units, &report.instances));
     }
-    report.units.retain(|status| serials.contains(&status.unit));
+    report.units.retain(|status| units.iter().any(|unit| status.unit == unit.as_str()));
     report.services.retain(|service| report.units.iter().any(|status| status.instance == service.instance));
     Ok(())
 }
@@ -190,7 +188,7 @@ mod tests {
             ["ZLG-0002", "ZLG-0004"].map(|unit| samples::instance("south", &[(unit, Role::Standby)]));
         let alone = PairReport { others: Vec::new(), ..instances[0].clone() };
         let mut report = Report { services, units, instances: vec![alone, instances[1].clone()] };
-        let serial = |serial: &str| [serial.to_owned()];
+        let serial = |serial: &str| [UnitId::new(serial).unwrap()];
         let refused = |report: &mut Report, unit| {
             let error = select(report, &serial(unit), "here").unwrap_err().to_string();
             report.units.retain(|status| !["ZLG-0002", "ZLG-0004"].contains(&&*status.unit));

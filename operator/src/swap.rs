@@ -12,7 +12,7 @@ use super::ConsoleError;
 use super::client::{self, Client, ClientArgs};
 use super::command::give;
 use super::follow::Follow;
-use super::page::{of, short};
+use super::page::{of, schedule, short};
 use super::show;
 
 /// Arguments of `swap`.
@@ -27,7 +27,8 @@ First prints the difference from the document in force: every entry that changes
 unit's present temperatures. Exit codes: 0 in force or scheduled, 78 refused, 1 not answered or not confirmed.")]
 pub struct SwapArgs {
     /// Serial of the unit
-    pub unit: String,
+    #[arg(value_parser = UnitId::new)]
+    pub unit: UnitId,
     /// Calibration document or overlay (TOML); - for standard input
     pub file: PathBuf,
     /// First tick, by sequence number (default: the next tick)
@@ -61,7 +62,8 @@ Examples:
   isotherm rollback ZLG-0001 --to 3 --yes")]
 pub struct RollbackArgs {
     /// Serial of the unit
-    pub unit: String,
+    #[arg(value_parser = UnitId::new)]
+    pub unit: UnitId,
     /// Revision to go back to (default: the previous one; `isotherm history` lists them)
     #[arg(long, value_name = "REVISION")]
     pub to: Option<u64>,
@@ -148,16 +150,15 @@ pub(super) async fn rollback(args: &RollbackArgs) -> Result<Exit, ConsoleError> 
 
 /// Shows what would change, asks, has it changed, and waits until it is.
 async fn change(
-    serial: &str,
+    unit: &UnitId,
     wish: &Wish,
     name: Option<&str>,
     consent: &Consent,
     client: &ClientArgs,
 ) -> Result<Exit, ConsoleError> {
-    let unit = client::unit(serial)?;
     let client = Client::open(client).await?;
-    let preview = wish.ask(&client, &unit, true).await?;
-    let key = key::calibration(&unit);
+    let preview = wish.ask(&client, unit, true).await?;
+    let key = key::calibration(unit);
     let sent = name.map(|name| (key.as_str(), name));
     tell(&preview, sent);
     // An order that will be refused is given too, where nobody needs to be asked: history and alerts know of it.
@@ -167,11 +168,11 @@ async fn change(
         return Ok(result(&preview, consent.json));
     }
     if !consent.yes {
-        confirm(serial, &preview)?;
+        confirm(unit, &preview)?;
     }
     // Before the order is given, so that its effect cannot come before the watch begins.
-    let mut follow = Follow::start(&client, &unit).await?;
-    let reply = wish.ask(&client, &unit, false).await?;
+    let mut follow = Follow::start(&client, unit).await?;
+    let reply = wish.ask(&client, unit, false).await?;
     if reply.outcome == SwapOutcome::Accepted {
         say(wait(&mut follow, &reply, client.timeout).await);
     } else if !is_refused {
@@ -223,22 +224,22 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
             "{}: accepted as revision {} ({digest}), {}\n",
             reply.unit,
             reply.revision,
-            show::schedule(reply.schedule, reply.slew_s)
+            schedule(reply.schedule, reply.slew_s)
         ),
     };
     print(&line, exit)
 }
 
 /// Asks whether to go on.
-fn confirm(serial: &str, preview: &SwapReply) -> Result<(), ConsoleError> {
+fn confirm(unit: &UnitId, preview: &SwapReply) -> Result<(), ConsoleError> {
     if !std::io::stdin().is_terminal() {
         return Err(ConsoleError::Unasked);
     }
     let mut stderr = std::io::stderr();
     // Where the question cannot be written, nobody has read it.
     let question = match preview.revision {
-        0 => format!("Give {serial} its first calibration?"),
-        revision => format!("Replace revision {revision} of {serial}?"),
+        0 => format!("Give {unit} its first calibration?"),
+        revision => format!("Replace revision {revision} of {unit}?"),
     };
     write!(stderr, "{question} [y/N] ").and_then(|()| stderr.flush()).map_err(ConsoleError::Terminal)?;
     let mut answer = String::new();
@@ -252,15 +253,21 @@ fn confirm(serial: &str, preview: &SwapReply) -> Result<(), ConsoleError> {
 
 /// Waits until the unit says that the revision is in force, or that it waits for its tick; in words.
 async fn wait(follow: &mut Follow, reply: &SwapReply, timeout: std::time::Duration) -> String {
-    let revision = reply.revision;
+    let (revision, is_known) = (reply.revision, follow.first.is_some());
     let seen = follow.until(timeout, |status| {
         if status.revision().counter >= revision {
             return Some(format!("revision {} is in force", status.revision().counter));
         }
         let pending = status.pending.as_ref().filter(|pending| pending.revision.counter == revision)?;
-        Some(format!("revision {revision} waits: {}", show::schedule(pending.schedule, pending.slew_s)))
+        Some(format!("revision {revision} waits: {}", schedule(pending.schedule, pending.slew_s)))
     });
     seen.await.unwrap_or_else(|| {
+        if is_known {
+            return format!(
+                "{} has sent no status since: isotherm status shows when revision {revision} is in force",
+                reply.unit
+            );
+        }
         format!("{} has not appeared yet: revision {revision} is in force from its first tick on", reply.unit)
     })
 }

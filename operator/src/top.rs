@@ -17,10 +17,10 @@ use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{MissedTickBehavior, interval};
 
-use isotherm_cli::Exit;
+use isotherm_cli::{Exit, duration};
 
 use super::ConsoleError;
-use super::client::{Client, ClientArgs, seconds};
+use super::client::{Client, ClientArgs};
 use super::status::unix_ms;
 pub use feed::Feed;
 pub use fleet::Fleet;
@@ -39,7 +39,7 @@ One line per unit, as in `isotherm status`; `isotherm status --help` explains th
 shows everything about a unit, s sorts, / filters, ? helps, q quits.")]
 pub struct TopArgs {
     /// Time between two updates (s)
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds(60.0))]
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = duration(0.1..=60.0))]
     pub interval: Duration,
     /// How to reach the service
     #[command(flatten)]

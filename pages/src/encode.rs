@@ -78,16 +78,20 @@ impl Store {
         json!({ "list": self.add("f64", &list.iter().map(|value| value.to_le_bytes())) })
     }
 
-    /// Values as their distances from a middle one, each to 2·10⁻⁶ of itself: what is left of single precision without its last
-    /// four bits, which would be noise that does not compress.
+    /// Values as their distances from their median, each to 2·10⁻⁶ of itself: what is left of single precision without its last
+    /// four bits, which would be noise that does not compress. A spike, however high, takes nothing from the others' precision.
     fn values(&mut self, list: &[f64]) -> Value {
-        let finite = || list.iter().copied().filter(|value| value.is_finite());
-        let (low, high) = (finite().fold(f64::MAX, f64::min), finite().fold(f64::MIN, f64::max));
-        let middle = if low <= high { 0.5 * low + 0.5 * high } else { 0.0 };
+        let mut finite: Vec<f64> = list.iter().copied().filter(|value| value.is_finite()).collect();
+        let half = finite.len() / 2;
+        let middle =
+            if finite.is_empty() { 0.0 } else { *finite.select_nth_unstable_by(half, f64::total_cmp).1 };
         // Whatever is no finite number is a gap.
         let distance = |value: &f64| if value.is_finite() { value - middle } else { f64::NAN };
         #[expect(clippy::cast_possible_truncation, reason = "single precision is what is wanted")]
-        let short = |value| f32::from_bits((distance(value) as f32).to_bits() & !0xf);
+        let short = |value| {
+            let near = (distance(value) as f32).clamp(f32::MIN, f32::MAX);
+            f32::from_bits(near.to_bits() & !0xf)
+        };
         let values = list.iter().map(|value| short(value).to_le_bytes());
         json!({ "list": self.add("f32", &values), "middle": middle })
     }
@@ -112,5 +116,31 @@ impl Store {
             self.lists.push(list);
             self.lists.len() - 1
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+
+    use super::*;
+
+    #[test]
+    fn a_spike_takes_nothing_from_the_values_beside_it() {
+        let values = [9.8065, 9.8066, 1e300, 9.8067, f64::NAN, -1e12, 9.8068];
+        let mut store = Store::default();
+        let middle = store.values(&values)["middle"].as_f64().unwrap();
+        let packed = Base64Unpadded::decode_vec(&store.lists[0].1).unwrap();
+        let mut planes = Vec::new();
+        flate2::read::ZlibDecoder::new(&packed[..]).read_to_end(&mut planes).unwrap();
+        let count = values.len();
+        let back = |place| {
+            let bytes: [u8; 4] = std::array::from_fn(|byte| planes[byte * count + place]);
+            f64::from(f32::from_le_bytes(bytes)) + middle
+        };
+        for place in [0, 1, 3, 6] {
+            assert!((back(place) - values[place]).abs() < 1e-9, "{} for {}", back(place), values[place]);
+        }
+        assert!(back(4).is_nan() && back(2).is_finite() && back(2) > 1e38 && back(5) < -0.99e12);
     }
 }

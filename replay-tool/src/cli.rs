@@ -16,8 +16,12 @@ mod show;
 mod simulate;
 mod step;
 
+use std::io::Write;
+use std::path::Path;
+
 use clap::{Parser, Subcommand};
-use isotherm_cli::{Common, Exit, failed_lines, parse, to_stdout};
+use isotherm_cli::{Common, Exit, coloured, failed_lines, parse};
+use isotherm_log::file::{refuse_overwriting, refuse_replacing};
 
 use crate::error::Error;
 use crate::stop::without_traces;
@@ -77,13 +81,32 @@ fn run(cli: Cli) -> Result<Exit, Error> {
     }
 }
 
-/// Writes to standard output; a reader that has gone away is no error.
-fn print(text: &[u8]) -> Result<(), Error> {
-    to_stdout(text).map_err(Error::Stdout)
+/// Writes one of many results; what nobody reads any more ends the command.
+fn put(stdout: &mut impl Write, text: &str) -> Result<(), Error> {
+    stdout.write_all(coloured(text).as_bytes()).map_err(Error::Stdout)
+}
+
+/// Refuses outputs that would fall on an input or on one another, and those that are there already unless they may be replaced.
+fn check_outputs<'a>(
+    outputs: impl IntoIterator<Item = &'a Path>,
+    inputs: impl IntoIterator<Item = &'a Path>,
+    overwrite: bool,
+) -> Result<(), Error> {
+    let mut others: Vec<_> = inputs.into_iter().collect();
+    for output in outputs {
+        refuse_overwriting(output, &others)?;
+        refuse_replacing(output, overwrite)?;
+        others.push(output);
+    }
+    Ok(())
 }
 
 /// Runs the program and says how it ended.
 #[must_use]
 pub fn main() -> Exit {
-    run(parse()).unwrap_or_else(|error| failed_lines(&error, error.exit()))
+    match run(parse()) {
+        Ok(exit) => exit,
+        Err(error) if error.is_reader_gone() => Exit::Ok,
+        Err(error) => failed_lines(&error, error.exit()),
+    }
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use isotherm_bus::BusError;
 use isotherm_cli::Exit;
-use isotherm_log::text::LogError;
 use thiserror::Error;
 
 /// Why a command ended early.
@@ -57,6 +56,16 @@ impl Error {
         isotherm_log::error::Error::file(path, action, source).into()
     }
 
+    /// Whether whoever read the results has gone away, as `head` does: who does has what was wanted.
+    pub(crate) fn is_reader_gone(&self) -> bool {
+        match self {
+            Self::Stdout(source) | Self::Log(isotherm_log::error::Error::File { source, .. }) => {
+                source.kind() == io::ErrorKind::BrokenPipe
+            }
+            _ => false,
+        }
+    }
+
     /// The exit code that this error stands for.
     #[must_use]
     pub fn exit(&self) -> Exit {
@@ -67,11 +76,5 @@ impl Error {
             Self::Scenario(_) => Exit::BadConfiguration,
             _ => Exit::Failed,
         }
-    }
-}
-
-impl From<LogError> for Error {
-    fn from(error: LogError) -> Self {
-        isotherm_log::error::Error::Log(error).into()
     }
 }

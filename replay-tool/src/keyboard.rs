@@ -13,13 +13,13 @@ use tokio::sync::mpsc::UnboundedSender;
 use crate::play::Command;
 
 /// What the keys do, in a line.
-pub const KEYS: &str = "space pause · n or → step · + - speed · ← → or [ ] seek 10 s · q quit";
+pub(crate) const KEYS: &str = "space pause · n or → step · + - speed · ← → or [ ] seek 10 s · q quit";
 /// How long the end of listening may take.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Listens to the keyboard. While it does, the terminal gives out every key at once; dropped, it is as it was.
 #[derive(Debug)]
-pub struct Keyboard {
+pub(crate) struct Keyboard {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -27,7 +27,7 @@ pub struct Keyboard {
 impl Keyboard {
     /// Begins to listen; `None` where nobody sits there: input or standard error is no terminal.
     #[must_use]
-    pub fn listen(commands: UnboundedSender<Command>) -> Option<Self> {
+    pub(crate) fn listen(commands: UnboundedSender<Command>) -> Option<Self> {
         if !(stdin().is_terminal() && stderr().is_terminal()) {
             return None;
         }

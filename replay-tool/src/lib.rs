@@ -4,17 +4,17 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`play`], [`pace`] | a log to the raw topics, at a speed |
-//! | [`keyboard`] | keys pressed meanwhile |
-//! | [`record`] | what is on the bus to recordings |
+//! | `play`, `pace` | a log to the raw topics, at a speed |
+//! | `keyboard` | keys pressed meanwhile |
+//! | `record` | what is on the bus to recordings |
 //! | [`simulated`] | a scenario as a text log |
 //! | [`error`], [`cli`] | what can go wrong; the command line |
 
 pub mod cli;
 pub mod error;
-pub mod keyboard;
-pub mod pace;
-pub mod play;
-pub mod record;
+mod keyboard;
+mod pace;
+mod play;
+mod record;
 pub mod simulated;
 mod stop;

@@ -9,13 +9,13 @@ use serde::Serialize;
 use tokio::time::Instant;
 
 /// A message that goes out later than this has missed its deadline.
-pub const DEADLINE: Duration = Duration::from_millis(5);
+pub(crate) const DEADLINE: Duration = Duration::from_millis(5);
 /// Slowest and fastest.
 const RANGE: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// How fast a log is played.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Speed {
+pub(crate) enum Speed {
     /// This many times as fast as it was recorded.
     Times(f64),
     /// As fast as the service keeps up.
@@ -25,7 +25,7 @@ pub enum Speed {
 impl Speed {
     /// Twice as fast; from 1024 on, as fast as the service keeps up.
     #[must_use]
-    pub fn faster(self) -> Self {
+    pub(crate) fn faster(self) -> Self {
         match self {
             Self::Times(times) if times < 1024.0 => Self::Times(times * 2.0),
             _ => Self::Max,
@@ -34,7 +34,7 @@ impl Speed {
 
     /// Half as fast.
     #[must_use]
-    pub fn slower(self) -> Self {
+    pub(crate) fn slower(self) -> Self {
         match self {
             Self::Times(times) => Self::Times((times / 2.0).max(*RANGE.start())),
             Self::Max => Self::Times(1024.0),
@@ -68,7 +68,7 @@ impl fmt::Display for Speed {
 
 /// Says when a message is due. Every deadline follows from one origin, so that nothing adds up.
 #[derive(Debug)]
-pub struct Pacer {
+pub(crate) struct Pacer {
     /// How fast.
     speed: Speed,
     /// When a message was due, and its time in the log (ns).
@@ -80,36 +80,36 @@ pub struct Pacer {
 impl Pacer {
     /// Nothing is due yet.
     #[must_use]
-    pub fn new(speed: Speed) -> Self {
+    pub(crate) fn new(speed: Speed) -> Self {
         Self { speed, origin: None, late: Late::default() }
     }
 
     /// How fast.
     #[must_use]
-    pub fn speed(&self) -> Speed {
+    pub(crate) fn speed(&self) -> Speed {
         self.speed
     }
 
     /// Goes on at another speed.
-    pub fn set_speed(&mut self, speed: Speed) {
+    pub(crate) fn set_speed(&mut self, speed: Speed) {
         self.speed = speed;
         self.restart();
     }
 
     /// The next message is due at once, and the others after it.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.origin = None;
     }
 
     /// Everything is due this much later.
-    pub fn hold(&mut self, duration: Duration) {
+    pub(crate) fn hold(&mut self, duration: Duration) {
         if let Some((begun, _)) = &mut self.origin {
             *begun += duration;
         }
     }
 
     /// When a message of this time in the log (ns) is due; `None` is at once, at any time.
-    pub fn due(&mut self, at_ns: i64) -> Option<Instant> {
+    pub(crate) fn due(&mut self, at_ns: i64) -> Option<Instant> {
         let Speed::Times(times) = self.speed else { return None };
         let (begun, first) = *self.origin.get_or_insert_with(|| (Instant::now(), at_ns));
         #[expect(clippy::cast_precision_loss, reason = "exact below 100 days, and no result rests on it")]
@@ -118,7 +118,7 @@ impl Pacer {
     }
 
     /// Notes that a message goes out now.
-    pub fn note(&mut self, due: Option<Instant>) {
+    pub(crate) fn note(&mut self, due: Option<Instant>) {
         if let Some(due) = due {
             self.late.note(due.elapsed());
         }
@@ -127,19 +127,19 @@ impl Pacer {
 
 /// How late messages went out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Lateness {
+pub(crate) struct Lateness {
     /// Messages that were due at a moment.
-    pub messages: u64,
+    pub(crate) messages: u64,
     /// What counts as too late (ms).
-    pub deadline_ms: f64,
+    pub(crate) deadline_ms: f64,
     /// Messages that went out later than that.
-    pub misses: u64,
+    pub(crate) misses: u64,
     /// Half of them were not later than this (ms).
-    pub p50_ms: f64,
+    pub(crate) p50_ms: f64,
     /// 99 % of them were not later than this (ms).
-    pub p99_ms: f64,
+    pub(crate) p99_ms: f64,
     /// The latest (ms).
-    pub max_ms: f64,
+    pub(crate) max_ms: f64,
 }
 
 /// Counts latenesses.

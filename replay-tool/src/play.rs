@@ -3,6 +3,7 @@
 mod player;
 mod playlist;
 mod report;
+mod screen;
 mod silence;
 mod units;
 
@@ -28,49 +29,50 @@ use crate::stop::Stop;
 use player::Player;
 pub(crate) use playlist::wanted;
 
-pub use report::{Counts, PlayReport, Position, Returned, UnitReport};
+pub(crate) use report::{PlayReport, UnitReport};
+pub(crate) use screen::Screen;
 
 /// How long a session may take to close.
 const CLOSE_LIMIT: Duration = Duration::from_secs(5);
 
 /// What is played, and how.
 #[derive(Debug, Clone)]
-pub struct PlayOptions {
+pub(crate) struct PlayOptions {
     /// The log.
-    pub files: LogFiles,
+    pub(crate) files: LogFiles,
     /// Which part of it.
-    pub part: Part,
+    pub(crate) part: Part,
     /// Keys of the messages that are taken, any of them; all where there is none.
-    pub topics: Vec<OwnedKeyExpr>,
+    pub(crate) topics: Vec<OwnedKeyExpr>,
     /// By which clock.
-    pub clock: Clock,
+    pub(crate) clock: Clock,
     /// How fast.
-    pub speed: Speed,
+    pub(crate) speed: Speed,
     /// How often the part is played; `None` is for ever.
-    pub passes: Option<u64>,
+    pub(crate) passes: Option<u64>,
     /// Units that are played as others: serial in the log, serial on the bus.
-    pub names: BTreeMap<UnitId, UnitId>,
+    pub(crate) names: BTreeMap<UnitId, UnitId>,
     /// Each unit is played as so many, `SERIAL-001` and so on; `None` is as itself.
-    pub copies: Option<u32>,
+    pub(crate) copies: Option<u32>,
     /// What happens to messages on their way.
-    pub faults: FaultOptions,
+    pub(crate) faults: FaultOptions,
     /// Where all chance comes from.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Number of the first series; `None` is one that no player had before.
-    pub series: Option<u64>,
+    pub(crate) series: Option<u64>,
     /// What the instruments of a text log are to report of themselves, once a second of event time.
-    pub health: Vec<HealthReading>,
+    pub(crate) health: Vec<HealthReading>,
     /// How the session is opened.
-    pub session: ClientOptions,
+    pub(crate) session: ClientOptions,
     /// How long to wait for service and subscribers, and for what comes back.
-    pub wait: Duration,
+    pub(crate) wait: Duration,
     /// Whether and how far playing is bounded by what comes back.
-    pub acknowledge: Acknowledge,
+    pub(crate) acknowledge: Acknowledge,
 }
 
 /// Whether and how far playing is bounded by what comes back corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Acknowledge {
+pub(crate) enum Acknowledge {
     /// Not at all: for listeners other than the service.
     No,
     /// At most so many gyro ticks of a unit are sent and not come back; `None` is by the number of units.
@@ -79,7 +81,7 @@ pub enum Acknowledge {
 
 /// What somebody at the keyboard asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Command {
+pub(crate) enum Command {
     /// Pause, or go on.
     Pause,
     /// Pause, and play up to the next gyro batch.
@@ -98,33 +100,25 @@ pub enum Command {
     Stop,
 }
 
-/// Whoever watches.
-pub trait Watch {
-    /// Where playing is; told now and then.
-    fn at(&self, position: &Position);
-    /// Something that must be said now.
-    fn say(&self, words: &str);
-}
-
 /// What playing came to.
 #[derive(Debug)]
-pub struct Played {
+pub(crate) struct Played {
     /// What was sent, and what became of it.
-    pub report: PlayReport,
+    pub(crate) report: PlayReport,
     /// What reading the log came to.
-    pub log: LogReport,
+    pub(crate) log: LogReport,
     /// Why it ended before the log did: a signal, a log that cannot be read on, a service that has gone.
-    pub ended: Result<(), Error>,
+    pub(crate) ended: Result<(), Error>,
 }
 
 /// Plays a log.
 ///
 /// # Errors
 /// [`Error::Log`] for a log that cannot be opened, [`Error::Bus`] where no session can be, or the service is missing.
-pub async fn play(
+pub(crate) async fn play(
     options: &PlayOptions,
     commands: UnboundedReceiver<Command>,
-    watch: &impl Watch,
+    screen: &Screen,
 ) -> Result<Played, Error> {
     // From here on a signal ends in order.
     let mut stop = Stop::on(&[SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()])?;
@@ -132,15 +126,15 @@ pub async fn play(
     let opened = tokio::select! {
         biased;
         () = stop.asked() => return Err(Error::Stopped),
-        session = way.open_patiently(options.wait, |words| watch.say(words)) => session?,
+        session = way.open_patiently(options.wait, |words| screen.say(words)) => session?,
     };
     let played = {
-        let mut player = Player::new(&opened, options, commands, watch)?;
+        let mut player = Player::new(&opened, options, commands, screen)?;
         let tried = way.tried();
         let ended = tokio::select! {
             biased;
             () = stop.asked() => Err(Error::Stopped),
-            ended = run(&opened, &tried, options, &mut player, watch) => ended,
+            ended = run(&opened, &tried, options, &mut player, screen) => ended,
         };
         let mut report = player.report(ended.is_err());
         if report.units.iter().any(UnitReport::is_doubled) {
@@ -161,12 +155,12 @@ pub async fn play(
 }
 
 /// Plays while the service is there.
-async fn run<W: Watch>(
+async fn run(
     session: &zenoh::Session,
     tried: &str,
     options: &PlayOptions,
-    player: &mut Player<'_, W>,
-    watch: &W,
+    player: &mut Player<'_>,
+    screen: &Screen,
 ) -> Result<(), Error> {
     if options.acknowledge == Acknowledge::No {
         return player.run().await;
@@ -184,6 +178,6 @@ async fn run<W: Watch>(
         () = service.gone() => {
             Err(BusError::ServiceGone { tried: tried.to_owned() }.into())
         }
-        never = silence::watch(session, &under_way, watch) => match never {},
+        never = silence::watch(session, &under_way, screen) => match never {},
     }
 }

@@ -15,7 +15,7 @@ mod told;
 mod topics;
 mod writer;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -40,10 +40,10 @@ use report::{fill, finish};
 use services::{await_service, follow_services, note, open, start_asker};
 use writer::{FileWriter, Told};
 
-pub use queue::TopicCount;
-pub use report::{Done, EndedBy, RecordReport};
-pub use topics::{TopicFilter, is_first, key_expressions};
-pub use writer::Bounds;
+pub(crate) use queue::TopicCount;
+pub(crate) use report::{EndedBy, RecordReport};
+pub(crate) use topics::{TopicFilter, is_first, key_expressions};
+pub(crate) use writer::Bounds;
 
 /// How often the figures are shown.
 const WATCH_INTERVAL: Duration = Duration::from_millis(250);
@@ -59,7 +59,7 @@ const SIGXFSZ: SignalKind = SignalKind::from_raw(25);
 
 /// Whether a service is needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ServiceWait {
+pub(crate) enum ServiceWait {
     /// No: only what comes is recorded.
     Without,
     /// It must answer within this time.
@@ -70,31 +70,31 @@ pub enum ServiceWait {
 
 /// What is recorded, and how.
 #[derive(Debug, Clone)]
-pub struct RecordOptions {
+pub(crate) struct RecordOptions {
     /// Where it is written to; with rotation, `-0001` and so on is added to the name.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// How the session is opened.
-    pub session: ClientOptions,
+    pub(crate) session: ClientOptions,
     /// Units to record; all where none is given.
-    pub units: Vec<UnitId>,
+    pub(crate) units: Vec<UnitId>,
     /// Topics to record; every kind where none is given.
-    pub topics: Vec<TopicFilter>,
+    pub(crate) topics: Vec<TopicFilter>,
     /// Whether a service is needed.
-    pub service: ServiceWait,
+    pub(crate) service: ServiceWait,
     /// How long a query may take.
-    pub query_limit: Duration,
+    pub(crate) query_limit: Duration,
     /// How long is recorded; until it is stopped where not given.
-    pub duration: Option<Duration>,
+    pub(crate) duration: Option<Duration>,
     /// Whether recording ends with the last service.
-    pub until_service_stops: bool,
+    pub(crate) until_service_stops: bool,
     /// How files are written.
-    pub writing: RecordingOptions,
+    pub(crate) writing: RecordingOptions,
     /// When chunks and files end.
-    pub bounds: Bounds,
+    pub(crate) bounds: Bounds,
     /// How many files of a row are kept.
-    pub keep: Option<usize>,
+    pub(crate) keep: Option<usize>,
     /// What may wait to be written (bytes).
-    pub queue_bytes: u64,
+    pub(crate) queue_bytes: u64,
 }
 
 /// Records until it is told to stop.
@@ -104,8 +104,8 @@ pub struct RecordOptions {
 /// # Errors
 /// [`Error::Usage`] and [`Error::Log`] where the file cannot be begun, [`Error::Bus`] where the session cannot be opened or
 /// no service answers, [`Error::Stopped`] where it was stopped before it began. A disk that is full later is no error: see
-/// [`Done::failure`].
-pub async fn record(
+/// [`report::Done::failure`].
+pub(crate) async fn record(
     options: &RecordOptions,
     mut watch: impl FnMut(&RecordReport),
 ) -> Result<RecordReport, Error> {
@@ -217,11 +217,8 @@ async fn on_session(
     }
     fill(&mut report, &queue, begun);
     let lost_thread = || Error::Runtime(std::io::Error::other("the writing thread has ended"));
-    finish(
-        &mut report,
-        done.ok().and_then(Result::ok).ok_or_else(lost_thread)?,
-        options.service != ServiceWait::Without,
-    );
+    let done = done.ok().and_then(Result::ok).ok_or_else(lost_thread)?;
+    finish(&mut report, done, options.service != ServiceWait::Without);
     Ok(report)
 }
 
@@ -277,21 +274,18 @@ impl Silence {
 }
 
 /// What a recording says of how it was made; nothing of the computer that it was made on.
-fn described(options: &RecordOptions) -> BTreeMap<String, String> {
+fn described(options: &RecordOptions) -> Vec<(&'static str, String)> {
     let join = |texts: Vec<String>| if texts.is_empty() { "all".to_owned() } else { texts.join(" ") };
     let topics = key_expressions(&options.topics, &options.units).iter().map(ToString::to_string).collect();
-    let mut described = BTreeMap::from([
-        ("compression".to_owned(), if options.writing.compress { "zstd" } else { "none" }.to_owned()),
-        ("chunk_s".to_owned(), options.bounds.chunk.as_secs_f64().to_string()),
-        ("units".to_owned(), join(options.units.iter().map(ToString::to_string).collect())),
-        ("topics".to_owned(), join(topics)),
-        ("with_service".to_owned(), (options.service != ServiceWait::Without).to_string()),
-    ]);
-    if let Some(bytes) = options.bounds.file_bytes {
-        described.insert("max_size_bytes".to_owned(), bytes.to_string());
-    }
-    if let Some(time) = options.bounds.file_time {
-        described.insert("max_duration_s".to_owned(), time.as_secs_f64().to_string());
-    }
+    let Bounds { chunk, file_bytes, file_time } = options.bounds;
+    let mut described = vec![
+        ("compression", if options.writing.compress { "zstd" } else { "none" }.to_owned()),
+        ("chunk_s", chunk.as_secs_f64().to_string()),
+        ("units", join(options.units.iter().map(ToString::to_string).collect())),
+        ("topics", join(topics)),
+        ("with_service", (options.service != ServiceWait::Without).to_string()),
+    ];
+    described.extend(file_bytes.map(|bytes| ("max_size_bytes", bytes.to_string())));
+    described.extend(file_time.map(|time| ("max_duration_s", time.as_secs_f64().to_string())));
     described
 }

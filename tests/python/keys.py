@@ -115,6 +115,21 @@ check(summary["seeks"] == 4 and unit["runs"] == 3 and unit["restarts"] == 2, sum
 check(unit["ticks_not_sent"] == unit["ticks_announced_missing"] > 1900, summary)
 check(unit["ticks_lost"] == 0, summary)
 
+# On by 10 s within a gap of 30 s: what stands behind it first goes out too.
+with open(LOG) as log:
+    lines = log.readlines()
+whole, LOG = LOG, LOG.replace(".csv", "-gap.csv")
+with open(LOG, "w") as log:
+    log.writelines(lines[:101] + lines[3101:3201])
+player = Player()
+player.until(r"0\.9\d s  ")
+time.sleep(0.5)
+player.press(RIGHT)
+summary = player.end(0)
+check(summary["seeks"] == 1 and summary["ticks_sent"] == 199, summary)
+check(summary["temperature_readings_sent"] == 16, summary)
+LOG = whole
+
 # Ctrl-C, and signals of others, also while playing is paused.
 for stop in (b"\x03", signal.SIGTERM, signal.SIGINT):
     player = Player()

@@ -6,13 +6,13 @@ use isotherm_protocol::codec;
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
 use isotherm_protocol::key::UnitId;
-use isotherm_protocol::stream::UnitStream;
+use isotherm_protocol::stream::{UnitStream, unfit};
 use serde::Serialize;
 
-use super::counters;
 use super::published::{Published, RawEnd};
 use super::rows::{write_frame, write_tick};
 use super::sums::{Summary, Sums};
+use super::{counters, troubles};
 use crate::diff::{Account, Comparison, DiffOptions, LogTick, Side};
 use crate::message::{Message, Topic};
 use crate::replica::{Changes, Done, Outline, Replica, ReplicaReport, entry_words};
@@ -78,7 +78,7 @@ pub struct Output {
 
 impl Output {
     /// Takes what is ready, as rows or frames; `frame` is a place to make them in.
-    pub fn give_out(&mut self, stream: &mut UnitStream, form: Form, frame: &mut Vec<u8>) {
+    fn give_out(&mut self, stream: &mut UnitStream, form: Form, frame: &mut Vec<u8>) {
         // Writing to a vector does not fail.
         if form == Form::Wire {
             while stream.next_frame(frame).is_some() {
@@ -104,6 +104,9 @@ pub struct UnitReport {
     pub summary: Summary,
     /// Counters of the unit that are not zero.
     pub counters: std::collections::BTreeMap<String, u64>,
+    /// What the unit has refused or passed over, in words, where no journal says what the service did.
+    #[serde(skip)]
+    pub troubles: Vec<String>,
     /// What became of the journal.
     pub replica: ReplicaReport,
     /// How the ticks compare with those that the service published.
@@ -114,7 +117,19 @@ impl UnitReport {
     /// Whether anything was lost, or is other than the service had it.
     #[must_use]
     pub fn lost_data(&self) -> bool {
-        !self.replica.is_exact() || self.published.as_ref().is_some_and(|account| !account.agrees())
+        // What the service refused too is no loss here.
+        let is_unfit =
+            !self.by_journal && unfit::COUNTERS.iter().any(|name| self.counters.contains_key(*name));
+        (is_unfit && self.unanswered() > 0)
+            || !self.replica.is_exact()
+            || self.published.as_ref().is_some_and(|account| !account.agrees())
+    }
+
+    /// Gyro ticks that went in and did not come out, those among them that came twice or too late.
+    #[must_use]
+    pub fn unanswered(&self) -> u64 {
+        let count = |name: &str| self.counters.get(name).copied().unwrap_or(0);
+        count("gyro_ticks_in").saturating_sub(count("ticks_out"))
     }
 }
 
@@ -226,6 +241,11 @@ impl UnitWork {
             by_journal: self.by_journal,
             summary: self.taker.sums.summary(),
             counters: self.replica.stream().into_iter().flat_map(counters).collect(),
+            troubles: self
+                .replica
+                .stream()
+                .filter(|_| !self.by_journal)
+                .map_or_else(Vec::new, |s| troubles(s, 0)),
             replica: self.replica.report().clone(),
             published: self.taker.comparison.map(|comparison| {
                 comparison.finish_with(|end_time| self.raw_end.reaches(end_time, self.taker.made))

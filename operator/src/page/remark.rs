@@ -52,7 +52,7 @@ impl Level {
             Self::Fault => ("!", self.style()),
             Self::Gone => ("×", self.style()),
             Self::Warning => ("▲", self.style()),
-            _ if is_running(state) => ("●", tone::GOOD),
+            _ if state.is_running() => ("●", tone::GOOD),
             _ => ("○", tone::DIM),
         }
     }
@@ -77,12 +77,6 @@ pub fn state_word(state: State) -> &'static str {
         State::RunningWithReversal => "running ±",
         State::RunningWithoutReversal => "running",
     }
-}
-
-/// Whether increments are to go out.
-#[must_use]
-pub fn is_running(state: State) -> bool {
-    matches!(state, State::RunningWithReversal | State::RunningWithoutReversal)
 }
 
 /// Rates are not measured by services before 0.2, which do not name themselves either.
@@ -154,7 +148,7 @@ fn flow(unit: &Unit<'_>, add: &mut impl FnMut(Level, String)) {
         Output::Held => add(Level::Warning, "no calibration: nothing is published".to_owned()),
     }
     if knows_rates(status) && status.input_rates.gyro_ticks_per_s == 0.0 && unit.gone.is_none() {
-        let level = if is_running(status.state) { Level::Warning } else { Level::Note };
+        let level = if status.state.is_running() { Level::Warning } else { Level::Note };
         add(level, "no raw ticks arrive".to_owned());
     }
     let grown = [
@@ -222,7 +216,7 @@ fn work(status: &Status, add: &mut impl FnMut(Level, String)) {
     }
     if let Some(pending) = &status.pending {
         let counter = pending.revision.counter;
-        add(Level::Note, format!("revision {counter} waits: {}", schedule(pending.schedule)));
+        add(Level::Note, format!("revision {counter} waits: {}", schedule(pending.schedule, 0.0)));
     }
     match &status.rest {
         Some(Rest::Moved(words)) => add(Level::Note, format!("not at rest: {words}")),
@@ -230,12 +224,14 @@ fn work(status: &Status, add: &mut impl FnMut(Level, String)) {
     }
 }
 
-/// When a change takes effect.
-pub(crate) fn schedule(schedule: Schedule) -> String {
+/// When a change takes effect, and how long it takes.
+pub(crate) fn schedule(schedule: Schedule, slew_s: f64) -> String {
+    let slew =
+        if slew_s > 0.0 { format!(", over {} s", (slew_s * 1e3).round() / 1e3) } else { String::new() };
     match schedule {
-        Schedule::NextTick => "from the next tick on".to_owned(),
-        Schedule::Sequence(sequence) => format!("from tick {sequence} on"),
-        Schedule::TimeNs(time_ns) => format!("from the first tick that ends at {time_ns} ns or later"),
+        Schedule::NextTick => format!("from the next tick on{slew}"),
+        Schedule::Sequence(sequence) => format!("from tick {sequence} on{slew}"),
+        Schedule::TimeNs(time_ns) => format!("from the first tick that ends at {time_ns} ns or later{slew}"),
     }
 }
 

@@ -15,7 +15,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Widget};
 
-use super::figure::{fit, frequency, width, wrap};
+use super::figure::{fit, fit_middle, frequency, width, wrap};
 use super::grid::{Column, Grid, drawn};
 use super::pairs::{name, of_unit};
 use super::remark::{Level, knows_rates};
@@ -139,13 +139,18 @@ fn title(unit: &Unit<'_>, columns: usize) -> Vec<Line<'static>> {
     let status = unit.status;
     let level = unit.level();
     let (mark, style) = level.mark(status.state);
-    let name = operation(status);
-    let serial = fit(&status.unit, columns.saturating_sub(4 + width(name)));
-    let mut lines = vec![Line::from_iter([
-        Span::styled(format!("{mark} "), style),
-        Span::styled(serial, tone::HEAD),
-        Span::raw(format!("  {name}")),
-    ])];
+    // What it is doing stands in a line of its own where the serial would have to be cut.
+    let name = format!("  {}", status.state.name());
+    let serial = fit_middle(&status.unit, columns.saturating_sub(2));
+    let mut line =
+        Line::from_iter([Span::styled(format!("{mark} "), style), Span::styled(serial, tone::HEAD)]);
+    let mut lines = Vec::new();
+    if line.width() + width(&name) > columns {
+        lines.push(std::mem::replace(&mut line, Line::from(fit(&name, columns))));
+    } else {
+        line.push_span(name);
+    }
+    lines.push(line);
     for remark in unit.remarks() {
         let mut mark = match remark.level {
             Level::Fine | Level::Note => "·",
@@ -158,11 +163,6 @@ fn title(unit: &Unit<'_>, columns: usize) -> Vec<Line<'static>> {
     }
     lines.push(Line::default());
     lines
-}
-
-/// What the unit is doing, in full.
-fn operation(status: &Status) -> &'static str {
-    status.state.name()
 }
 
 /// Where it comes from, what comes in, how far it is.

@@ -36,6 +36,9 @@ fn the_narrow_table_keeps_what_matters_and_the_wide_one_has_all() {
     for column in ["unit", "state", "rev", "°C", "range", "°/h", "Hz", "note"] {
         assert!(head(80).contains(column), "{column} in {}", head(80));
     }
+    // A serial is whole before all else.
+    assert!(words(&units(&now(&statuses), 20).lines()).contains("ZLG-0008"));
+    assert!(words(&sheet(&now(&statuses)[4], None, &[], 30)).starts_with("! ZLG-0005\n  "));
     for column in ["°C/min", "mg", "gaps", "dup", "late", "bad", "p99", "cal. age"] {
         assert!(head(160).contains(column), "{column} in {}", head(160));
     }

@@ -5,7 +5,7 @@ use ratatui::style::Style;
 use ratatui::text::Span;
 
 use super::grid::{Column, Grid};
-use super::remark::{Level, is_running, knows_rates};
+use super::remark::{Level, knows_rates};
 use super::{Lately, Unit, figure, state_word, tone};
 
 /// Widest that a serial may stand; a longer one is cut in its middle.
@@ -15,7 +15,7 @@ const WIDEST_SERIAL: usize = 24;
 const COLUMNS: [Column; 16] = [
     Column::words("", 0, 1),
     Column::words("unit", 0, 8),
-    Column::words("state", 0, 9),
+    Column::words("state", 1, 9),
     Column::number("rev", 5, 3),
     Column::number("°C", 1, 5),
     Column::number("°C/min", 10, 6),
@@ -48,7 +48,7 @@ fn row(unit: &Unit<'_>) -> Vec<Span<'static>> {
     let level = unit.level();
     let (mark, mark_style) = level.mark(status.state);
     // What is gone or does not run is dim as a whole: its numbers are old, or of no weight.
-    let base = if level == Level::Gone || !is_running(status.state) { tone::DIM } else { tone::PLAIN };
+    let base = if level == Level::Gone || !status.state.is_running() { tone::DIM } else { tone::PLAIN };
     let (range, range_style) = range(status);
     let serial = figure::fit_middle(&status.unit, WIDEST_SERIAL);
     let or_base = |style: Style| if base == tone::DIM { base } else { style };

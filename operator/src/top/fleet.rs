@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use isotherm_protocol::pair::PairReport;
 use isotherm_protocol::service_status::ServiceStatus;
-use isotherm_protocol::status::{Output, State, Status};
+use isotherm_protocol::status::{Output, Status};
 
 use super::feed::News;
 use crate::page::{Lately, Past, Unit};
@@ -69,11 +69,9 @@ struct Look {
 
 impl Look {
     fn at(at: Instant, status: &Status) -> Self {
-        let running = matches!(status.state, State::RunningWithReversal | State::RunningWithoutReversal)
-            && status.output != Output::Held;
         Self {
             at,
-            running,
+            running: status.state.is_running() && status.output != Output::Held,
             ticks_in: status.counter("gyro_ticks_in"),
             ticks_out: status.counter("ticks_out"),
             counted: Lately::counted(status),

@@ -1,6 +1,6 @@
 //! `isotherm-replay cat`.
 
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, Write};
 
 use clap::Args;
 use isotherm_cli::Exit;
@@ -16,9 +16,8 @@ use isotherm_protocol::status::Status;
 use serde_json::{Value, json};
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::log_args::unnamed;
 use super::play::key_expression;
-use super::{LogArgs, show};
+use super::{LogArgs, put, show};
 use crate::error::Error;
 use crate::play::wanted;
 
@@ -42,7 +41,7 @@ pub(super) struct CatArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
-    let mut messages = args.log.messages(1, unnamed().as_ref())?;
+    let mut messages = args.log.messages()?;
     let mut out = BufWriter::new(io::stdout().lock());
     let (mut printed, mut unread) = (0, false);
     while args.limit.is_none_or(|limit| printed < limit)
@@ -60,23 +59,14 @@ pub(super) fn run(args: &CatArgs) -> Result<Exit, Error> {
             }
         }
         printed += 1;
-        if let Err(source) = out.write_all(show::json(&line).as_bytes()) {
-            return ended(source);
-        }
+        put(&mut out, &show::json(&line))?;
     }
-    if let Err(source) = out.flush() {
-        return ended(source);
-    }
+    out.flush().map_err(Error::Stdout)?;
     let lost = messages.report().lost_data();
     if printed == 0 && args.limit != Some(0) && !lost {
         return Err(Error::Nothing("printed", "message"));
     }
     Ok(Exit::of_loss(unread || lost))
-}
-
-/// A reader that has gone away, as `head` does, has what it wanted.
-fn ended(source: io::Error) -> Result<Exit, Error> {
-    if source.kind() == ErrorKind::BrokenPipe { Ok(Exit::Ok) } else { Err(Error::Stdout(source)) }
 }
 
 /// What a message says; of a key that is none of the protocol's, its length.

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::Exit;
+use isotherm_cli::{Exit, print};
 use isotherm_log::offline::read_document;
 use serde::Serialize;
 
 use super::log_args::LogArgs;
 use super::record::Compression;
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 use isotherm_convert::{self as convert, Conversion, Place, Ros2Options, Target};
 
@@ -102,18 +102,17 @@ impl ConvertArgs {
 
     /// Refuses options that have no meaning for the target.
     fn refuse_idle_options(&self, target: Target) -> Result<(), Error> {
-        let idle = [
-            ("--raw", self.raw),
-            ("--calibration", !self.calibration.is_empty()),
-            ("--frame", self.frame.is_some()),
+        let (bags, recordings) = ((Target::Ros2, "ROS 2 bags"), (Target::Mcap, "recordings (.mcap)"));
+        let options = [
+            ("--raw", self.raw, bags),
+            ("--calibration", !self.calibration.is_empty(), bags),
+            ("--frame", self.frame.is_some(), bags),
+            ("--compression", !self.compression.compresses(), recordings),
+            ("--no-json-channels", self.no_json_channels, recordings),
         ];
-        match idle.iter().find(|(_, given)| *given && target != Target::Ros2) {
-            Some((option, _)) => Err(Error::Usage(format!("{option} is for ROS 2 bags: leave it out"))),
-            None if !self.compression.compresses() && target != Target::Mcap => {
-                Err(Error::Usage("--compression is for recordings (.mcap): leave it out".to_owned()))
-            }
-            None if self.no_json_channels && target != Target::Mcap => {
-                Err(Error::Usage("--no-json-channels is for recordings (.mcap): leave it out".to_owned()))
+        match options.iter().find(|(_, given, (of, _))| *given && target != *of) {
+            Some((option, _, (_, outputs))) => {
+                Err(Error::Usage(format!("{option} is for {outputs}: leave it out")))
             }
             None => Ok(()),
         }
@@ -144,7 +143,7 @@ impl ConvertArgs {
         }
         let documents = self.calibration.iter().map(|path| Ok(read_document(path)?.document));
         let documents = documents.collect::<Result<_, Error>>()?;
-        let mut sources: Vec<_> = vec![("log".to_owned(), names(&log.log))];
+        let mut sources: Vec<_> = vec![("log".to_owned(), show::names(&log.log))];
         sources
             .extend(log.mapping_file().map(|mapping| ("mapping".to_owned(), mapping.display().to_string())));
         Ok(Conversion {
@@ -161,22 +160,14 @@ impl ConvertArgs {
     }
 }
 
-/// Files by their names.
-fn names(paths: &[PathBuf]) -> String {
-    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
-    names.join(", ")
-}
-
 /// Runs the command.
 pub(super) fn run(args: &ConvertArgs) -> Result<Exit, Error> {
     let conversion = args.conversion()?;
     let outcome = conversion.run()?;
-    for note in &outcome.converted.notes {
-        show::warn(note);
-    }
+    outcome.converted.notes.iter().for_each(show::warn);
     let report = Report { target: conversion.target, outcome: &outcome };
-    print(if args.json { show::json(&report) } else { human(&outcome) }.as_bytes())?;
-    Ok(Exit::of_loss(outcome.lost_data()))
+    let text = if args.json { show::json(&report) } else { human(&outcome) };
+    Ok(print(&text, Exit::of_loss(outcome.lost_data())))
 }
 
 /// The summary as tables.

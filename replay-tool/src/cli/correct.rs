@@ -5,18 +5,22 @@ mod report;
 mod sink;
 mod text;
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::thread::available_parallelism;
 
 use clap::Args;
-use isotherm_cli::Exit;
+use isotherm_cli::{Bar, Exit, print, say_lines};
 use isotherm_correction::navigation::NavigationStep;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_correction::units::Span;
+use isotherm_log::file::read_small_text;
+use isotherm_log::offline::{Loaded, RunOptions, UnitPlan, UnitReport, correct, load_calibration};
+use isotherm_log::part::LogFiles;
+use isotherm_log::source::LogReport;
 
-use super::{LogArgs, print};
+use super::{LogArgs, show};
 use crate::error::Error;
-use sink::Format;
+use sink::{Format, Sink};
 
 /// Correct a log offline, with the service's own state machine
 #[derive(Debug, Args)]
@@ -67,7 +71,7 @@ pub(super) struct CorrectArgs {
     /// Do not compare with the corrected ticks in a recording
     #[arg(long, hide_short_help = true)]
     no_compare: bool,
-    /// Threads that correct the units of a recording; 1: also reads it (default: all cores)
+    /// Threads that correct the units of a log; 1: also reads it (default: all cores)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), hide_short_help = true)]
     threads: Option<u16>,
     /// Print the summary as one JSON object
@@ -102,13 +106,57 @@ impl CorrectArgs {
 }
 
 /// Prints the summary: on standard error where the ticks go to standard output.
-fn print_summary(args: &CorrectArgs, text: &str) -> Result<(), Error> {
+fn print_summary(args: &CorrectArgs, text: &str, exit: Exit) -> Exit {
     if args.out.as_deref() == Some(Path::new("-")) {
-        // A reader that has gone away is no error.
-        let _ = io::stderr().write_all(text.as_bytes());
-        return Ok(());
+        say_lines(text.trim_end_matches('\n'));
+        return exit;
     }
-    print(text.as_bytes())
+    print(text, exit)
+}
+
+/// Reads a calibration document and says what is doubtful about it.
+fn loaded(path: &Path) -> Result<Loaded, Error> {
+    let loaded = load_calibration(path)?;
+    loaded.warnings.iter().for_each(show::warn);
+    Ok(loaded)
+}
+
+/// Corrects the units as planned, and writes what comes of it with the documents beside it.
+fn corrected(
+    args: &CorrectArgs,
+    mut files: LogFiles,
+    plans: Vec<UnitPlan>,
+    documents: &[&Path],
+) -> Result<(Vec<UnitReport>, LogReport), Error> {
+    let units: Vec<_> = plans.iter().map(|plan| plan.id.clone()).collect();
+    let mut sink = Sink::open(args, &units)?;
+    for path in documents {
+        sink.document(read_small_text(path, "read the calibration document")?.into_bytes())?;
+    }
+    // A unit's state rests on all that came before the part: that is corrected and not given out.
+    let mut part = args.log.part()?;
+    let from_ns = files.from_beginning(&mut part)?;
+    let cores = available_parallelism().map_or(1, usize::from);
+    let options = RunOptions {
+        threads: args.threads.map_or(cores, usize::from),
+        form: sink.form(args.format),
+        from_ns,
+    };
+    let (mut bar, mut ticks) = (None, 0);
+    let result = correct(&files, &part, plans, options, &mut |made, progress| {
+        let bar = bar.get_or_insert_with(|| Bar::over_log(progress.watch()));
+        ticks += made.iter().map(|(_, output)| output.ticks).sum::<u64>();
+        bar.show(format!("{ticks} ticks"));
+        sink.write(made)
+    });
+    bar.iter().for_each(Bar::finish);
+    let (units, log) = result?;
+    let is_empty = units.iter().all(|unit| unit.summary.ticks == 0 && unit.unanswered() == 0);
+    if is_empty && matches!(files, LogFiles::Text { .. }) && !log.lost_data() {
+        return Err(Error::Nothing("corrected", "raw message"));
+    }
+    sink.finish(&args.log.log)?;
+    Ok((units, log))
 }
 
 /// Runs the command.

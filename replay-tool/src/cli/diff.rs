@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::diff::{AXES, Account, CorrectedLog, DiffOptions, Largest, Tolerance, compare, is_csv};
 use isotherm_log::offline::unit_id;
 use isotherm_log::part::Part;
@@ -19,7 +19,7 @@ use serde::Serialize;
 
 pub(super) use show_difference::first_difference;
 
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 
 /// Compare two corrected logs tick by tick, and show the first difference
@@ -39,8 +39,8 @@ pub(super) struct DiffArgs {
     #[arg(value_name = "B")]
     b: PathBuf,
     /// Unit serial, repeatable (default: all). CSV: the serial to assign
-    #[arg(long, short, value_name = "SERIAL")]
-    unit: Vec<String>,
+    #[arg(long, short, value_name = "SERIAL", value_parser = UnitId::new)]
+    unit: Vec<UnitId>,
     /// Tolerance of angle increments (rad)
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = not_negative)]
     tolerance_angle: f64,
@@ -81,7 +81,7 @@ struct Report<'r> {
 
 /// Runs the command.
 pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
-    let units = args.unit.iter().map(|serial| unit_id(serial)).collect::<Result<BTreeSet<_>, _>>()?;
+    let units: BTreeSet<_> = args.unit.iter().cloned().collect();
     for recording in [&args.a, &args.b].into_iter().filter(|path| is_recording(path)) {
         check_units(std::slice::from_ref(recording), &units)?;
     }
@@ -105,9 +105,7 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
             "neither log has corrected ticks: make them with isotherm-replay correct".to_owned(),
         ));
     }
-    for words in [a.cut_short(), b.cut_short()].into_iter().flatten() {
-        show::warn(&words);
-    }
+    [a.cut_short(), b.cut_short()].iter().flatten().for_each(show::warn);
     let within_tolerance = accounts.values().all(Account::is_identical);
     let identical = within_tolerance && accounts.values().all(|account| account.within_tolerance == 0);
     let name = |path: &Path| path.display().to_string();
@@ -119,8 +117,8 @@ pub(super) fn run(args: &DiffArgs) -> Result<Exit, Error> {
         tolerance,
         units: &accounts,
     };
-    print(if args.json { show::json(&report) } else { human(&report, named) }.as_bytes())?;
-    Ok(if within_tolerance { Exit::Ok } else { Exit::Failed })
+    let exit = if within_tolerance { Exit::Ok } else { Exit::Failed };
+    Ok(print(&if args.json { show::json(&report) } else { human(&report, named) }, exit))
 }
 
 /// The unit that a CSV is of, where it is not said: the only one of the other log.

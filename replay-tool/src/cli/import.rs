@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use isotherm_cli::{Exit, Window};
-use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_cli::{Exit, Window, number, print};
+use isotherm_log::file::write_whole;
 use isotherm_log::import::{ACCEL_UNITS, GYRO_UNITS, Hints, Proposal, TIME_UNITS, propose};
 use isotherm_log::info::LogInfo;
 use isotherm_log::mapping::{Delimiter, Encoding, Mapping};
 use serde::Serialize;
 
 use super::log_args::LogArgs;
-use super::{info, plot, print, show};
+use super::{check_outputs, info, plot, show};
 use crate::error::Error;
 
 /// Propose a column mapping for a text log of any maker, then show what the log contains
@@ -56,7 +56,7 @@ pub(super) struct ImportArgs {
     #[arg(long, value_name = "SERIAL")]
     serial: Option<String>,
     /// Ticks per second, for a log without usable time (Hz)
-    #[arg(long, value_name = "HZ", value_parser = rate)]
+    #[arg(long, value_name = "HZ", value_parser = number("", 1e-3..=1e6))]
     rate_hz: Option<f64>,
     /// Delimiter (default: detected)
     #[arg(long, value_name = "WORD", value_parser = PossibleValuesParser::new(Delimiter::ALL.map(Delimiter::word)))]
@@ -79,11 +79,6 @@ struct Report<'a> {
     plot: Option<String>,
     notes: &'a [String],
     info: &'a LogInfo,
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate: &f64| (1e-3..=1e6).contains(rate));
-    rate.ok_or_else(|| "must be a number from 0.001 to 1000000".to_owned())
 }
 
 impl ImportArgs {
@@ -128,11 +123,8 @@ impl ImportArgs {
 pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
     let out = args.out.clone().unwrap_or_else(|| Mapping::path_beside(args.first()));
     let page = (!args.no_plot).then(|| args.plot.clone().unwrap_or_else(|| args.page()));
-    let inputs: Vec<_> = args.log.iter().map(PathBuf::as_path).collect();
-    for path in std::iter::once(&out).chain(&page) {
-        refuse_overwriting(path, &inputs)?;
-        refuse_replacing(path, args.overwrite)?;
-    }
+    let (outputs, inputs) = (std::iter::once(&out).chain(&page), &args.log);
+    check_outputs(outputs.map(PathBuf::as_path), inputs.iter().map(PathBuf::as_path), args.overwrite)?;
     let mut hints = args.hints();
     let mut proposal = settled(args, &mut hints)?;
     write(&out, &proposal)?;
@@ -165,8 +157,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<Exit, Error> {
         let drawn = page.map_or_else(String::new, |page| format!("{page}: a first plot\n"));
         format!("{}\n{}: the mapping\n{notes}{drawn}", info::tables::of(&info), out.display())
     };
-    print(text.as_bytes())?;
-    Ok(info::outcome(&info))
+    Ok(print(&text, info::outcome(&info)))
 }
 
 /// A proposal in which nothing is open: what is, is asked on a terminal.

@@ -4,12 +4,11 @@ mod readings;
 pub(super) mod tables;
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::info::{FileInfo, LogInfo, Survey};
-use isotherm_log::part::Part;
 
 use super::log_args::{LogArgs, unnamed};
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 
 /// Ticks in one batch of a text log.
@@ -32,8 +31,7 @@ pub(super) struct InfoArgs {
 /// Runs the command.
 pub(super) fn run(args: &InfoArgs) -> Result<Exit, Error> {
     let info = survey(&args.log)?;
-    print(if args.json { show::json(&info) } else { tables::of(&info) }.as_bytes())?;
-    Ok(outcome(&info))
+    Ok(print(&if args.json { show::json(&info) } else { tables::of(&info) }, outcome(&info)))
 }
 
 /// Reads the log to its end.
@@ -61,17 +59,4 @@ pub(super) fn survey(log: &LogArgs) -> Result<LogInfo, Error> {
 pub(super) fn outcome(info: &LogInfo) -> Exit {
     let cut = |file: &FileInfo| file.recording.as_ref().is_some_and(|recording| !recording.complete);
     Exit::of_loss(info.reading.lost_data() || info.files.iter().any(cut))
-}
-
-impl LogArgs {
-    /// The files that the log is read from: those of a folder are the mapping's.
-    ///
-    /// # Errors
-    /// As [`LogArgs::events`].
-    fn log_files(&self) -> Result<Vec<std::path::PathBuf>, Error> {
-        if self.is_recording()? {
-            return Ok(self.log.clone());
-        }
-        Ok(self.events(&Part::default())?.paths().to_vec())
-    }
 }

@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::log_args::unnamed;
 use super::play::key_expression;
-use super::{LogArgs, print, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use crate::play::wanted;
 
@@ -41,7 +40,7 @@ struct Listed {
 
 /// Runs the command.
 pub(super) fn run(args: &ListArgs) -> Result<Exit, Error> {
-    let mut messages = args.log.messages(1, unnamed().as_ref())?;
+    let mut messages = args.log.messages()?;
     let mut bar = Bar::over_log(messages.progress().watch());
     let mut topics = BTreeMap::<String, Listed>::new();
     let mut begin_ns = None;
@@ -66,8 +65,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Exit, Error> {
     } else {
         human(&topics)
     };
-    print(text.as_bytes())?;
-    Ok(Exit::of_loss(report.lost_data()))
+    Ok(print(&text, Exit::of_loss(report.lost_data())))
 }
 
 /// The distance of two moments (s), negative where the second is the earlier.

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::Args;
 use isotherm_cli::Window;
 use isotherm_log::mapping::Mapping;
-use isotherm_log::offline::unit_id;
 use isotherm_log::part::{LogFiles, Messages, Part, are_recordings};
 use isotherm_log::replica::check_units;
 use isotherm_log::text::LogReader;
@@ -24,8 +23,8 @@ pub(crate) struct LogArgs {
     #[arg(long, short, value_name = "FILE")]
     pub(crate) mapping: Option<PathBuf>,
     /// Unit serial, repeatable (default: all). Text log: the serial to assign
-    #[arg(long, short, value_name = "SERIAL")]
-    pub(crate) unit: Vec<String>,
+    #[arg(long, short, value_name = "SERIAL", value_parser = UnitId::new)]
+    pub(crate) unit: Vec<UnitId>,
     #[command(flatten)]
     pub(crate) window: Window,
 }
@@ -52,12 +51,8 @@ impl LogArgs {
     }
 
     /// The units given.
-    ///
-    /// # Errors
-    /// For a serial that cannot be one.
-    pub(crate) fn units(&self) -> Result<BTreeSet<UnitId>, Error> {
-        let units = self.unit.iter().map(|serial| unit_id(serial));
-        Ok(units.collect::<Result<_, _>>()?)
+    pub(crate) fn units(&self) -> BTreeSet<UnitId> {
+        self.unit.iter().cloned().collect()
     }
 
     /// Refuses to correct a text log of one unit by the document of another.
@@ -65,7 +60,7 @@ impl LogArgs {
     /// # Errors
     /// Where `--unit` is another unit than the document's.
     pub(crate) fn refuse_document_of_another(&self, document: &str) -> Result<(), Error> {
-        match self.unit.iter().find(|given| *given != document) {
+        match self.unit.iter().find(|given| given.as_str() != document) {
             Some(given) if !self.is_recording()? => Err(Error::Usage(format!(
                 "--unit is {given}, --calibration is for unit {document}: give the document of {given}, or leave --unit out to correct the \
                  log as one of {document}"
@@ -77,10 +72,10 @@ impl LogArgs {
     /// The part of the log's time and units.
     ///
     /// # Errors
-    /// As [`LogArgs::units`], and where the part ends before it begins.
+    /// Where the part ends before it begins.
     pub(crate) fn part(&self) -> Result<Part, Error> {
         let (start, end) = self.window.limits().map_err(Error::Usage)?;
-        Ok(Part { units: self.units()?, start, end })
+        Ok(Part { units: self.units(), start, end })
     }
 
     /// Which files to open, and how. A text log is of the one unit that is given, else of `unit`; it is put into gyro
@@ -89,7 +84,7 @@ impl LogArgs {
     /// # Errors
     /// As [`LogArgs::is_recording`] and [`Mapping::load`]; where a text log has no unit or several.
     pub(crate) fn files(&self, batch_ticks: usize, unit: Option<&UnitId>) -> Result<LogFiles, Error> {
-        let given = self.units()?;
+        let given = self.units();
         if self.is_recording()? {
             check_units(&self.log, &given)?;
             return Ok(LogFiles::Recordings(self.log.clone()));
@@ -110,23 +105,23 @@ impl LogArgs {
         Ok(LogFiles::Text { paths: self.log.clone(), mapping, unit, batch_ticks })
     }
 
-    /// Opens the log's part as messages: [`LogArgs::files`] and [`LogArgs::part`] in one.
+    /// Opens the log's part as messages, those of a text log of one tick each: [`LogArgs::files`] and [`LogArgs::part`] in one.
     ///
     /// # Errors
     /// As these.
-    pub(crate) fn messages(&self, batch_ticks: usize, unit: Option<&UnitId>) -> Result<Messages, Error> {
-        Ok(self.files(batch_ticks, unit)?.open(&self.part()?)?)
+    pub(crate) fn messages(&self) -> Result<Messages, Error> {
+        Ok(self.files(1, unnamed().as_ref())?.open(&self.part()?)?)
     }
 
-    /// Opens a part of a text log as events.
+    /// The files that the log is read from: those of a folder are the mapping's.
     ///
     /// # Errors
-    /// As [`LogArgs::files`], and where the log is a recording.
-    pub(crate) fn events(&self, part: &Part) -> Result<LogReader, Error> {
+    /// As [`LogArgs::files`].
+    pub(crate) fn log_files(&self) -> Result<Vec<PathBuf>, Error> {
         if self.is_recording()? {
-            return Err(Error::Usage("this needs a text log, the log is recordings".to_owned()));
+            return Ok(self.log.clone());
         }
-        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.within(part))
+        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.paths().to_vec())
     }
 
     /// The file of a text log's mapping: the one given, else the one beside the log.
@@ -154,8 +149,9 @@ impl LogArgs {
         )))
     }
 
-    /// Every file that is read, for outputs that must not fall on one.
+    /// Every file that is read, for outputs that must not fall on one; what cannot be opened is said where it is read.
     pub(crate) fn inputs(&self) -> Vec<PathBuf> {
-        self.log.iter().cloned().chain(self.mapping_file()).collect()
+        let files = self.log_files().unwrap_or_else(|_| self.log.clone());
+        files.into_iter().chain(self.mapping_file()).collect()
     }
 }

@@ -1,6 +1,5 @@
 //! `isotherm-replay play`.
 
-mod screen;
 mod tables;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,9 +8,8 @@ use std::time::Duration;
 use clap::Args;
 use isotherm_bus::ClientOptions;
 use isotherm_bus::outlet::least_in_flight;
-use isotherm_cli::{Exit, seconds};
+use isotherm_cli::{Exit, duration, number, print};
 use isotherm_correction::sample::ChannelName;
-use isotherm_correction::units::Span;
 use isotherm_document::few;
 use isotherm_log::faults::FaultOptions;
 use isotherm_log::message::Topic;
@@ -22,12 +20,11 @@ use isotherm_protocol::raw::{HealthReading, MAX_HEALTH};
 use serde::Serialize;
 use zenoh::key_expr::OwnedKeyExpr;
 
-use super::{LogArgs, print, show};
+use super::{LogArgs, show};
 use crate::error::Error;
 use crate::keyboard::Keyboard;
 use crate::pace::Speed;
-use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, UnitReport, play, wanted};
-use screen::Screen;
+use crate::play::{Acknowledge, PlayOptions, PlayReport, Played, Screen, UnitReport, play, wanted};
 
 /// Most copies of a unit.
 const MAX_COPIES: u32 = 999;
@@ -70,13 +67,13 @@ pub(super) struct PlayArgs {
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3_600_000), hide_short_help = true)]
     jitter_ms: u32,
     /// Share of messages to leave out (0…1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = number("", 0.0..=1.0), hide_short_help = true)]
     loss: f64,
     /// Share of messages to send twice (0…1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = number("", 0.0..=1.0), hide_short_help = true)]
     duplicate: f64,
     /// Share of messages to send after one to four later ones of their key (0…1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share, hide_short_help = true)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = number("", 0.0..=1.0), hide_short_help = true)]
     reorder: f64,
     /// Seed of these four faults
     #[arg(long, value_name = "S", default_value_t = 1, hide_short_help = true)]
@@ -94,8 +91,8 @@ pub(super) struct PlayArgs {
     #[arg(long, conflicts_with = "in_flight", hide_short_help = true)]
     no_acknowledge: bool,
     /// Longest wait for service, subscribers and output (s)
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds, hide_short_help = true)]
-    wait: Span,
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = duration(0.0..=1e9), hide_short_help = true)]
+    wait: Duration,
     /// Health reading to add to a text log once a second: voltage (V) or counter; repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = health_reading)]
     health: Vec<HealthReading>,
@@ -142,14 +139,6 @@ pub(super) fn key_expression(text: &str) -> Result<OwnedKeyExpr, String> {
     OwnedKeyExpr::new(text).map_err(|error| isotherm_bus::words(&error))
 }
 
-/// Reads a share.
-fn share(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        _ => Err("must be a number from 0 to 1".into()),
-    }
-}
-
 impl PlayArgs {
     /// What is played, and how.
     fn options(&self) -> Result<PlayOptions, Error> {
@@ -190,7 +179,7 @@ impl PlayArgs {
             series: self.series,
             health: self.health.clone(),
             session: self.session.clone(),
-            wait: Duration::from_nanos(self.wait.as_ns().unsigned_abs()),
+            wait: self.wait,
             acknowledge: self.acknowledge(batch)?,
         })
     }
@@ -256,17 +245,16 @@ pub(super) fn run(args: &PlayArgs) -> Result<Exit, Error> {
     // What Zenoh may still do is not waited for.
     runtime.shutdown_background();
     let Played { report: play, log, ended } = played?;
-    for warning in tables::warnings(&play) {
-        show::warn(&warning);
-    }
+    tables::warnings(&play).iter().for_each(show::warn);
     let report = Report { play: &play, log: &log };
-    print(if args.json { show::json(&report) } else { tables::human(&report, &options) }.as_bytes())?;
-    ended?;
     let lost = play.lost_data() || log.lost_data();
+    let text = if args.json { show::json(&report) } else { tables::human(&report, &options) };
+    let exit = print(&text, Exit::of_loss(lost));
+    ended?;
     // What `--loss` withholds was there.
     let found = |unit: &UnitReport| unit.counts.messages_sent + unit.counts.messages_withheld > 0;
     if !lost && !play.stopped && !play.units.iter().any(found) {
         return Err(Error::Nothing("played", "raw message"));
     }
-    Ok(Exit::of_loss(lost))
+    Ok(exit)
 }

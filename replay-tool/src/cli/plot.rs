@@ -4,9 +4,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::diff::is_csv;
-use isotherm_log::file::{refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::write_whole;
 use isotherm_log::offline::read_document;
 use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
@@ -15,7 +15,7 @@ use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
 use super::log_args::{LogArgs, unnamed};
-use super::{print, show};
+use super::{check_outputs, show};
 use crate::error::Error;
 
 /// Ticks in one batch of a text log.
@@ -39,8 +39,8 @@ pub(super) struct PlotArgs {
     #[arg(long, value_name = "FILE", requires = "beside")]
     beside_mapping: Option<PathBuf>,
     /// Unit of the second log (default: --unit)
-    #[arg(long, value_name = "SERIAL", requires = "beside")]
-    beside_unit: Vec<String>,
+    #[arg(long, value_name = "SERIAL", requires = "beside", value_parser = UnitId::new)]
+    beside_unit: Vec<UnitId>,
     /// Calibration document (TOML) that corrects a text log and scales counts (recordings: as recorded)
     #[arg(long, short, value_name = "FILE")]
     calibration: Option<PathBuf>,
@@ -89,9 +89,8 @@ impl PlotArgs {
 pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    let lost = summary.reading.iter().any(LogReport::lost_data);
-    Ok(Exit::of_loss(lost))
+    let exit = Exit::of_loss(summary.reading.iter().any(LogReport::lost_data));
+    Ok(print(&if args.json { show::json(&report) } else { human(&report) }, exit))
 }
 
 /// Draws a text log that a mapping reads.
@@ -116,7 +115,7 @@ fn corrected(log: &LogArgs, unnamed: Option<&UnitId>) -> Result<Option<Messages>
     if !is_csv(path) {
         return Ok(None);
     }
-    let unit = log.units()?.pop_first().or_else(|| unnamed.cloned());
+    let unit = log.units().pop_first().or_else(|| unnamed.cloned());
     unit.map(|unit| Ok(Messages::of_corrected(path, &unit, &log.part()?)?)).transpose()
 }
 
@@ -126,13 +125,12 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let mut inputs = args.log.inputs();
     inputs.extend(other.iter().flat_map(LogArgs::inputs));
     inputs.extend(args.calibration.clone());
-    refuse_overwriting(&args.out, &inputs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    refuse_replacing(&args.out, args.overwrite)?;
+    check_outputs([args.out.as_path()], inputs.iter().map(PathBuf::as_path), args.overwrite)?;
     let calibration = args.calibration.as_deref();
     let calibration = calibration.map(read_document).transpose()?;
 
     let unnamed = unnamed();
-    let first_units = args.log.units()?;
+    let first_units = args.log.units();
     let mut logs = Vec::new();
     let mut bar = None;
     for log in std::iter::once(&args.log).chain(&other) {
@@ -154,7 +152,7 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
         // Units of different serials are compared where each log has one that was asked for.
         let one =
             |units: &std::collections::BTreeSet<UnitId>| units.first().filter(|_| units.len() == 1).cloned();
-        let shown_as = one(&first_units).filter(|_| log.units().is_ok_and(|units| units.len() == 1));
+        let shown_as = one(&first_units).filter(|_| log.units().len() == 1);
         logs.push(PlotLog { name, messages, shown_as, correct_from });
     }
     let options = PlotOptions { detail: usize::try_from(args.detail).unwrap_or(usize::MAX), calibration };

@@ -1,17 +1,15 @@
 //! `isotherm-replay record`.
 
-use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use isotherm_bus::ClientOptions;
-use isotherm_cli::{Exit, seconds};
-use isotherm_correction::units::Span;
-use isotherm_log::offline::unit_id;
+use isotherm_cli::{Exit, duration, print};
 use isotherm_log::recording::RecordingOptions;
+use isotherm_protocol::key::UnitId;
 
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 use crate::record::{Bounds, RecordOptions, ServiceWait, TopicFilter, record};
 
@@ -42,20 +40,20 @@ pub(super) struct RecordArgs {
     #[command(flatten)]
     session: ClientOptions,
     /// Unit serial, repeatable (default: all)
-    #[arg(long, short, value_name = "SERIAL")]
-    unit: Vec<String>,
+    #[arg(long, short, value_name = "SERIAL", value_parser = UnitId::new)]
+    unit: Vec<UnitId>,
     /// raw, reference, corrected, status, service, journal, or a key expression; repeatable (default: all of these)
     #[arg(long, short, value_name = "TOPIC")]
     topic: Vec<TopicFilter>,
     /// Stop after this time (s)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    duration: Option<Span>,
+    #[arg(long, value_name = "SECONDS", value_parser = duration(0.0..=1e9))]
+    duration: Option<Duration>,
     /// Stop when the last service has stopped
     #[arg(long, conflicts_with = "no_service")]
     until_service_stops: bool,
     /// Longest wait for a service and its answers (s)
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds, hide_short_help = true)]
-    timeout: Span,
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = duration(0.01..=1e9), hide_short_help = true)]
+    timeout: Duration,
     /// Wait for a service without a limit
     #[arg(long, conflicts_with = "no_service")]
     wait: bool,
@@ -69,14 +67,14 @@ pub(super) struct RecordArgs {
     #[arg(long, hide_short_help = true)]
     no_json_channels: bool,
     /// Longest chunk (s), the most that a crash of the recorder loses
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds, hide_short_help = true)]
-    chunk_seconds: Span,
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = duration(0.01..=1e9), hide_short_help = true)]
+    chunk_seconds: Duration,
     /// Start a new file at this size (bytes, or with K, M, G: 1024, 1024², 1024³)
-    #[arg(long, value_name = "BYTES", value_parser = bytes, hide_short_help = true)]
+    #[arg(long, value_name = "BYTES", value_parser = bytes(SMALLEST_FILE), hide_short_help = true)]
     max_size: Option<u64>,
     /// Start a new file after this time (s)
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, hide_short_help = true)]
-    max_duration: Option<Span>,
+    #[arg(long, value_name = "SECONDS", value_parser = duration(0.1..=1e9), hide_short_help = true)]
+    max_duration: Option<Duration>,
     /// Keep the newest N files of this recording, delete older ones
     #[arg(long, value_name = "FILES", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     keep: Option<u32>,
@@ -84,7 +82,7 @@ pub(super) struct RecordArgs {
     #[arg(long)]
     overwrite: bool,
     /// Memory for messages waiting for the disk (bytes, or with K, M, G); more are counted as lost
-    #[arg(long, value_name = "BYTES", default_value = "256M", value_parser = bytes, hide_short_help = true)]
+    #[arg(long, value_name = "BYTES", default_value = "256M", value_parser = bytes(SMALLEST_QUEUE), hide_short_help = true)]
     queue: u64,
     /// Print the summary as one JSON object
     #[arg(long)]
@@ -108,27 +106,23 @@ impl Compression {
     }
 }
 
-/// Reads `500M`.
-fn bytes(text: &str) -> Result<u64, String> {
-    let (number, factor) = match text.char_indices().last() {
-        Some((at, 'K' | 'k')) => (text.get(..at), 1 << 10),
-        Some((at, 'M' | 'm')) => (text.get(..at), 1 << 20),
-        Some((at, 'G' | 'g')) => (text.get(..at), 1 << 30),
-        _ => (Some(text), 1),
-    };
-    let number: Option<u64> = number.and_then(|number| number.parse().ok());
-    let bytes = number.and_then(|number| number.checked_mul(factor));
-    bytes.ok_or_else(|| "must be a whole number of bytes, or one followed by K, M or G".to_owned())
+/// Reads `500M`, and no less than the least.
+fn bytes(least: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
+    move |text| {
+        let unit = text.chars().next_back().and_then(|unit| "KMG".find(unit.to_ascii_uppercase()));
+        let (number, shift) = unit.map_or((text, 0), |place| (&text[..text.len() - 1], 10 * (place + 1)));
+        let bytes = number.parse::<u64>().ok().and_then(|number| number.checked_mul(1 << shift));
+        bytes.filter(|bytes| *bytes >= least).ok_or_else(|| {
+            format!(
+                "must be a whole number of bytes, or one followed by K, M or G, and at least {least} bytes"
+            )
+        })
+    }
 }
 
 impl RecordArgs {
     /// What they ask for.
     fn options(&self) -> Result<RecordOptions, Error> {
-        at_least("--max-size", self.max_size, SMALLEST_FILE, "bytes")?;
-        at_least("--queue", Some(self.queue), SMALLEST_QUEUE, "bytes")?;
-        at_least("--max-duration", self.max_duration.map(Span::as_s), 0.1, "s")?;
-        at_least("--chunk-seconds", Some(self.chunk_seconds.as_s()), 0.01, "s")?;
-        at_least("--timeout", Some(self.timeout.as_s()), 0.01, "s")?;
         if self.keep.is_some() && self.max_size.is_none() && self.max_duration.is_none() {
             return Err(Error::Usage("--keep needs --max-size or --max-duration".to_owned()));
         }
@@ -137,16 +131,16 @@ impl RecordArgs {
         } else if self.wait {
             ServiceWait::Forever
         } else {
-            ServiceWait::Within(time(self.timeout))
+            ServiceWait::Within(self.timeout)
         };
         Ok(RecordOptions {
             out: self.out.clone(),
             session: self.session.clone(),
-            units: self.unit.iter().map(|serial| unit_id(serial)).collect::<Result<_, _>>()?,
+            units: self.unit.clone(),
             topics: self.topic.clone(),
             service,
-            query_limit: time(self.timeout),
-            duration: self.duration.map(time),
+            query_limit: self.timeout,
+            duration: self.duration,
             until_service_stops: self.until_service_stops,
             writing: RecordingOptions {
                 compress: self.compression.compresses(),
@@ -155,34 +149,14 @@ impl RecordArgs {
                 ..RecordingOptions::default()
             },
             bounds: Bounds {
-                chunk: time(self.chunk_seconds),
+                chunk: self.chunk_seconds,
                 file_bytes: self.max_size,
-                file_time: self.max_duration.map(time),
+                file_time: self.max_duration,
             },
             keep: self.keep.and_then(|keep| usize::try_from(keep).ok()),
             queue_bytes: self.queue,
         })
     }
-}
-
-/// Refuses an option's value below the least.
-fn at_least<T: PartialOrd + Display + Copy>(
-    name: &str,
-    value: Option<T>,
-    least: T,
-    unit: &str,
-) -> Result<(), Error> {
-    match value {
-        Some(value) if value < least => {
-            Err(Error::Usage(format!("{name} is {value}, must be at least {least} {unit}")))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A span that is not negative as a duration.
-fn time(span: Span) -> Duration {
-    Duration::from_nanos(u64::try_from(span.as_ns()).unwrap_or(0))
 }
 
 /// Runs the command.
@@ -197,24 +171,24 @@ pub(super) fn run(args: &RecordArgs) -> Result<Exit, Error> {
     let report = recorded.map_err(|error| table::advise(error, &options))?;
     live.warn(&report);
     if let Some(failure) = &report.done.failure {
-        show::warn(&format!("recording has stopped: {failure}; everything before that is in the file"));
+        show::warn(format_args!("recording has stopped: {failure}; everything before that is in the file"));
     }
     if report.lost > 0 {
-        show::warn(&format!("{} of {} messages are lost", report.lost, report.received));
+        show::warn(format_args!("{} of {} messages are lost", report.lost, report.received));
     }
     if !report.done.units_without_memory.is_empty() {
         let units = report.done.units_without_memory.join(", ");
-        show::warn(&format!(
+        show::warn(format_args!(
             "no memory or journal of {units} from before the recording: its output cannot be reproduced to the bit"
         ));
     }
     if args.topic.is_empty() && !report.done.units_without_raw.is_empty() {
         let units = report.done.units_without_raw.join(", ");
-        show::warn(&format!(
+        show::warn(format_args!(
             "no raw messages of {units} were received: producers do not reach this recorder; give one --connect, to \
              the service or a router, and no --listen"
         ));
     }
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(Exit::of_loss(report.lost_data()))
+    let text = if args.json { show::json(&report) } else { human(&report) };
+    Ok(print(&text, Exit::of_loss(report.lost_data())))
 }

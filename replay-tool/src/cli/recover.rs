@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use isotherm_cli::{Bar, Exit};
+use isotherm_cli::{Bar, Exit, print};
 use isotherm_log::file::is_being_written;
 use isotherm_log::recording::RecordingOptions;
 use isotherm_log::recording::recover::{Recovery, RecoveryReport};
 
-use super::{print, show};
+use super::show;
 use crate::error::Error;
 
 /// Damaged places that the table names.
@@ -45,10 +45,8 @@ pub(super) struct RecoverArgs {
 pub(super) fn run(args: &RecoverArgs) -> Result<Exit, Error> {
     let recovery = Recovery::open(&args.input)?;
     if is_being_written(&args.input) {
-        show::warn(&format!(
-            "{} is still being written: later messages are not recovered",
-            args.input.display()
-        ));
+        let recording = args.input.display();
+        show::warn(format_args!("{recording} is still being written: later messages are not recovered"));
     }
     let options = RecordingOptions {
         compress: args.compression.compresses(),
@@ -61,8 +59,8 @@ pub(super) fn run(args: &RecoverArgs) -> Result<Exit, Error> {
     });
     bar.finish();
     let report = recovered?;
-    print(if args.json { show::json(&report) } else { human(&report, &args.out) }.as_bytes())?;
-    Ok(Exit::of_loss(report.lost_data()))
+    let text = if args.json { show::json(&report) } else { human(&report, &args.out) };
+    Ok(print(&text, Exit::of_loss(report.lost_data())))
 }
 
 /// The summary as a table.

@@ -1,14 +1,13 @@
 //! Summaries as tables and as JSON.
 
-use std::fmt::Write as _;
-use std::io::{self, Write};
+use std::fmt::{Display, Write};
 use std::ops::RangeBounds;
+use std::path::PathBuf;
 
 use comfy_table::Row;
-use serde::Serialize;
-
+use isotherm_cli::say_lines;
 use isotherm_log::source::LogReport;
-use isotherm_log::text::ReadReport;
+use serde::Serialize;
 
 /// A table of two columns, figures to the right.
 pub(super) fn table(rows: &[(&str, String)]) -> String {
@@ -34,9 +33,8 @@ pub(super) fn grid<R: Into<Row>>(
 }
 
 /// A warning on standard error.
-pub(super) fn warn(words: &str) {
-    // A reader that has gone away is no error.
-    let _ = writeln!(io::stderr(), "warning: {words}");
+pub(super) fn warn(words: impl Display) {
+    say_lines(format_args!("warning: {words}"));
 }
 
 /// One JSON object on one line.
@@ -45,25 +43,32 @@ pub(super) fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).map(|text| text + "\n").unwrap_or_default()
 }
 
-/// What reading a log came to, in words; empty where there is nothing to say.
-pub(super) fn reading(report: &LogReport) -> String {
-    let report = match report {
-        LogReport::Text(report) => return rows(report),
-        LogReport::Recording(report) => report,
-    };
-    let mut text = String::new();
-    if let Some(words) = &report.cut_short {
-        let _ = writeln!(text, "not read to the end: {words}; everything before it has been used");
-    }
-    if report.foreign_messages > 0 {
-        let _ = writeln!(text, "{} messages of other programs were skipped", report.foreign_messages);
-    }
-    text
+/// Files by their names.
+pub(super) fn names(paths: &[PathBuf]) -> String {
+    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
 }
 
-/// The same of a text log.
-pub(super) fn rows(report: &ReadReport) -> String {
+/// The head of a document's digest.
+pub(super) fn hexadecimal(digest: [u8; 8]) -> String {
+    format!("{:016x}", u64::from_be_bytes(digest))
+}
+
+/// What reading a log came to, in words; empty where there is nothing to say.
+pub(super) fn reading(report: &LogReport) -> String {
     let mut text = String::new();
+    let report = match report {
+        LogReport::Text(report) => report,
+        LogReport::Recording(report) => {
+            if let Some(words) = &report.cut_short {
+                let _ = writeln!(text, "not read to the end: {words}; everything before it has been used");
+            }
+            if report.foreign_messages > 0 {
+                let _ = writeln!(text, "{} messages of other programs were skipped", report.foreign_messages);
+            }
+            return text;
+        }
+    };
     if report.skipped_rows > 0 {
         let (rows, first) = (report.skipped_rows, report.first_skipped.as_deref().unwrap_or_default());
         let _ = writeln!(text, "{rows} rows could not be read and were skipped; the first:\n  {first}");

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
-use isotherm_cli::{Bar, Exit, seconds};
+use isotherm_cli::{Bar, Exit, print, seconds};
 use isotherm_correction::units::Span;
 use isotherm_simulator::{Scenario, Simulation, presets};
 use serde::Serialize;
 
-use super::{print, show};
+use super::{check_outputs, show};
 use crate::error::Error;
 use crate::simulated::{LogWriter, write_truth, write_truth_header};
-use isotherm_log::file::{Sink, read_small_text, refuse_overwriting, refuse_replacing, write_whole};
+use isotherm_log::file::{Sink, read_small_text, write_whole};
 use isotherm_log::mapping::Mapping;
 
 /// Simulate a log, with the mapping that reads it back
@@ -135,17 +135,6 @@ impl SimulateArgs {
         scenario.duration_s = self.duration.map_or(scenario.duration_s, Span::as_s);
         Ok(scenario)
     }
-
-    /// Refuses files that are given twice, that would be written over the scenario, or that are there already.
-    fn refuse_overwriting(&self, out: &Path, mapping: &Path) -> Result<(), Error> {
-        let mut others: Vec<&Path> = self.scenario.as_deref().into_iter().collect();
-        for file in [Some(out), Some(mapping), self.truth.as_deref()].into_iter().flatten() {
-            refuse_overwriting(file, &others)?;
-            refuse_replacing(file, self.overwrite)?;
-            others.push(file);
-        }
-        Ok(())
-    }
 }
 
 /// Reads a scenario from a file.
@@ -160,14 +149,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     if args.list_presets {
         let rows: Vec<_> =
             PRESETS.iter().map(|preset| format!("{:21} {}\n", preset.name, preset.about)).collect();
-        print(rows.concat().as_bytes())?;
-        return Ok(Exit::Ok);
+        return Ok(print(&rows.concat(), Exit::Ok));
     }
     if args.print_preset.is_some() {
         let text =
             toml::to_string(&args.scenario()?).map_err(|error| Error::Scenario(vec![error.to_string()]))?;
-        print(text.as_bytes())?;
-        return Ok(Exit::Ok);
+        return Ok(print(&text, Exit::Ok));
     }
     let Some(out) = &args.out else { return Err(Error::Usage("give --out".into())) };
     let scenario = args.scenario()?;
@@ -177,7 +164,8 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
         .map_err(|errors| Error::Scenario(errors.0.iter().map(|error| format!("{name}{error}")).collect()))?;
 
     let mapping = Mapping::path_beside(out);
-    args.refuse_overwriting(out, &mapping)?;
+    let outputs = [Some(out.as_path()), Some(&mapping), args.truth.as_deref()];
+    check_outputs(outputs.into_iter().flatten(), args.scenario.as_deref(), args.overwrite)?;
     let mut log = Sink::create(out)?;
     log.write(|writer| rows.write_header(writer))?;
     let mut truth = args.truth.as_deref().map(Sink::create).transpose()?;
@@ -211,8 +199,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<Exit, Error> {
     write_whole(&mapping, rows.mapping().as_bytes(), true)
         .map_err(|source| Error::file(&mapping, "write", source))?;
     log.keep()?;
-    print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
-    Ok(Exit::Ok)
+    Ok(print(&if args.json { show::json(&report) } else { human(&report) }, Exit::Ok))
 }
 
 /// The summary as a table.

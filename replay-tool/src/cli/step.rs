@@ -10,11 +10,11 @@ use isotherm_cli::Exit;
 use isotherm_correction::unit::UnitSettings;
 use isotherm_log::offline::{Loaded, load_calibration};
 use isotherm_log::part::Part;
-use isotherm_log::replica::stepper::{Step, Stepper};
+use isotherm_log::replica::stepper::Stepper;
 use isotherm_log::replica::{Changes, Replica, scan};
 use isotherm_protocol::key::UnitId;
 
-use super::{LogArgs, print, show};
+use super::{LogArgs, put, show};
 use crate::error::Error;
 
 /// What can be typed between two events.
@@ -72,8 +72,8 @@ fn open(args: &StepArgs, loaded: Option<&Loaded>) -> Result<Stepper, Error> {
     }
     let files = args.log.files(1, None)?;
     let mut outlines = scan(&args.log.log, files.end_ns(&args.log.part()?)?)?;
-    outlines.damaged.iter().for_each(|words| show::warn(words));
-    let wanted = args.log.units()?;
+    outlines.damaged.iter().for_each(show::warn);
+    let wanted = args.log.units();
     let holds = |unit: &UnitId| wanted.is_empty() || wanted.contains(unit);
     let units: Vec<_> = outlines
         .units
@@ -124,11 +124,7 @@ fn list(stepper: &mut Stepper, args: &StepArgs) -> Result<(), Error> {
     }
     let mut left = args.count.unwrap_or(u64::MAX);
     while let Some(step) = next.filter(|_| left > 0) {
-        if args.json {
-            tell_json(&step)?;
-        } else {
-            tell(&step)?;
-        }
+        put(&mut io::stdout(), &if args.json { show::json(&step) } else { words::step(&step) })?;
         left -= 1;
         next = if left > 0 { stepper.next_step()? } else { None };
     }
@@ -178,7 +174,7 @@ fn converse(stepper: &mut Stepper, input: &mut dyn BufRead) -> Result<(), Error>
                 last
             }
         };
-        step.iter().try_for_each(tell)?;
+        step.iter().try_for_each(|step| put(&mut io::stdout(), &words::step(step)))?;
         line.clear();
         match input.read_line(&mut line) {
             Ok(0) => return Ok(()),
@@ -190,15 +186,7 @@ fn converse(stepper: &mut Stepper, input: &mut dyn BufRead) -> Result<(), Error>
 
 /// Says that there is no further event.
 fn over() -> Result<(), Error> {
-    print("end of the log\n".as_bytes())
-}
-
-fn tell(step: &Step) -> Result<(), Error> {
-    print(words::step(step).as_bytes())
-}
-
-fn tell_json(step: &Step) -> Result<(), Error> {
-    print(show::json(step).as_bytes())
+    put(&mut io::stdout(), "end of the log\n")
 }
 
 #[cfg(test)]

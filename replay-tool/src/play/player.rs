@@ -16,9 +16,10 @@ use tokio::time::{Instant, sleep_until};
 use zenoh::Session;
 
 use super::playlist::{Frame, Load, Playlist};
+use super::screen::Screen;
 use super::silence::Shared;
 use super::units::{PlayedUnit, Units};
-use super::{Acknowledge, Command, PlayOptions, Watch};
+use super::{Acknowledge, Command, PlayOptions};
 use crate::error::Error;
 use crate::pace::Pacer;
 
@@ -42,10 +43,10 @@ enum Stage {
 }
 
 /// Plays.
-pub(super) struct Player<'a, W> {
+pub(super) struct Player<'a> {
     session: &'a Session,
     options: &'a PlayOptions,
-    watch: &'a W,
+    screen: &'a Screen,
     /// Whoever is at the keyboard; `None` once nobody is.
     commands: Option<UnboundedReceiver<Command>>,
     pub(super) playlist: Playlist<'a>,
@@ -80,18 +81,18 @@ pub(super) struct Player<'a, W> {
     ticks_sent: u64,
 }
 
-impl<'a, W: Watch> Player<'a, W> {
+impl<'a> Player<'a> {
     /// Opens the log; nothing is sent.
     pub(super) fn new(
         session: &'a Session,
         options: &'a PlayOptions,
         commands: UnboundedReceiver<Command>,
-        watch: &'a W,
+        screen: &'a Screen,
     ) -> Result<Self, Error> {
         Ok(Self {
             session,
             options,
-            watch,
+            screen,
             commands: Some(commands),
             playlist: Playlist::new(options)?,
             units: Units::new(options),
@@ -183,29 +184,16 @@ impl<'a, W: Watch> Player<'a, W> {
     /// Waits until a message is due and sends it, unless somebody would rather be elsewhere by then.
     async fn play(&mut self, next: (Turn, Leaving)) -> Result<(), Error> {
         // A step does not wait for its time.
-        let mut due = if self.steps > 0 { None } else { self.pacer.due(next.0.0) };
-        while let Some(at) = due.filter(|at| *at > Instant::now()) {
-            let command = tokio::select! {
+        let due = if self.steps > 0 { None } else { self.pacer.due(next.0.0) };
+        if let Some(at) = due.filter(|at| *at > Instant::now()) {
+            tokio::select! {
                 biased;
-                command = obey::command(&mut self.commands) => Some(command),
-                () = sleep_until(at) => None,
-            };
-            let Some(command) = command else { break };
-            let (seeks, speed) = (self.seeks, self.pacer.speed());
-            self.obey(command)?;
-            if self.seeks != seeks {
-                return Ok(());
-            }
-            if self.stage != Stage::Playing || self.paused.is_some() || self.steps > 0 {
-                self.waiting.extend([next]);
-                return Ok(());
-            }
-            if self.pacer.speed() != speed {
-                // The rest of the wait counts from the last message, at the new speed.
-                if let Some(last) = self.last_at {
-                    self.pacer.due(last);
+                command = obey::command(&mut self.commands) => {
+                    // Whatever is asked for, the message waits among the others for its turn.
+                    self.waiting.extend([next]);
+                    return self.obey(command);
                 }
-                due = self.pacer.due(next.0.0);
+                () = sleep_until(at) => {}
             }
         }
         self.send(next, due).await

@@ -2,40 +2,39 @@
 
 use std::collections::BTreeSet;
 use std::ops::Add;
-use std::time::Duration;
 
 use isotherm_bus::outlet::Account;
 use isotherm_protocol::pair::PairReport;
 use serde::Serialize;
 
 use super::playlist::Load;
-use crate::pace::{Lateness, Speed};
+use crate::pace::Lateness;
 
 /// What was sent of a unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Counts {
+pub(crate) struct Counts {
     /// Messages sent, those that were sent before among them.
-    pub messages_sent: u64,
+    pub(crate) messages_sent: u64,
     /// Messages sent that the service cannot read; the log has them so.
-    pub messages_unreadable: u64,
+    pub(crate) messages_unreadable: u64,
     /// Messages that were not sent, by `--loss`.
-    pub messages_withheld: u64,
+    pub(crate) messages_withheld: u64,
     /// Messages that were sent a second time, by `--duplicate`.
-    pub messages_sent_again: u64,
+    pub(crate) messages_sent_again: u64,
     /// Messages that were sent behind later ones, by `--reorder`.
-    pub messages_held_back: u64,
+    pub(crate) messages_held_back: u64,
     /// Gyro ticks in the messages sent.
-    pub ticks_in_messages: u64,
+    pub(crate) ticks_in_messages: u64,
     /// Gyro ticks that were not sent, by `--loss`.
-    pub ticks_withheld: u64,
+    pub(crate) ticks_withheld: u64,
     /// Accelerometer ticks sent.
-    pub accel_ticks_sent: u64,
+    pub(crate) accel_ticks_sent: u64,
     /// Temperature readings sent.
-    pub temperature_readings_sent: u64,
+    pub(crate) temperature_readings_sent: u64,
     /// Health readings sent: times at which there were some.
-    pub health_readings_sent: u64,
+    pub(crate) health_readings_sent: u64,
     /// Rate references sent.
-    pub references_sent: u64,
+    pub(crate) references_sent: u64,
 }
 
 impl Counts {
@@ -57,24 +56,25 @@ impl Counts {
 
 /// What became of gyro ticks, of a unit or of all; everything is `None` without acknowledgement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Returned {
+#[expect(clippy::struct_field_names, reason = "they are the names of the JSON")]
+pub(crate) struct Returned {
     /// Gyro ticks between the first and the last of a run that were never sent, because the log does not have them, or
     /// because they were passed over or withheld: the service announces them as missing.
-    pub ticks_not_sent: Option<u64>,
+    pub(crate) ticks_not_sent: Option<u64>,
     /// Gyro ticks that came back corrected, each counted once.
-    pub ticks_acknowledged: Option<u64>,
+    pub(crate) ticks_acknowledged: Option<u64>,
     /// Gyro ticks that the service announced as missing.
-    pub ticks_announced_missing: Option<u64>,
+    pub(crate) ticks_announced_missing: Option<u64>,
     /// Gyro ticks that came back as they were, because the service has no calibration for the unit.
-    pub ticks_uncalibrated: Option<u64>,
+    pub(crate) ticks_uncalibrated: Option<u64>,
     /// Gyro ticks sent behind later ones, too late to come back.
-    pub ticks_late: Option<u64>,
+    pub(crate) ticks_late: Option<u64>,
     /// Gyro ticks sent in their order that did not come back.
-    pub ticks_lost: Option<u64>,
+    pub(crate) ticks_lost: Option<u64>,
     /// Gyro ticks under way when playing was stopped.
-    pub ticks_under_way: Option<u64>,
+    pub(crate) ticks_under_way: Option<u64>,
     /// Gyro ticks that came back more than once.
-    pub ticks_duplicated: Option<u64>,
+    pub(crate) ticks_duplicated: Option<u64>,
 }
 
 impl From<&Account> for Returned {
@@ -115,30 +115,30 @@ impl Add for Returned {
 
 /// What was sent of a unit, and what became of it. What comes back is `None` without acknowledgement.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct UnitReport {
+pub(crate) struct UnitReport {
     /// Its serial on the bus.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Its serial in the log.
-    pub of: String,
+    pub(crate) of: String,
     /// What was sent.
     #[serde(flatten)]
-    pub counts: Counts,
+    pub(crate) counts: Counts,
     /// Gyro ticks sent, each counted once.
-    pub ticks_sent: u64,
+    pub(crate) ticks_sent: u64,
     /// What became of them.
     #[serde(flatten)]
-    pub returned: Returned,
+    pub(crate) returned: Returned,
     /// Runs sent: series, or what began anew in one.
-    pub runs: Option<u64>,
+    pub(crate) runs: Option<u64>,
     /// Times that the unit's corrected stream began anew.
-    pub restarts: Option<u64>,
+    pub(crate) restarts: Option<u64>,
     /// Corrected ticks of a series that was not sent here: somebody else plays the unit.
-    pub ticks_of_others: Option<u64>,
+    pub(crate) ticks_of_others: Option<u64>,
     /// Pairs and single services that have the unit, of which there is to be one; looked for where ticks came twice.
-    pub services: Option<u64>,
+    pub(crate) services: Option<u64>,
     /// Temperature channels sent that the unit's calibration does not have.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub unknown_channels: Vec<String>,
+    pub(crate) unknown_channels: Vec<String>,
 }
 
 impl UnitReport {
@@ -180,7 +180,7 @@ impl UnitReport {
 
     /// Whether what came back is not what was sent: somebody else plays the unit, or services answer that are no pair.
     #[must_use]
-    pub fn is_mixed(&self) -> bool {
+    pub(crate) fn is_mixed(&self) -> bool {
         self.ticks_of_others.is_some_and(|ticks| ticks > 0)
             || (self.is_doubled() && self.services.is_some_and(|services| services > 1))
     }
@@ -188,36 +188,36 @@ impl UnitReport {
 
 /// What playing came to: the sums over the units, and the units.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct PlayReport {
+pub(crate) struct PlayReport {
     /// Messages sent.
-    pub messages_sent: u64,
+    pub(crate) messages_sent: u64,
     /// Gyro ticks sent, each counted once.
-    pub ticks_sent: u64,
+    pub(crate) ticks_sent: u64,
     /// Accelerometer ticks sent.
-    pub accel_ticks_sent: u64,
+    pub(crate) accel_ticks_sent: u64,
     /// Temperature readings sent.
-    pub temperature_readings_sent: u64,
+    pub(crate) temperature_readings_sent: u64,
     /// What became of the gyro ticks.
     #[serde(flatten)]
-    pub returned: Returned,
+    pub(crate) returned: Returned,
     /// Times that the log was played, the last one perhaps not to its end.
-    pub passes: u64,
+    pub(crate) passes: u64,
     /// Times that somebody went to another place in it.
-    pub seeks: u64,
+    pub(crate) seeks: u64,
     /// Time of the log that was played (s).
-    pub log_s: f64,
+    pub(crate) log_s: f64,
     /// Time that it took (s).
-    pub elapsed_s: f64,
+    pub(crate) elapsed_s: f64,
     /// Time that playing was paused (s), part of the former.
-    pub paused_s: f64,
+    pub(crate) paused_s: f64,
     /// How many times as fast as recorded, pauses left out.
-    pub actual_speed: f64,
+    pub(crate) actual_speed: f64,
     /// How late messages went out.
-    pub lateness: Lateness,
+    pub(crate) lateness: Lateness,
     /// Playing ended before the log did: by a signal, or by an error.
-    pub stopped: bool,
+    pub(crate) stopped: bool,
     /// The units, in the order in which the log names them.
-    pub units: Vec<UnitReport>,
+    pub(crate) units: Vec<UnitReport>,
 }
 
 impl PlayReport {
@@ -237,31 +237,9 @@ impl PlayReport {
 
     /// Whether a tick that was sent in its order did not come back.
     #[must_use]
-    pub fn lost_data(&self) -> bool {
+    pub(crate) fn lost_data(&self) -> bool {
         self.returned.ticks_lost.is_some_and(|lost| lost > 0)
     }
-}
-
-/// Where playing is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Position {
-    /// Time in the log, from its first message on (s).
-    pub log_s: f64,
-    /// Share of everything that is to be played (0…1); of this pass where there is no last one.
-    pub share: f64,
-    /// How long the rest takes at this speed, pauses left out; of this pass where there is no last one. `None` as long as nobody can
-    /// know.
-    pub left: Option<Duration>,
-    /// Gyro ticks sent.
-    pub ticks_sent: u64,
-    /// Which pass, from 1.
-    pub pass: u64,
-    /// How fast it is to be.
-    pub speed: Speed,
-    /// How fast it was, pauses left out.
-    pub actual_speed: f64,
-    /// Nothing goes out.
-    pub paused: bool,
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ use isotherm_protocol::status::{Output, Status, UNKNOWN_CHANNEL};
 use tokio::time::Instant;
 use zenoh::Session;
 
-use super::{PlayReport, UnitReport, Watch};
+use super::screen::Screen;
+use super::{PlayReport, UnitReport};
 
 /// Time between two looks.
 const LOOK: Duration = Duration::from_millis(500);
@@ -33,7 +34,7 @@ struct Since {
 }
 
 /// Looks now and then whether what is sent comes back, and says where it does not.
-pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch) -> Infallible {
+pub(super) async fn watch(session: &Session, shared: &Shared, screen: &Screen) -> Infallible {
     let mut since: BTreeMap<UnitId, Since> = BTreeMap::new();
     loop {
         tokio::time::sleep(LOOK).await;
@@ -56,7 +57,7 @@ pub(super) async fn watch(session: &Session, shared: &Shared, watch: &impl Watch
                 0 => String::new(),
                 others => format!(" ({others} other units likewise)"),
             };
-            watch.say(&(text + &others));
+            screen.say(&(text + &others));
         }
     }
 }

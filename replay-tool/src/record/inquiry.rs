@@ -47,20 +47,15 @@ pub(super) async fn ask(
 ) -> Result<Vec<String>, BusError> {
     let mut unanswered = Vec::new();
     for &keys in question.keys() {
-        let expressions =
-            if keys == key::ALL_CONFIGURATIONS { of_units(keys, &[]) } else { of_units(keys, units) };
-        for expression in expressions {
+        for expression in of_units(keys, units) {
             let history = if expression.ends_with("/history") {
                 format!("?limit={HISTORY_ENTRIES}")
             } else {
                 String::new()
             };
             let (replies, in_time) = ask_all(session, &format!("{expression}{history}"), limit).await?;
-            let mut samples = Vec::new();
-            for reply in replies {
-                // A unit without a document, or a service that has no history, says so.
-                samples.extend(reply.into_result().ok());
-            }
+            // A unit without a document, or a service that has no history, says so.
+            let samples: Vec<_> = replies.into_iter().filter_map(|reply| reply.into_result().ok()).collect();
             if !in_time {
                 unanswered.push(format!("{expression}: no complete answer within {limit:?}"));
             }

@@ -54,17 +54,17 @@ impl Item {
 
 /// Messages of one topic.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct TopicCount {
+pub(crate) struct TopicCount {
     /// The key, without namespace.
-    pub topic: String,
+    pub(crate) topic: String,
     /// Messages that came in.
-    pub received: u64,
+    pub(crate) received: u64,
     /// Of these, in a file.
-    pub written: u64,
+    pub(crate) written: u64,
     /// Of these, not in a file: the queue was full, or writing failed.
-    pub lost: u64,
+    pub(crate) lost: u64,
     /// Their bytes that came in.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 /// The queue between the receive threads, which never wait for it, and the thread that writes.
@@ -109,42 +109,47 @@ impl Queue {
 
     /// Takes a message in, or counts it as lost; never waits.
     pub(super) fn message(&self, key: &str, frame: impl FnOnce() -> Vec<u8>, length: usize) {
+        let limit = self.limit.checked_sub(length as u64 + ENTRY_BYTES);
+        let item = |topic, received_ns| Item::Message { topic, received_ns, frame: frame() };
+        self.enter(key, (1, length), limit, item);
+    }
+
+    /// Takes in the parts of an answer, of which there is always room.
+    pub(super) fn memory(&self, key: &str, frames: Vec<Vec<u8>>) {
+        let size = (frames.len() as u64, frames.iter().map(Vec::len).sum());
+        self.enter(key, size, Some(u64::MAX), |topic, received_ns| Item::Memory {
+            topic,
+            received_ns,
+            frames,
+        });
+    }
+
+    /// Takes in so many messages of so many bytes, or counts them as lost where more bytes than `limit` wait already, or it is none.
+    fn enter(
+        &self,
+        key: &str,
+        (messages, length): (u64, usize),
+        limit: Option<u64>,
+        item: impl FnOnce(usize, u64) -> Item,
+    ) {
         let mut state = self.lock();
         if state.closed {
             return;
         }
-        let Some(topic) = state.place(key) else {
-            state.nameless += 1;
+        let is_lost = state.failed || limit.is_none_or(|limit| state.bytes > limit);
+        let topic = state.place(key);
+        let Some((topic, count)) = topic.and_then(|topic| Some((topic, state.counts.get_mut(topic)?))) else {
+            state.nameless += messages;
             return;
         };
-        let full = state.bytes + length as u64 + ENTRY_BYTES > self.limit || state.failed;
-        let Some(count) = state.counts.get_mut(topic) else { return };
-        count.received += 1;
+        count.received += messages;
         count.bytes += length as u64;
-        if full {
-            count.lost += 1;
+        if is_lost {
+            count.lost += messages;
             return;
         }
         // By the clock under the lock: messages stand in the file in the order of their times.
-        self.push(&mut state, Item::Message { topic, received_ns: now_ns(), frame: frame() });
-    }
-
-    /// Takes in the parts of an answer.
-    pub(super) fn memory(&self, key: &str, frames: Vec<Vec<u8>>) {
-        let mut state = self.lock();
-        if state.closed {
-            return;
-        }
-        let Some(topic) = state.place(key) else { return };
-        let failed = state.failed;
-        let Some(count) = state.counts.get_mut(topic) else { return };
-        count.received += frames.len() as u64;
-        count.bytes += frames.iter().map(|frame| frame.len() as u64).sum::<u64>();
-        if failed {
-            count.lost += frames.len() as u64;
-        } else {
-            self.push(&mut state, Item::Memory { topic, received_ns: now_ns(), frames });
-        }
+        self.push(&mut state, item(topic, now_ns()));
     }
 
     /// Takes in a file.

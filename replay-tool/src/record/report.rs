@@ -12,7 +12,7 @@ use super::queue::{Queue, TopicCount};
 /// Why a recording ended.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum EndedBy {
+pub(crate) enum EndedBy {
     /// It goes on.
     #[default]
     Nothing,
@@ -28,54 +28,54 @@ pub enum EndedBy {
 
 /// What was written.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Done {
+pub(crate) struct Done {
     /// Files that are there, oldest first.
-    pub files: Vec<PathBuf>,
+    pub(crate) files: Vec<PathBuf>,
     /// Files deleted to keep only the newest.
-    pub files_deleted: u64,
+    pub(crate) files_deleted: u64,
     /// Files attached, in each recording file anew.
-    pub attachments: u64,
+    pub(crate) attachments: u64,
     /// What the journals came to.
-    pub journal: JournalAccount,
+    pub(crate) journal: JournalAccount,
     /// Units that were recorded but cannot be corrected again from this recording alone: nothing says what they knew.
-    pub units_without_memory: Vec<String>,
+    pub(crate) units_without_memory: Vec<String>,
     /// Units of which corrected messages were recorded but nothing raw, though it was asked for: producers do not reach the
     /// recorder.
-    pub units_without_raw: Vec<String>,
+    pub(crate) units_without_raw: Vec<String>,
     /// Why nothing more could be written.
-    pub failure: Option<String>,
+    pub(crate) failure: Option<String>,
 }
 
 /// What recording came to.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct RecordReport {
+pub(crate) struct RecordReport {
     /// What was written; nothing before the end.
     #[serde(flatten)]
-    pub done: Done,
+    pub(crate) done: Done,
     /// Why it ended.
-    pub ended_by: EndedBy,
+    pub(crate) ended_by: EndedBy,
     /// How long it took, from the first file's beginning (s).
-    pub elapsed_s: f64,
+    pub(crate) elapsed_s: f64,
     /// Messages that came in.
-    pub received: u64,
+    pub(crate) received: u64,
     /// Of these, in a file.
-    pub written: u64,
+    pub(crate) written: u64,
     /// Of these, in no file.
-    pub lost: u64,
+    pub(crate) lost: u64,
     /// Length of all files written, of deleted ones too (bytes).
-    pub file_bytes: u64,
+    pub(crate) file_bytes: u64,
     /// By key.
-    pub topics: Vec<TopicCount>,
+    pub(crate) topics: Vec<TopicCount>,
     /// Services that were there, by instance.
-    pub services: BTreeSet<String>,
+    pub(crate) services: BTreeSet<String>,
     /// What somebody should know.
-    pub warnings: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl RecordReport {
     /// Whether anything was lost.
     #[must_use]
-    pub fn lost_data(&self) -> bool {
+    pub(crate) fn lost_data(&self) -> bool {
         self.lost > 0 || self.done.failure.is_some()
     }
 }

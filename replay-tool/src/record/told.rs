@@ -1,10 +1,9 @@
 //! What a recording says of itself: versions and options at its beginning, counts at its end.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, UNIX_EPOCH};
 
 use isotherm_log::message::Topic;
-use isotherm_log::recording::{METADATA, Metadata};
+use isotherm_log::recording::Metadata;
 use isotherm_protocol::version;
 use serde::Serialize;
 
@@ -17,20 +16,18 @@ struct TopicLine {
     lost: u64,
 }
 
-/// What the beginning of a file says.
-pub(super) fn beginning(
-    described: &BTreeMap<String, String>,
-    number: u32,
-    now_ns: u64,
-) -> BTreeMap<String, String> {
-    let mut values = described.clone();
-    values.insert("record".to_owned(), "beginning".to_owned());
-    values.insert("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
-    values.insert("wire_versions".to_owned(), wire_versions());
-    values.insert("file".to_owned(), number.to_string());
-    values.insert("began_ns".to_owned(), now_ns.to_string());
-    values.insert("began".to_owned(), time(now_ns));
-    values
+/// What the beginning of a file says; `described` is how all files are recorded.
+pub(super) fn beginning(described: &[(&'static str, String)], number: u32) -> Metadata {
+    let now_ns = super::queue::now_ns();
+    let values = [
+        ("record", "beginning".to_owned()),
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("wire_versions", wire_versions()),
+        ("file", number.to_string()),
+        ("began_ns", now_ns.to_string()),
+        ("began", time(now_ns)),
+    ];
+    Metadata::of(described.iter().cloned().chain(values))
 }
 
 /// What its end says; `lost` is by number of the topic, as `written` is.
@@ -44,7 +41,7 @@ pub(super) fn end(why: &str, topics: &[Topic], written: &[u64], lost: &[u64]) ->
     lines.sort_by(|a, b| a.topic.cmp(&b.topic));
     let sum = |count: fn(&TopicLine) -> u64| lines.iter().map(count).sum::<u64>().to_string();
     let now_ns = super::queue::now_ns();
-    let values = [
+    Metadata::of([
         ("record", "end".to_owned()),
         ("why", why.to_owned()),
         ("ended_ns", now_ns.to_string()),
@@ -54,9 +51,7 @@ pub(super) fn end(why: &str, topics: &[Topic], written: &[u64], lost: &[u64]) ->
         ("lost", sum(|line| line.lost)),
         // Plain structures of numbers and texts always serialise.
         ("topics", serde_json::to_string(&lines).unwrap_or_default()),
-    ];
-    let values = values.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    Metadata { name: METADATA.to_owned(), values }
+    ])
 }
 
 /// The versions of each kind of message that this program knows.

@@ -17,7 +17,7 @@ const KINDS: [(&str, &str); 6] = [
 
 /// Topics of one kind, or of a key expression.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum TopicFilter {
+pub(crate) enum TopicFilter {
     /// Those of all units, or of the units asked for.
     Kind(&'static str),
     /// Whatever the expression takes in.
@@ -46,7 +46,7 @@ impl FromStr for TopicFilter {
 ///
 /// They may overlap: see [`is_first`].
 #[must_use]
-pub fn key_expressions(filters: &[TopicFilter], units: &[UnitId]) -> Vec<OwnedKeyExpr> {
+pub(crate) fn key_expressions(filters: &[TopicFilter], units: &[UnitId]) -> Vec<OwnedKeyExpr> {
     let all = KINDS.map(|(_, keys)| TopicFilter::Kind(keys));
     let filters = if filters.is_empty() { &all } else { filters };
     let mut expressions = Vec::new();
@@ -62,7 +62,7 @@ pub fn key_expressions(filters: &[TopicFilter], units: &[UnitId]) -> Vec<OwnedKe
 
 /// A key expression of all units narrowed to some; as it is where none is named, or where it is of no unit.
 pub(super) fn of_units(keys: &str, units: &[UnitId]) -> Vec<OwnedKeyExpr> {
-    let narrowed: Vec<_> = if units.is_empty() || keys == key::ALL_SERVICE_STATUS {
+    let narrowed: Vec<_> = if units.is_empty() || !keys.starts_with("imu/") {
         vec![keys.to_owned()]
     } else {
         units.iter().map(|unit| keys.replacen('*', unit.as_str(), 1)).collect()
@@ -73,7 +73,7 @@ pub(super) fn of_units(keys: &str, units: &[UnitId]) -> Vec<OwnedKeyExpr> {
 
 /// Whether a key belongs to the expression of this index: to the first that takes it in, so that none is recorded twice.
 #[must_use]
-pub fn is_first(expressions: &[OwnedKeyExpr], index: usize, key: &zenoh::key_expr::keyexpr) -> bool {
+pub(crate) fn is_first(expressions: &[OwnedKeyExpr], index: usize, key: &zenoh::key_expr::keyexpr) -> bool {
     expressions.iter().position(|keys| keys.intersects(key)) == Some(index)
 }
 

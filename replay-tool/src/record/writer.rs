@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use isotherm_log::message::{Message, Topic};
-use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
+use isotherm_log::recording::{Attachment, Documents, RecordingOptions, RecordingWriter};
 use isotherm_protocol::codec;
 use isotherm_protocol::journal::JournalPart;
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::files::Files;
-use super::queue::{Item, Queue, Taken, now_ns};
+use super::queue::{Item, Queue, Taken};
 use super::report::Done;
 use super::told::{beginning, end};
 use crate::error::Error;
@@ -21,13 +21,13 @@ const IDLE: Duration = Duration::from_millis(200);
 
 /// When files and chunks end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// A chunk ends after this long at the latest: what a kill can cost.
-    pub chunk: Duration,
+    pub(crate) chunk: Duration,
     /// A file ends with the chunk that makes it this long (bytes).
-    pub file_bytes: Option<u64>,
+    pub(crate) file_bytes: Option<u64>,
     /// A file ends with the first message this long after its beginning.
-    pub file_time: Option<Duration>,
+    pub(crate) file_time: Option<Duration>,
 }
 
 /// What the thread tells.
@@ -48,7 +48,7 @@ pub(super) struct FileWriter {
     writing: RecordingOptions,
     bounds: Bounds,
     /// What the beginning of every file says of how it was recorded.
-    described: BTreeMap<String, String>,
+    described: Vec<(&'static str, String)>,
     told: UnboundedSender<Told>,
     current: Current,
     /// By number.
@@ -87,7 +87,7 @@ impl FileWriter {
         mut files: Files,
         writing: RecordingOptions,
         bounds: Bounds,
-        described: BTreeMap<String, String>,
+        described: Vec<(&'static str, String)>,
         told: UnboundedSender<Told>,
     ) -> Result<Self, Error> {
         let current = Current::begin(&mut files, writing, &described, Vec::new())?;
@@ -292,15 +292,12 @@ impl Current {
     fn begin(
         files: &mut Files,
         writing: RecordingOptions,
-        described: &BTreeMap<String, String>,
+        described: &[(&'static str, String)],
         lost_before: Vec<u64>,
     ) -> Result<Self, Error> {
         let path = files.advance()?;
         let mut writer = RecordingWriter::create(&path, writing)?;
-        writer.metadata(&Metadata {
-            name: METADATA.to_owned(),
-            values: beginning(described, files.number, now_ns()),
-        })?;
+        writer.metadata(&beginning(described, files.number))?;
         Ok(Self {
             writer,
             begun: Instant::now(),

@@ -1,6 +1,7 @@
 //! The program as it is called: exit codes, what goes to which stream, examples of the help.
 
 use std::fs;
+use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -215,6 +216,7 @@ fn no_output_is_written_over_an_input() {
     for truth in ["x.csv", "x.mapping.toml"] {
         told += &common::told(path, &[&simulate[..], &[truth]].concat());
     }
+    told += &common::told(path, &["import", "mems.csv", "--out", "y.html", "--plot", "y.html"]);
     insta::assert_snapshot!(told);
     assert_eq!(fs::read(path.join("mems.csv")).unwrap(), before);
     assert!(!path.join("x.csv").exists());
@@ -268,7 +270,55 @@ fn ticks_that_the_calibration_refuses_are_a_loss() {
     let document = fs::read_to_string(calibration()).unwrap();
     fs::write(folder.path().join("gyros.toml"), document.split("\n[accel]").next().unwrap()).unwrap();
     let accels = ["correct", "mems.csv", "-m", "mems.mapping.toml", "-c", "gyros.toml", "--out", "out.csv"];
-    insta::assert_snapshot!(all + &told(folder.path(), &accels));
+    let accels = told(folder.path(), &accels);
+    // So of a recording, and into one.
+    let laser = fs::read_to_string(laser).unwrap().replace("\"ZLG-0001\"", "\"MEMS-0001\"");
+    fs::write(folder.path().join("laser.toml"), laser).unwrap();
+    check(&replay(folder.path(), &["convert", "mems.csv", "-u", "MEMS-0001", "--out", "mems.mcap"]), 0);
+    let of_recordings = [
+        &["correct", "mems.mcap", "-c", "laser.toml"][..],
+        &["correct", "mems.csv", "-c", "laser.toml", "--out", "out.mcap"],
+    ];
+    insta::assert_snapshot!(all + &accels + &of_recordings.map(|args| told(folder.path(), args)).concat());
+}
+
+#[test]
+fn what_nobody_reads_any_more_ends_a_command_and_a_full_disk_fails_it() {
+    let folder = simulated();
+    let calibration = calibration();
+    let program = || {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_isotherm-replay"));
+        program.current_dir(folder.path()).stderr(Stdio::piped());
+        program
+    };
+    for arguments in [
+        &["correct", "mems.csv", "-c", &calibration, "--out", "-"][..],
+        &["step", "mems.csv", "-c", &calibration, "--json"],
+        &["cat", "mems.csv"],
+    ] {
+        let mut child = program().args(arguments).stdout(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        check(&output, 0);
+        assert_eq!(stderr(&output), "", "{arguments:?}");
+    }
+    for arguments in [&["--help"][..], &["list", "mems.csv"], &["cat", "mems.csv"]] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        check(&program().args(arguments).stdout(full).output().unwrap(), 1);
+    }
+}
+
+#[test]
+fn names_that_are_no_text_or_move_the_cursor_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let no_text = std::ffi::OsStr::from_bytes(b"\xff.csv");
+    let program = env!("CARGO_BIN_EXE_isotherm-replay");
+    let output = Command::new(program).args(["info".as_ref(), no_text, "--nonsense".as_ref()]).output();
+    check(&output.unwrap(), 2);
+    let short = ["simulate", "--preset", "mems-chamber", "--duration", "1", "--out", "\u{1b}[2J.csv"];
+    let output = replay(folder.path(), &short);
+    check(&output, 0);
+    assert!(stdout(&output).contains("\\u001b[2J.csv") && !stdout(&output).contains('\u{1b}'));
 }
 
 #[test]

@@ -20,10 +20,8 @@ pub(super) fn section(status: &Status, columns: usize) -> Section {
     }
     if let Some(pending) = &status.pending {
         let digest = figure::digest(pending.digest, pending.revision.digest);
-        let slew = if pending.slew_s > 0.0 { format!(", over {} s", pending.slew_s) } else { String::new() };
-        let when = schedule(pending.schedule);
-        let words =
-            format!("revision {} ({digest}) {when}{slew}; {}", pending.revision.counter, pending.source);
+        let when = schedule(pending.schedule, pending.slew_s);
+        let words = format!("revision {} ({digest}) {when}; {}", pending.revision.counter, pending.source);
         section.field("waits", &words, tone::PLAIN, columns);
     }
     let swaps = &status.swaps;

@@ -1,18 +1,28 @@
 //! What correcting a recording came to.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
+use isotherm_cli::Exit;
 use isotherm_log::diff::Account;
 use isotherm_log::offline::UnitReport;
 use isotherm_log::source::LogReport;
 use serde::Serialize;
 
+use super::{CorrectArgs, print_summary};
 use crate::cli::diff::first_difference;
 use crate::cli::show;
 
+/// Says what the units came to, and how that went.
+pub(super) fn print(args: &CorrectArgs, units: &[UnitReport], log: &LogReport) -> Exit {
+    let report = Report::new(units, log);
+    report.warn();
+    let text = if args.json { show::json(&report) } else { report.human() };
+    print_summary(args, &text, Exit::of_loss(report.lost_data()))
+}
+
 /// Everything that the summary says.
 #[derive(Debug, Serialize)]
-pub(super) struct Report<'r> {
+struct Report<'r> {
     units: &'r [UnitReport],
     log: &'r LogReport,
     /// Whether every unit's ticks are those that the service published, to the bit; left out where none were compared.
@@ -23,7 +33,7 @@ pub(super) struct Report<'r> {
 }
 
 impl<'r> Report<'r> {
-    pub(super) fn new(units: &'r [UnitReport], log: &'r LogReport) -> Self {
+    fn new(units: &'r [UnitReport], log: &'r LogReport) -> Self {
         let mut report = Self { units, log, identical: None, unfinished: 0 };
         report.identical = report.compared().next().is_some().then(|| report.compared().all(Account::agrees));
         report.unfinished = report.compared().map(|account| account.unfinished).sum();
@@ -34,30 +44,29 @@ impl<'r> Report<'r> {
         self.units.iter().filter_map(|unit| unit.published.as_ref())
     }
 
-    pub(super) fn lost_data(&self) -> bool {
+    fn lost_data(&self) -> bool {
         self.log.lost_data() || self.units.iter().any(UnitReport::lost_data)
     }
 
     /// Says on stderr what is not as it should be.
-    pub(super) fn warn(&self) {
+    fn warn(&self) {
         if let LogReport::Recording(report) = self.log {
-            report.cut_short.iter().for_each(|words| show::warn(words));
+            report.cut_short.iter().for_each(show::warn);
         }
         for unit in self.units {
-            let replica = &unit.replica;
-            for notice in &replica.notices {
-                show::warn(&format!("unit {}: {notice}", unit.unit));
-            }
+            let (replica, warn) = (&unit.replica, |words: &dyn Display| {
+                show::warn(format_args!("unit {}: {words}", unit.unit));
+            });
+            replica.notices.iter().for_each(|notice| warn(notice));
             if replica.further_notices > 0 {
-                show::warn(&format!("unit {}: {} more of these", unit.unit, replica.further_notices));
+                warn(&format_args!("{} more of these", replica.further_notices));
             }
-            for doubt in unit.summary.doubts() {
-                show::warn(&format!("unit {}: {doubt}", unit.unit));
-            }
+            unit.troubles.iter().for_each(|trouble| warn(trouble));
+            unit.summary.doubts().iter().for_each(|doubt| warn(doubt));
         }
     }
 
-    pub(super) fn human(&self) -> String {
+    fn human(&self) -> String {
         let head =
             ["unit", "ticks", "gaps", "missing", "duration (s)", "mean rate (°/h)", "journal", "published"];
         let row = |unit: &UnitReport| {
@@ -162,6 +171,7 @@ mod tests {
             by_journal: true,
             summary: isotherm_log::offline::sums::Summary::default(),
             counters: std::collections::BTreeMap::new(),
+            troubles: Vec::new(),
             replica: isotherm_log::replica::ReplicaReport::default(),
             published: Some(account),
         };

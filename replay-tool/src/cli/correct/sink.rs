@@ -1,18 +1,19 @@
 //! Where the corrected ticks of a log's units go.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use isotherm_log::file::{self, Partial, refuse_overwriting, refuse_replacing};
+use isotherm_log::file::{self, Partial};
 use isotherm_log::offline::rows::write_header;
 use isotherm_log::offline::{Form, Made};
-use isotherm_log::recording::{Attachment, Documents, METADATA, Metadata, RecordingOptions, RecordingWriter};
+use isotherm_log::recording::{Documents, Metadata, RecordingOptions, RecordingWriter};
 use isotherm_protocol::digest::Digest;
 use isotherm_protocol::key::UnitId;
 
 use super::CorrectArgs;
+use crate::cli::{check_outputs, show};
 use crate::error::Error;
 
 /// How corrected ticks are written.
@@ -23,6 +24,11 @@ pub(super) enum Format {
     Csv,
     /// Frames as on the bus, each after its length.
     Wire,
+}
+
+/// Whether the ticks go into a recording, by the output's name.
+pub(super) fn is_recording(out: &Path) -> bool {
+    out.extension().is_some_and(|extension| extension == "mcap")
 }
 
 /// What is written to.
@@ -40,15 +46,16 @@ impl Sink {
     ///
     /// # Errors
     /// [`Error::Usage`] where several units do not fit, [`Error::Log`] where it cannot be created or replaced.
-    pub(super) fn open(args: &CorrectArgs, units: &[UnitId], inputs: &[PathBuf]) -> Result<Self, Error> {
+    pub(super) fn open(args: &CorrectArgs, units: &[UnitId]) -> Result<Self, Error> {
         let CorrectArgs { out: Some(out), format, overwrite, .. } = args else { return Ok(Self::None) };
-        let inputs: Vec<_> = inputs.iter().map(PathBuf::as_path).collect();
-        if out.extension().is_some_and(|extension| extension == "mcap") {
+        let mut inputs = args.log.inputs();
+        inputs.extend(args.calibration.iter().cloned());
+        let inputs = inputs.iter().map(PathBuf::as_path);
+        if is_recording(out) {
             if format.is_some() {
                 return Err(Error::Usage("--format is for files other than FILE.mcap".to_owned()));
             }
-            refuse_overwriting(out, &inputs)?;
-            refuse_replacing(out, *overwrite)?;
+            check_outputs([out.as_path()], inputs, *overwrite)?;
             let partial = Partial::of(out);
             let options = RecordingOptions { json: true, overwrite: true, ..RecordingOptions::default() };
             let writer = Box::new(RecordingWriter::create(partial.writing(), options)?);
@@ -72,10 +79,8 @@ impl Sink {
             }
         };
         let is_stdout = |path: &Path| path == Path::new("-");
-        for path in paths.iter().filter(|path| !is_stdout(path)) {
-            refuse_overwriting(path, &inputs)?;
-            refuse_replacing(path, *overwrite)?;
-        }
+        let outputs = paths.iter().map(PathBuf::as_path).filter(|path| !is_stdout(path));
+        check_outputs(outputs, inputs, *overwrite)?;
         let mut files = Vec::new();
         for path in paths {
             let mut file = if is_stdout(&path) { file::Sink::stdout() } else { file::Sink::create(&path)? };
@@ -98,25 +103,24 @@ impl Sink {
     }
 
     /// Puts a document beside the ticks, once.
-    pub(super) fn document(&mut self, bytes: Vec<u8>) -> Result<(), Error> {
+    pub(super) fn document(&mut self, bytes: Vec<u8>) -> Result<(), isotherm_log::error::Error> {
         if let Self::Recording { writer, attached, received_ns, .. } = self
             && attached.insert(Digest::of(&bytes))
         {
-            let attachment: Attachment = Documents::attachment(bytes, *received_ns);
-            writer.attach(&attachment)?;
+            writer.attach(&Documents::attachment(bytes, *received_ns))?;
         }
         Ok(())
     }
 
     /// Writes what was made of a block.
-    pub(super) fn write(&mut self, made: Made) -> Result<(), Error> {
+    pub(super) fn write(&mut self, made: Made) -> Result<(), isotherm_log::error::Error> {
         match self {
             Self::None => Ok(()),
             Self::Files(files) => made.into_iter().try_for_each(|(place, output)| {
                 let file = files.get_mut(place);
-                file.map_or(Ok(()), |file| Ok(file.write(|writer| writer.write_all(&output.bytes))?))
+                file.map_or(Ok(()), |file| file.write(|writer| writer.write_all(&output.bytes)))
             }),
-            Self::Recording { .. } => {
+            Self::Recording { writer, received_ns, .. } => {
                 let (mut messages, mut documents) = (Vec::new(), Vec::new());
                 for (_, output) in made {
                     messages.extend(output.messages);
@@ -124,11 +128,9 @@ impl Sink {
                 }
                 // Each unit's own are in order already.
                 messages.sort_by_key(|message| message.received_ns);
-                if let Self::Recording { writer, received_ns, .. } = self {
-                    for message in &messages {
-                        *received_ns = message.received_ns.max(*received_ns);
-                        writer.write(message)?;
-                    }
+                for message in &messages {
+                    *received_ns = message.received_ns.max(*received_ns);
+                    writer.write(message)?;
                 }
                 documents.into_iter().try_for_each(|(_, text)| self.document(text.into_bytes()))
             }
@@ -141,14 +143,11 @@ impl Sink {
             Self::None => Ok(()),
             Self::Files(files) => files.into_iter().try_for_each(|file| Ok(file.finish()?.keep()?)),
             Self::Recording { mut writer, partial, .. } => {
-                let inputs: Vec<_> = inputs.iter().map(|path| path.display().to_string()).collect();
                 let values = [
                     ("made_by", concat!("isotherm-replay correct ", env!("CARGO_PKG_VERSION")).to_owned()),
-                    ("made_of", inputs.join(", ")),
+                    ("made_of", show::names(inputs)),
                 ];
-                let values: BTreeMap<_, _> =
-                    values.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-                writer.metadata(&Metadata { name: METADATA.to_owned(), values })?;
+                writer.metadata(&Metadata::of(values))?;
                 writer.finish()?;
                 Ok(partial.keep()?)
             }

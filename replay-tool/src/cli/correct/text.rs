@@ -1,21 +1,20 @@
 //! Text logs: one unit with one calibration.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use isotherm_cli::{Bar, Exit};
-use isotherm_log::offline::sums::{Summary, Sums};
-use isotherm_log::offline::{Form, Made, Output, counters, load_calibration, troubles};
-use isotherm_log::text::ReadReport;
-use isotherm_protocol::stream::UnitStream;
+use isotherm_cli::Exit;
+use isotherm_log::offline::sums::Summary;
+use isotherm_log::offline::{Basis, UnitPlan};
+use isotherm_log::source::LogReport;
 use serde::Serialize;
 
-use super::sink::Sink;
-use super::{CorrectArgs, print_summary};
+use super::{CorrectArgs, corrected, loaded, print_summary, report, sink};
 use crate::cli::show;
 use crate::error::Error;
 
-/// Outputs that are written together.
-const BLOCK: usize = 512;
+/// Gyro ticks in a message.
+const BATCH: usize = 64;
 
 /// Everything that the summary says.
 #[derive(Debug, Serialize)]
@@ -24,8 +23,8 @@ struct Report<'a> {
     calibration_digest: String,
     #[serde(flatten)]
     summary: &'a Summary,
-    counters: std::collections::BTreeMap<String, u64>,
-    log: &'a ReadReport,
+    counters: &'a BTreeMap<String, u64>,
+    log: &'a LogReport,
 }
 
 /// The calibration document, of which there must be one.
@@ -51,72 +50,26 @@ fn calibration(args: &CorrectArgs) -> Result<&Path, Error> {
 /// Runs the command on a text log.
 pub(super) fn run(args: &CorrectArgs) -> Result<Exit, Error> {
     let settings = args.settings()?;
-    let calibration = calibration(args)?;
-    if args.out.as_ref().and_then(|out| out.extension()).is_some_and(|extension| extension == "mcap") {
-        return super::recording::run_text(args, calibration);
-    }
-    let loaded = load_calibration(calibration)?;
-    args.log.refuse_document_of_another(loaded.unit.as_str())?;
-    for warning in &loaded.warnings {
-        show::warn(&warning.to_string());
-    }
-    let mut part = args.log.part()?;
-    // A unit's state rests on all that came before the part: that is corrected and not given out.
-    let from_ns = args.log.files(1, Some(&loaded.unit))?.from_beginning(&mut part)?;
-    let mut events = args.log.events(&part)?;
-    let mut inputs = events.paths().to_vec();
-    inputs.extend(args.log.mapping_file().into_iter().chain([calibration.to_owned()]));
-    let mut sink = Sink::open(args, std::slice::from_ref(&loaded.unit), &inputs)?;
-    let form = sink.form(args.format);
-    let mut stream = loaded.stream(settings);
-    let mut sums = Sums::default();
-    let mut bar = Bar::over_log(events.progress().watch());
-    let mut ticks_before = 0;
-    for event in &mut events {
-        let event = event?;
-        stream.handle((&event).into());
-        if u64::try_from(event.time().as_ns()).unwrap_or(0) < from_ns {
-            stream.drop_ready();
-            ticks_before = stream.unit().counters().gyro_ticks_in;
-        }
-        if stream.ready().len() >= BLOCK {
-            sink.write(take(&mut stream, &mut sums, form))?;
-        }
-        bar.step_saying(|| Some(format!("{} ticks", sums.ticks())));
-    }
-    stream.flush();
-    let ticks_in = stream.unit().counters().gyro_ticks_in;
-    if ticks_in == ticks_before && !events.report().lost_data() {
-        return Err(Error::Nothing("corrected", "raw message"));
-    }
-    sink.write(take(&mut stream, &mut sums, form))?;
-    sink.finish(&inputs)?;
-    bar.finish();
-
-    let (summary, log) = (sums.summary(), events.report());
-    for trouble in troubles(&stream, 0).into_iter().chain(summary.doubts()) {
-        show::warn(&trouble);
-    }
-    let digest = format!("{:016x}", u64::from_be_bytes(loaded.digest));
-    let report = Report {
-        unit: loaded.unit.as_str(),
-        calibration_digest: digest,
-        summary: &summary,
-        counters: counters(&stream).collect(),
-        log: &log,
+    let path = calibration(args)?;
+    let loaded = loaded(path)?;
+    let unit = loaded.unit.clone();
+    args.log.refuse_document_of_another(unit.as_str())?;
+    let files = args.log.files(BATCH, Some(&unit))?;
+    let calibration_digest = show::hexadecimal(loaded.digest);
+    let basis = Basis::Given { settings, calibration: Some(loaded) };
+    let plan = UnitPlan { id: unit.clone(), basis, compare: false };
+    let (units, log) = corrected(args, files, vec![plan], &[path])?;
+    let ([corrected], false) = (units.as_slice(), args.out.as_deref().is_some_and(sink::is_recording)) else {
+        return Ok(report::print(args, &units, &log));
     };
-    print_summary(args, &if args.json { show::json(&report) } else { human(&report) })?;
+    let summary = &corrected.summary;
+    corrected.troubles.iter().for_each(show::warn);
+    summary.doubts().iter().for_each(show::warn);
+    let (unit, counters) = (unit.as_str(), &corrected.counters);
+    let report = Report { unit, calibration_digest, summary, counters, log: &log };
+    let text = if args.json { show::json(&report) } else { human(&report) };
     // What went in did not all go out corrected, though the log has it.
-    let refused = ticks_in > stream.unit().counters().ticks_out;
-    Ok(Exit::of_loss(log.lost_data() || refused))
-}
-
-/// Takes what is ready and sums it up.
-fn take(stream: &mut UnitStream, sums: &mut Sums, form: Form) -> Made {
-    stream.ready().ticks().iter().for_each(|tick| sums.add(tick));
-    let mut output = Output::default();
-    output.give_out(stream, form, &mut Vec::new());
-    vec![(0, output)]
+    Ok(print_summary(args, &text, Exit::of_loss(log.lost_data() || corrected.unanswered() > 0)))
 }
 
 /// The summary as tables.
@@ -136,5 +89,5 @@ fn human(report: &Report<'_>) -> String {
         ("mean rate (°/h)", summary.mean_rate_deg_per_h, 4),
         ("mean specific force (m/s²)", summary.mean_specific_force_m_per_s2, 6),
     ];
-    show::table(&rows) + &show::axes(&means) + &show::rows(report.log)
+    show::table(&rows) + &show::axes(&means) + &show::reading(report.log)
 }

@@ -243,7 +243,7 @@ fn unit_details(text: &mut String, unit: &UnitInfo, begin_ns: i64) {
             );
         }
         list(text, &corrected.revisions, |first| {
-            let (counter, digest) = (first.revision.counter, hexadecimal(first.revision.digest));
+            let (counter, digest) = (first.revision.counter, show::hexadecimal(first.revision.digest));
             let when = after(first.first_end_ns, begin_ns);
             format!("calibration {counter} ({digest}): first tick {}, {when}", first.first_sequence)
         });
@@ -267,7 +267,7 @@ fn journal_details(text: &mut String, journal: &JournalInfo) {
         let _ = writeln!(text, "journal: {missing} entries are missing, {broken} parts are incomplete");
     }
     list(text, &journal.swaps, |swap| {
-        let (counter, digest) = (swap.revision.counter, hexadecimal(swap.revision.digest));
+        let (counter, digest) = (swap.revision.counter, show::hexadecimal(swap.revision.digest));
         format!("given: calibration {counter} ({digest}), {}", swap.source)
     });
     list(text, &journal.commands, |command| {
@@ -304,8 +304,4 @@ fn seconds(ns: u64) -> String {
 /// A time as seconds behind the beginning.
 fn after(ns: i64, begin_ns: i64) -> String {
     format!("{:.6} s from the beginning", Timestamp::from_ns(ns).seconds_from(Timestamp::from_ns(begin_ns)))
-}
-
-fn hexadecimal(digest: [u8; 8]) -> String {
-    format!("{:016x}", u64::from_be_bytes(digest))
 }

@@ -1,10 +1,9 @@
 //! Figures of a recording: while it runs, on a terminal; at its end.
 
 use std::collections::BTreeMap;
-use std::io::IsTerminal;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isotherm_bus::BusError;
+use isotherm_cli::Bar;
 
 use crate::cli::show;
 use crate::error::Error;
@@ -16,7 +15,7 @@ const MOST_ROWS: usize = 24;
 /// The figures on a terminal; nothing where there is none.
 #[derive(Debug)]
 pub(super) struct Live {
-    drawn: ProgressBar,
+    lines: Bar,
     /// Messages and bytes, and when they were looked at (s).
     before: (u64, u64, f64),
     /// Warnings that have been printed.
@@ -26,20 +25,13 @@ pub(super) struct Live {
 impl Live {
     /// Nothing yet.
     pub(super) fn new() -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let target =
-            if terminal { ProgressDrawTarget::stderr_with_hz(4) } else { ProgressDrawTarget::hidden() };
-        let drawn = ProgressBar::with_draw_target(None, target);
-        if let Ok(style) = ProgressStyle::with_template("{msg}") {
-            drawn.set_style(style);
-        }
-        Self { drawn, before: (0, 0, 0.0), warned: 0 }
+        Self { lines: Bar::lines(), before: (0, 0, 0.0), warned: 0 }
     }
 
     /// Shows them.
     pub(super) fn show(&mut self, report: &RecordReport) {
         self.warn(report);
-        if self.drawn.is_hidden() {
+        if self.lines.is_hidden() {
             return;
         }
         let (messages, bytes, at) = self.before;
@@ -52,8 +44,7 @@ impl Live {
             size(rate(report.file_bytes, bytes)),
             size(float(report.file_bytes)),
         );
-        self.drawn.set_message(topics(&report.topics) + &line);
-        self.drawn.tick();
+        self.lines.say(topics(&report.topics) + &line);
         // Over a second and more, so that chunks even out.
         if seconds >= 2.0 {
             self.before = (report.received, report.file_bytes, report.elapsed_s);
@@ -63,13 +54,13 @@ impl Live {
     /// Prints warnings that have not been printed.
     pub(super) fn warn(&mut self, report: &RecordReport) {
         let new = report.warnings.get(self.warned..).unwrap_or_default();
-        self.drawn.suspend(|| new.iter().for_each(|words| show::warn(words)));
+        self.lines.beside(|| new.iter().for_each(show::warn));
         self.warned = report.warnings.len();
     }
 
     /// Takes them away.
     pub(super) fn finish(&self) {
-        self.drawn.finish_and_clear();
+        self.lines.finish();
     }
 }
 

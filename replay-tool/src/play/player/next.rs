@@ -2,12 +2,11 @@
 
 use super::{Leaving, Player, Turn};
 use crate::error::Error;
-use crate::play::Watch;
 
 /// Messages that are passed over before others get their turn.
 const STRIDE: u32 = 256;
 
-impl<W: Watch> Player<'_, W> {
+impl Player<'_> {
     /// The next message to go out; `None` at the end of the log.
     pub(super) async fn next_due(&mut self) -> Result<Option<(Turn, Leaving)>, Error> {
         let mut passed_over = 0;

@@ -5,9 +5,10 @@ use tokio::time::Instant;
 
 use super::{Player, Stage};
 use crate::error::Error;
-use crate::play::{Command, Watch};
+use crate::pace::Speed;
+use crate::play::Command;
 
-impl<W: Watch> Player<'_, W> {
+impl Player<'_> {
     /// Does what somebody asked for meanwhile.
     pub(super) fn obey_all(&mut self) -> Result<(), Error> {
         while let Some(Ok(command)) = self.commands.as_mut().map(UnboundedReceiver::try_recv) {
@@ -37,18 +38,13 @@ impl<W: Watch> Player<'_, W> {
             Command::StepOrForward if self.paused.is_some() => self.steps += 1,
             Command::StepOrForward => self.seek(10.0)?,
             Command::Seek(seconds) => self.seek(seconds)?,
-            Command::Faster => self.pacer.set_speed(self.pacer.speed().faster()),
-            Command::Slower => self.pacer.set_speed(self.pacer.speed().slower()),
+            Command::Faster => self.set_speed(self.pacer.speed().faster()),
+            Command::Slower => self.set_speed(self.pacer.speed().slower()),
             Command::Finish => self.stage = Stage::Finishing,
             Command::Stop => return Err(Error::Stopped),
         }
         self.show();
         Ok(())
-    }
-
-    pub(super) fn show(&mut self) {
-        self.shown = Some(Instant::now());
-        self.watch.at(&self.position());
     }
 
     fn pause(&mut self, pause: bool) {
@@ -63,6 +59,14 @@ impl<W: Watch> Player<'_, W> {
         }
     }
 
+    fn set_speed(&mut self, speed: Speed) {
+        self.pacer.set_speed(speed);
+        // The rest of a wait counts from the last message.
+        if let Some(last) = self.last_at {
+            self.pacer.due(last);
+        }
+    }
+
     /// Goes on elsewhere in the log: further on, in the same series; back, in a new one.
     fn seek(&mut self, seconds: f64) -> Result<(), Error> {
         let here = self.last_at.or(self.from).unwrap_or(0);
@@ -71,7 +75,10 @@ impl<W: Watch> Player<'_, W> {
         if there < here {
             self.rewind()?;
         } else {
+            // What has been read already and goes out later than that is not read again.
+            let later = self.waiting.split_off(&(there, 0));
             self.forget();
+            self.waiting = later;
         }
         self.from = Some(there);
         self.seeks += 1;

@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
+use indicatif::HumanDuration;
 use tokio::time::Instant;
 
 use super::{Player, Stage};
 use crate::pace::Speed;
-use crate::play::Watch;
-use crate::play::report::{PlayReport, Position, UnitReport};
+use crate::play::report::{PlayReport, UnitReport};
 use crate::play::units::PlayedUnit;
 
-impl<W: Watch> Player<'_, W> {
+impl Player<'_> {
     /// How fast it was, pauses left out.
     fn actual_speed(&self, elapsed: Duration, paused: Duration) -> f64 {
         let playing = elapsed.saturating_sub(paused).as_secs_f64();
@@ -23,7 +23,12 @@ impl<W: Watch> Player<'_, W> {
         (now - self.begun, paused)
     }
 
-    pub(super) fn position(&self) -> Position {
+    /// Shows where playing is: time in the log, pass, ticks sent, speed, and how long the rest takes at this speed, pauses left out.
+    pub(super) fn show(&mut self) {
+        self.shown = Some(Instant::now());
+        if self.screen.is_hidden() {
+            return;
+        }
         let (elapsed, paused) = self.times();
         let log_s = seconds(self.last_at.or(self.from).unwrap_or(0));
         let of_pass = match self.options.part.end {
@@ -31,6 +36,7 @@ impl<W: Watch> Player<'_, W> {
             None => self.playlist.share(),
         };
         let of_pass = if of_pass.is_finite() { of_pass.clamp(0.0, 1.0) } else { 0.0 };
+        // Of this pass where there is no last one.
         #[expect(clippy::cast_precision_loss, reason = "shares of a bar")]
         let (share, passes_left) = match self.options.passes {
             Some(passes) => (
@@ -44,18 +50,15 @@ impl<W: Watch> Player<'_, W> {
             Speed::Times(times) => times,
             Speed::Max => actual_speed,
         };
-        // How long the log is shows by how far it has been read.
-        let left_s = log_s / of_pass * (1.0 - of_pass + passes_left) / times;
-        Position {
-            log_s,
-            share: share.clamp(0.0, 1.0),
-            left: Duration::try_from_secs_f64(left_s).ok(),
-            ticks_sent: self.ticks_sent,
-            pass: self.pass,
-            speed,
-            actual_speed,
-            paused: self.paused.is_some(),
-        }
+        // How long the log is shows by how far it has been read; whole seconds: it is an estimate.
+        let left =
+            Duration::try_from_secs_f64((log_s / of_pass * (1.0 - of_pass + passes_left) / times).floor());
+        let left = left.map_or_else(|_| String::new(), |left| format!("  {:#} left", HumanDuration(left)));
+        let pass = if self.pass > 1 { format!("  pass {}", self.pass) } else { String::new() };
+        let is_paused = self.paused.is_some();
+        let speed = if is_paused { "paused".to_owned() } else { format!("{actual_speed:.1}× of {speed}") };
+        let ticks = self.ticks_sent;
+        self.screen.at(share, format!("{log_s:.2} s{pass}  {ticks} ticks  {speed}{left}"));
     }
 
     /// What playing came to.

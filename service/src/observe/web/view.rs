@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use super::Web;
 use isotherm_operator::page::{
-    Lately, Level, Remark, Unit, applied, channel_in_view, is_running, knows_rates, name, range,
-    said_of_pairs, state_word,
+    Lately, Level, Remark, Unit, applied, channel_in_view, knows_rates, name, range, said_of_pairs,
+    state_word,
 };
 use isotherm_operator::status::unix_ms;
 use isotherm_operator::{Fleet, worst_first};
@@ -80,7 +80,7 @@ impl Row {
             level: unit.level(),
             reasons: unit.remarks().into_iter().map(|remark| remark.words).collect(),
             state: state_word(status.state),
-            running: is_running(status.state) && unit.gone.is_none(),
+            running: status.state.is_running() && unit.gone.is_none(),
             revision: status.calibration.as_ref().map(|calibration| calibration.revision.counter),
             digest: status.calibration.as_ref().and_then(|it| it.digest).map(|digest| digest.to_string()),
             temperature_deg_c: channel.and_then(|channel| channel.temperature_deg_c),
