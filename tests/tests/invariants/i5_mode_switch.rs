@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use isotherm_correction::calibration::GyroParts;
+use isotherm_correction::curve::CurveParts;
 use isotherm_correction::reversal::{Reversal, ReversalParts, Transition};
 use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, SensorFlags, TickFlags};
 use isotherm_correction::units::Span;
@@ -119,6 +120,22 @@ fn i5_shorter_transitions_are_bridged_too() {
         assert_eq!(restored[0].sequence, LAST_GOOD + u64::from(n) + 3, "the correction goes into j = n + 3");
         assert!(error(&out, first, TICKS, 1.0, 0.7).abs() < 0.001 * ARCSEC);
     }
+}
+
+#[test]
+fn i5_what_a_gyro_reads_in_a_transition_is_beyond_no_range() {
+    let mut parts = mode_reversed(ReversalParts::default());
+    for gyro in &mut parts.gyros {
+        gyro.increment_weight_over_rate =
+            Some(CurveParts::PiecewiseLinear { knots: vec![[-1.0, 1e-6], [1.0, 2e-6]] });
+    }
+    let ticks: Vec<_> = (0..TICKS).map(|k| raw(k, 1.0, 0.7, &[LAST_GOOD + 1], 3)).collect();
+    let out = drive::run(&mut drive::unit(&compile(&parts)), &[Owned::Gyro(ticks)]);
+    for tick in &out {
+        let clamped = tick.gyro_flags.iter().any(|flags| flags.contains(SensorFlags::CLAMPED_RATE));
+        assert!(!clamped, "tick {}: {:?}", tick.sequence, tick.flags);
+    }
+    assert_eq!(out.iter().filter(|tick| tick.flags.contains(TickFlags::INTERPOLATED)).count(), 3);
 }
 
 #[test]
