@@ -62,6 +62,12 @@ impl Pace {
         if over == Span::ZERO { Self::default() } else { Self { start, per_second: 1.0 / over.as_s() } }
     }
 
+    /// What is left of the way at `time`, as a way that begins there.
+    fn left(self, time: Timestamp) -> Self {
+        let left = 1.0 - self.share(time);
+        if left > 0.0 { Self { start: time, per_second: self.per_second / left } } else { Self::default() }
+    }
+
     /// Whether the way begins at `time`.
     pub(crate) fn starts(&self, time: Timestamp) -> bool {
         self.per_second > 0.0 && self.start == time
@@ -105,6 +111,12 @@ impl Ramp {
         } else {
             Self { pace: Pace::new(start, over), from, step: target - from }
         };
+    }
+
+    /// Goes on as before, on a way that begins at `time`.
+    pub(crate) fn set_out(&mut self, time: Timestamp) {
+        let (from, to) = (self.at(time), self.from + self.step);
+        *self = Self { pace: self.pace.left(time), from, step: to - from };
     }
 
     /// Arrives at once.
