@@ -142,11 +142,12 @@ fn terms(
     }
 }
 
-/// First place on a grid over the curve's range where it is zero or has changed its sign.
+/// A place on a grid over the curve's range, or else a knot, where it is zero or has changed its sign.
 fn sign_change(curve: &Curve) -> Option<f64> {
     let [low, high] = curve.range();
     let first = curve.at(low).value;
-    (0..=256).map(|i| low + (high - low) * f64::from(i) / 256.0).find(|&x| {
+    let grid = (0..=256).map(|i| low + (high - low) * f64::from(i) / 256.0);
+    grid.chain(curve.knots()).find(|&x| {
         let same_sign = curve.at(x).value * first;
         same_sign.is_nan() || same_sign <= 0.0
     })
