@@ -37,7 +37,7 @@ use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::sample::{ChannelName, OutputKind};
 use crate::sigma::SigmaModel;
-use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
+use crate::thermal::{AccelModel, GyroModel, Motion, MotionTerms, Trends};
 
 /// A validated coefficient set; immutable, shared by pointer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -119,6 +119,12 @@ impl Calibration {
         self.filter == other.filter
             && self.channels == other.channels
             && self.temperatures == other.temperatures
+    }
+
+    /// Everything that makes the bias of a gyro: what follows its temperature, and what follows motion, if anything does.
+    pub(crate) fn terms_of_gyro(&self, gyro: usize) -> (Option<&GyroModel>, Option<&MotionTerms>) {
+        let in_motion = self.motion.as_deref().and_then(|motion| motion.gyros.get(gyro));
+        (self.gyros.get(gyro), in_motion.filter(|terms| !terms.is_empty()))
     }
 
     /// What the drift estimator is to expect of a gyro; `None` where the set says nothing, or there is no such gyro.

@@ -279,13 +279,18 @@ impl<const T: usize> Bank<T> {
         }
     }
 
-    /// Goes on with everything of one sensor in an earlier bank, on its way as it is.
-    pub(crate) fn carry(&mut self, old: &Self, lane: usize) {
-        self.lines.iter_mut().zip(&old.lines).for_each(|(line, old)| line.copy_lane(old, lane));
-        self.started = self.started.set(lane, old.started.contains(lane));
-        self.clamped = self.clamped.set(lane, old.clamped.contains(lane));
-        if let (Some(trailed), Some(old)) = (self.trailed.get_mut(lane), old.trailed.get(lane)) {
-            *trailed = *old;
+    /// Goes on with everything of the sensors that are the same in an earlier bank, on its way as it is.
+    pub(crate) fn carry<S: PartialEq>(&mut self, sensors: &[S], (old_sensors, old): (&[S], &Self)) {
+        for (lane, (sensor, before)) in sensors.iter().zip(old_sensors).enumerate() {
+            if sensor != before {
+                continue;
+            }
+            self.lines.iter_mut().zip(&old.lines).for_each(|(line, old)| line.copy_lane(old, lane));
+            self.started = self.started.set(lane, old.started.contains(lane));
+            self.clamped = self.clamped.set(lane, old.clamped.contains(lane));
+            if let (Some(trailed), Some(old)) = (self.trailed.get_mut(lane), old.trailed.get(lane)) {
+                *trailed = *old;
+            }
         }
     }
 

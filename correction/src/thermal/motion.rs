@@ -43,7 +43,8 @@ impl MotionTerms {
         Some(Self { channel: parts.channel, terms, over_rate: None })
     }
 
-    fn is_empty(&self) -> bool {
+    /// Whether there are none.
+    pub(crate) fn is_empty(&self) -> bool {
         self.terms.is_empty() && self.over_rate.is_none()
     }
 }

@@ -169,19 +169,14 @@ impl ThermalMemory {
     fn carry_unchanged(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         self.updated.clone_from(&old_memory.updated);
         self.paces.carry(&old_memory.paces);
-        for (lane, (new, old)) in calibration.gyros.iter().zip(&old.gyros).enumerate() {
-            if new == old {
-                self.gyros.carry(&old_memory.gyros, lane);
-            }
-        }
-        for (lane, (new, old)) in calibration.accels.iter().zip(&old.accels).enumerate() {
-            if new == old {
-                self.accels.carry(&old_memory.accels, lane);
-                self.boards.carry(&old_memory.boards, lane);
-            }
-        }
-        if calibration.motion == old.motion {
-            self.motion.clone_from(&old_memory.motion);
+        self.gyros.carry(&calibration.gyros, (&old.gyros, &old_memory.gyros));
+        self.accels.carry(&calibration.accels, (&old.accels, &old_memory.accels));
+        self.boards.carry(&calibration.accels, (&old.accels, &old_memory.boards));
+        if let (Some(banks), Some(motion)) = (&mut self.motion, &calibration.motion)
+            && let (Some(old_banks), Some(old)) = (&old_memory.motion, &old.motion)
+        {
+            banks.gyros.carry(&motion.gyros, (&old.gyros, &old_banks.gyros));
+            banks.accels.carry(&motion.accels, (&old.accels, &old_banks.accels));
         }
         if calibration.gyro_orientation == old.gyro_orientation
             && calibration.gyro_orientation_channels == old.gyro_orientation_channels
