@@ -9,8 +9,8 @@ use crate::vector::{Vector, add, cross, dot, norm, scale};
 /// Input axes of the sensors of one kind: s = C(T)·v, C(T) = C0 + C1·(T − T₀), T that of the housing.
 ///
 /// An axis is a direction, so every row is given unit length again at each temperature. A corrector that takes
-/// the linear matrix as it stands differs from that by at most ½·|C1·(T − T₀)|² per row, relative: see
-/// [`Orientation::stretch`]. The presets keep it below 1e-9.
+/// the linear matrix as it stands differs from that by at most ½·|C1·(T − T₀)|² per row, relative. The presets keep it below
+/// 1e-9.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Orientation {
@@ -78,15 +78,6 @@ impl Orientation {
         turned.collect()
     }
 
-    /// Largest difference from one of a row's length before it is renormalised, at a housing temperature.
-    #[must_use]
-    pub fn stretch(&self, housing_deg_c: f64) -> f64 {
-        let away_k = housing_deg_c - self.reference_deg_c;
-        let length = |(&row, &per_k): (&Vector, &Vector)| norm(add(row, scale(per_k, away_k)));
-        let lengths = self.rows.iter().zip(&self.rows_per_k).map(length);
-        lengths.fold(0.0, |worst: f64, length| worst.max(libm::fabs(length - 1.0)))
-    }
-
     /// Determinant of Cᵀ·C at the reference temperature: zero where the axes lie in one plane.
     pub(crate) fn spread(&self) -> f64 {
         let column = |a: usize, b: usize| self.rows.iter().map(|row| row[a] * row[b]).sum::<f64>();
@@ -112,7 +103,6 @@ mod tests {
         let turn = dot(orientation.axes(70.0)[1], orientation.axes(20.0)[0])
             - dot(orientation.axes(20.0)[1], orientation.axes(20.0)[0]);
         assert!((turn + 50.0 * 4e-6).abs() < 1e-6, "{turn}");
-        assert!(orientation.stretch(20.0) < 1e-15 && orientation.stretch(70.0) > 1e-9);
     }
 
     #[test]

@@ -31,8 +31,6 @@ pub struct Trajectory {
     earth_rad_per_s: Vector,
     /// Specific force at the attitude without movement, in case axes (m/s²).
     support_m_per_s2: Vector,
-    /// Level frame to case axes without movement, by rows.
-    level_to_case: [Vector; 3],
     turn: Turn,
 }
 
@@ -63,7 +61,6 @@ impl Trajectory {
         Self {
             earth_rad_per_s: level_to_case.map(|row| dot(row, earth)),
             support_m_per_s2: level_to_case.map(|row| dot(row, support)),
-            level_to_case,
             turn: Turn::new(&motion.path),
         }
     }
@@ -106,23 +103,6 @@ impl Trajectory {
                 }
             }
         }
-    }
-
-    /// Attitude at a time: the quaternion (w, x, y, z) whose rotation takes case axes to north, east, down.
-    #[must_use]
-    pub fn attitude(&self, time_s: f64) -> [f64; 4] {
-        let own = match &self.turn {
-            Turn::Rest => [1.0, 0.0, 0.0, 0.0],
-            Turn::Constant { axis, rate_rad_per_s } => about(*axis, rate_rad_per_s * time_s),
-            Turn::Sine { axis, amplitude_rad, pulsation, phase_rad, .. } => {
-                about(*axis, amplitude_rad * libm::sin(pulsation * time_s + phase_rad))
-            }
-            Turn::Coning { half_angle_rad, pulsation } => {
-                let (sine, cosine) = libm::sincos(pulsation * time_s);
-                about([cosine, sine, 0.0], *half_angle_rad)
-            }
-        };
-        product(quaternion_to_level(self.level_to_case), own)
     }
 }
 
@@ -257,6 +237,7 @@ fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { libm::sin(x) / x }
 }
 
+/// Level frame to case axes without movement, by rows.
 fn level_to_case(motion: &Motion) -> [Vector; 3] {
     let (sh, ch) = libm::sincos(motion.heading_deg.to_radians());
     let (sp, cp) = libm::sincos(motion.pitch_deg.to_radians());
@@ -266,32 +247,6 @@ fn level_to_case(motion: &Motion) -> [Vector; 3] {
         [sr * sp * ch - cr * sh, sr * sp * sh + cr * ch, sr * cp],
         [cr * sp * ch + sr * sh, cr * sp * sh - sr * ch, cr * cp],
     ]
-}
-
-fn about(axis: Vector, angle_rad: f64) -> [f64; 4] {
-    let (sine, cosine) = libm::sincos(0.5 * angle_rad);
-    [cosine, axis[0] * sine, axis[1] * sine, axis[2] * sine]
-}
-
-fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-    let (va, vb) = ([a[1], a[2], a[3]], [b[1], b[2], b[3]]);
-    let v = add(add(scale(vb, a[0]), scale(va, b[0])), cross(va, vb));
-    [a[0] * b[0] - dot(va, vb), v[0], v[1], v[2]]
-}
-
-/// The quaternion of the transposed matrix, by its largest element, so that no root is taken of a small number.
-fn quaternion_to_level(rows: [Vector; 3]) -> [f64; 4] {
-    let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = rows;
-    let candidates = [
-        [1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
-        [zy - yz, 1.0 + xx - yy - zz, yx + xy, xz + zx],
-        [xz - zx, yx + xy, 1.0 - xx + yy - zz, zy + yz],
-        [yx - xy, xz + zx, zy + yz, 1.0 - xx - yy + zz],
-    ];
-    let norm = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>();
-    let best = candidates.into_iter().fold([0.0; 4], |best, q| if norm(&q) > norm(&best) { q } else { best });
-    let length = libm::sqrt(norm(&best));
-    best.map(|x| x / length)
 }
 
 #[cfg(test)]

@@ -84,7 +84,7 @@ fn the_quartz_accelerometers_follow_their_documented_formula() {
     let mut accumulated = [0.0_f64; 3];
     for step in Simulation::new(&scenario).unwrap() {
         let truth = &step.truth;
-        let force = block.orientation.project(truth.mean_force, truth.housing_deg_c);
+        let velocity = block.orientation.project(truth.delta_velocity, truth.housing_deg_c);
         for (index, sensor) in block.sensors.iter().enumerate() {
             let at = |c: [f64; 3], deg_c: f64| {
                 let away_k = deg_c - sensor.reference_deg_c;
@@ -92,7 +92,7 @@ fn the_quartz_accelerometers_follow_their_documented_formula() {
             };
             let deg_c = truth.accel_deg_c[index];
             let scale = at(sensor.scale_v_per_m_per_s2, deg_c) / at(sensor.board_ratio, truth.board_deg_c);
-            let volts = scale * force[index] + at(sensor.bias_v, deg_c);
+            let volts = scale * velocity[index] / step.gyro.duration.as_s() + at(sensor.bias_v, deg_c);
             let readings = &step.accel.as_ref().unwrap().readings;
             accumulated[index] += readings[index] - volts * 5.0e5 * step.gyro.duration.as_s();
             assert!(accumulated[index].abs() < 1.0 + 1e-6, "{accumulated:?}");
