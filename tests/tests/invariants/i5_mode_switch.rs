@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use isotherm_correction::calibration::GyroParts;
 use isotherm_correction::curve::CurveParts;
-use isotherm_correction::reversal::{Reversal, ReversalParts, Transition};
+use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, SensorFlags, TickFlags};
 use isotherm_correction::units::Span;
 use isotherm_tests::calibrations::{
@@ -49,7 +49,7 @@ fn run(
     missing: &[u64],
 ) -> Vec<CorrectedTick> {
     let calibration = compile(&mode_reversed(parts));
-    let n = u64::from(Reversal::new(&parts).unwrap().transition_ticks(Span::from_s(TICK_S)));
+    let n = u64::from(parts.transition.ticks(Span::from_s(TICK_S)));
     let ticks = (0..TICKS).filter(|k| !missing.contains(k)).map(|k| raw(k, frequency_hz, phase, switches, n));
     drive::run(&mut drive::unit(&calibration), &[Owned::Gyro(ticks.collect())])
 }
@@ -200,7 +200,7 @@ fn i5_a_gyro_that_is_held_back_loses_nothing_and_the_next_two_ticks_are_flagged_
         stated.gyros[1].delay_ticks = delay_ticks;
         compile(&stated)
     };
-    let n = u64::from(Reversal::new(&parts).unwrap().transition_ticks(Span::from_s(TICK_S)));
+    let n = u64::from(parts.transition.ticks(Span::from_s(TICK_S)));
     let ticks: Vec<_> = (0..TICKS).map(|k| raw(k, 1.0, 0.3, &[LAST_GOOD + 1], n)).collect();
     let [plain, held] = [0.0, 0.6]
         .map(|delay| drive::run(&mut drive::unit(&calibration(delay)), &[Owned::Gyro(ticks.clone())]));
