@@ -4,7 +4,7 @@ use isotherm_correction::sample::Sensors;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::vector::{Vector, add, cross, dot, norm, scale};
+use crate::vector::{Vector, cross, dot, norm, plus, scale};
 
 /// Input axes of the sensors of one kind: s = C(T)·v, C(T) = C0 + C1·(T − T₀), T that of the housing.
 ///
@@ -52,7 +52,7 @@ impl Orientation {
     #[must_use]
     pub fn tilted(mut self, by_rad: &[[f64; 3]], by_rad_per_k: &[[f64; 3]]) -> Self {
         let turned =
-            self.rows.iter().zip(by_rad).map(|(&row, &by)| crate::vector::unit(add(row, cross(by, row))));
+            self.rows.iter().zip(by_rad).map(|(&row, &by)| crate::vector::unit(plus(row, cross(by, row))));
         self.rows = turned.collect();
         self.rows_per_k = self.rows.iter().zip(by_rad_per_k).map(|(&row, &by)| cross(by, row)).collect();
         self
@@ -72,7 +72,7 @@ impl Orientation {
             return at_reference.collect();
         }
         let turned = at_reference.zip(&self.rows_per_k).map(|(row, &per_k)| {
-            let row = add(row, scale(per_k, away_k));
+            let row = plus(row, scale(per_k, away_k));
             scale(row, 1.0 / norm(row))
         });
         turned.collect()

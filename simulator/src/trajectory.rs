@@ -1,7 +1,7 @@
 //! Exact integrals of body rate and specific force over any interval of a motion.
 
 use crate::motion::{Motion, Path};
-use crate::vector::{Vector, add, cross, dot, scale, unit};
+use crate::vector::{Vector, cross, dot, minus, plus, scale, unit};
 
 /// Integrals over one interval, in case axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -16,7 +16,7 @@ impl Increments {
     /// Increments over this interval and the next one together.
     #[must_use]
     pub fn plus(self, next: Self) -> Self {
-        Self { angle: add(self.angle, next.angle), velocity: add(self.velocity, next.velocity) }
+        Self { angle: plus(self.angle, next.angle), velocity: plus(self.velocity, next.velocity) }
     }
 }
 
@@ -76,7 +76,7 @@ impl Trajectory {
                 let (sine, cosine) = libm::sincos(rate_rad_per_s * middle_s);
                 let seen = |v| turned_back(*axis, v, flat * cosine, flat * sine, length_s);
                 let own = scale(*axis, rate_rad_per_s * length_s);
-                Increments { angle: add(own, seen(earth)), velocity: seen(support) }
+                Increments { angle: plus(own, seen(earth)), velocity: seen(support) }
             }
             Turn::Sine { axis, amplitude_rad, pulsation, phase_rad, vibration } => {
                 let middle_rad = pulsation * middle_s + phase_rad;
@@ -91,14 +91,14 @@ impl Trajectory {
                     scale(vibration.amplitude_m_per_s2, mean * length_s)
                 });
                 Increments {
-                    angle: add(scale(*axis, turned_rad), seen(earth)),
-                    velocity: add(shaken, seen(support)),
+                    angle: plus(scale(*axis, turned_rad), seen(earth)),
+                    velocity: plus(shaken, seen(support)),
                 }
             }
             Turn::Coning { half_angle_rad, pulsation } => {
                 let cone = Cone::new(*half_angle_rad, *pulsation, middle_s, length_s);
                 Increments {
-                    angle: add(cone.own_angle(*pulsation), cone.seen(earth)),
+                    angle: plus(cone.own_angle(*pulsation), cone.seen(earth)),
                     velocity: cone.seen(support),
                 }
             }
@@ -192,7 +192,7 @@ impl Cone {
         let (cc, ss, cs) = (0.5 * (self.length_s + cos_2), 0.5 * (self.length_s - cos_2), 0.5 * sin_2);
         let along = scale([cc * v[0] + cs * v[1], cs * v[0] + ss * v[1], 0.0], 2.0 * s * s);
         let straight = scale(v, self.length_s * (1.0 - 2.0 * s * s));
-        add(add(straight, along), scale(cross(axis, v), -2.0 * c))
+        plus(plus(straight, along), scale(cross(axis, v), -2.0 * c))
     }
 }
 
@@ -200,8 +200,8 @@ impl Cone {
 /// and sine of its angle.
 fn turned_back(axis: Vector, v: Vector, cosine: f64, sine: f64, length_s: f64) -> Vector {
     let along = scale(axis, dot(axis, v));
-    let across = add(v, scale(along, -1.0));
-    add(add(scale(along, length_s), scale(across, cosine)), scale(cross(axis, v), -sine))
+    let across = minus(v, along);
+    plus(plus(scale(along, length_s), scale(across, cosine)), scale(cross(axis, v), -sine))
 }
 
 /// ∫cos φ and ∫sin φ over an interval whose middle is offset zero.

@@ -4,7 +4,7 @@ use crate::failure::{FailingSensor, Failure, Fault};
 use crate::instrument::Gyros;
 use crate::scenario::Scenario;
 use crate::simulation::Simulation;
-use crate::vector::{add, norm, scale};
+use crate::vector::{norm, plus, scale};
 
 fn all() -> Vec<Scenario> {
     let failure = Failure { sensor: FailingSensor::Gyro(2), at_s: 100.0, fault: Fault::Stuck };
@@ -50,7 +50,7 @@ fn temperature_changes_the_length_of_a_row_by_less_than_1e_9() {
         for axes in [instrument.gyro_orientation, instrument.accelerometers.unwrap().orientation] {
             for away_k in [-45.0, 90.0].map(|deg_c| deg_c - axes.reference_deg_c) {
                 for (row, per_k) in axes.rows.iter().zip(&axes.rows_per_k) {
-                    assert!((norm(add(*row, scale(*per_k, away_k))) - 1.0).abs() < 1e-9, "{axes:?}");
+                    assert!((norm(plus(*row, scale(*per_k, away_k))) - 1.0).abs() < 1e-9, "{axes:?}");
                 }
             }
         }

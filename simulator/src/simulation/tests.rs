@@ -121,7 +121,7 @@ fn jittered_ticks_stay_contiguous_and_keep_the_truth() {
         assert_eq!(end + step.gyro.duration, step.gyro.end_time);
         assert!((8_000_000..=12_000_000).contains(&step.gyro.duration.as_ns()));
         end = step.gyro.end_time;
-        turned = crate::vector::add(turned, step.truth.delta_angle);
+        turned = crate::vector::plus(turned, step.truth.delta_angle);
     }
     let whole = Trajectory::new(&jittered.motion);
     let length_s = end.seconds_from(Timestamp::from_ns(0));
@@ -129,7 +129,7 @@ fn jittered_ticks_stay_contiguous_and_keep_the_truth() {
     for part in 0..6000_u32 {
         let part_s = length_s / 6000.0;
         expected =
-            crate::vector::add(expected, whole.increments((f64::from(part) + 0.5) * part_s, part_s).angle);
+            crate::vector::plus(expected, whole.increments((f64::from(part) + 0.5) * part_s, part_s).angle);
     }
     for axis in 0..3 {
         assert!((turned[axis] - expected[axis]).abs() < 1e-11, "{}", turned[axis] - expected[axis]);

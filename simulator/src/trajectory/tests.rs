@@ -33,7 +33,7 @@ fn conjugate(q: [f64; 4]) -> [f64; 4] {
 
 fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     let (va, vb) = ([a[1], a[2], a[3]], [b[1], b[2], b[3]]);
-    let v = add(add(scale(vb, a[0]), scale(va, b[0])), cross(va, vb));
+    let v = plus(plus(scale(vb, a[0]), scale(va, b[0])), cross(va, vb));
     [a[0] * b[0] - dot(va, vb), v[0], v[1], v[2]]
 }
 
@@ -87,11 +87,11 @@ fn by_brute_force(motion: &Motion, middle_s: f64, length_s: f64) -> Increments {
         } = motion.path
         {
             let phase = TURN_RAD * frequency_hz * centre_s + vibration_phase_deg.to_radians();
-            force = add(force, scale(unit(vibration_axis), vibration_m_per_s2 * libm::sin(phase)));
+            force = plus(force, scale(unit(vibration_axis), vibration_m_per_s2 * libm::sin(phase)));
         }
         let sine = crate::vector::norm([x, y, z]);
         let by_rad = scale([x, y, z], if sine > 0.0 { 2.0 * libm::asin(sine) / sine } else { 0.0 });
-        let step = Increments { angle: add(by_rad, earth_rad), velocity: scale(force, part_s) };
+        let step = Increments { angle: plus(by_rad, earth_rad), velocity: scale(force, part_s) };
         sum = sum.plus(step);
     }
     sum
