@@ -114,6 +114,13 @@ impl Calibration {
         self.gyros.iter().map(move |gyro| if counts { gyro.increment_weight.abs() } else { 0.0 })
     }
 
+    /// What one count of each accelerometer is worth at the assumed temperature (m/s); likewise.
+    pub(crate) fn count_m_per_s(&self) -> impl Iterator<Item = f64> {
+        let (counts, deg_c) = (self.accel_output == OutputKind::Counts, self.filter.assumed_deg_c);
+        let size = move |accel: &AccelModel| 1.0 / accel.scale_factor.at(deg_c).value.abs();
+        self.accels.iter().map(move |accel| if counts { size(accel) } else { 0.0 })
+    }
+
     /// Whether another set filters the same channels in the same way, so that thermal memory means the same in both.
     pub(crate) fn same_thermal_basis(&self, other: &Self) -> bool {
         self.filter == other.filter

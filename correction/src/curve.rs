@@ -50,7 +50,7 @@ pub enum CurveParts {
 }
 
 /// Range of a constant: wider than any temperature or rate.
-const ANYWHERE: [f64; 2] = [-1e9, 1e9];
+pub(crate) const ANYWHERE: [f64; 2] = [-1e9, 1e9];
 
 impl CurveParts {
     /// The value at an argument, clamped to the fitted range; `None` where the numbers make no curve.
