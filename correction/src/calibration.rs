@@ -37,7 +37,7 @@ use crate::orientation::Orientation;
 use crate::reversal::Reversal;
 use crate::sample::{ChannelName, OutputKind};
 use crate::sigma::SigmaModel;
-use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
+use crate::thermal::{AccelModel, GyroModel, Motion, MotionTerms, Trends};
 
 /// A validated coefficient set; immutable, shared by pointer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -114,11 +114,24 @@ impl Calibration {
         self.gyros.iter().map(move |gyro| if counts { gyro.increment_weight.abs() } else { 0.0 })
     }
 
+    /// What one count of each accelerometer is worth at the assumed temperature (m/s); likewise.
+    pub(crate) fn count_m_per_s(&self) -> impl Iterator<Item = f64> {
+        let (counts, deg_c) = (self.accel_output == OutputKind::Counts, self.filter.assumed_deg_c);
+        let size = move |accel: &AccelModel| 1.0 / accel.scale_factor.at(deg_c).value.abs();
+        self.accels.iter().map(move |accel| if counts { size(accel) } else { 0.0 })
+    }
+
     /// Whether another set filters the same channels in the same way, so that thermal memory means the same in both.
     pub(crate) fn same_thermal_basis(&self, other: &Self) -> bool {
         self.filter == other.filter
             && self.channels == other.channels
             && self.temperatures == other.temperatures
+    }
+
+    /// Everything that makes the bias of a gyro: what follows its temperature, and what follows motion, if anything does.
+    pub(crate) fn terms_of_gyro(&self, gyro: usize) -> (Option<&GyroModel>, Option<&MotionTerms>) {
+        let in_motion = self.motion.as_deref().and_then(|motion| motion.gyros.get(gyro));
+        (self.gyros.get(gyro), in_motion.filter(|terms| !terms.is_empty()))
     }
 
     /// What the drift estimator is to expect of a gyro; `None` where the set says nothing, or there is no such gyro.

@@ -253,17 +253,14 @@ impl ChannelMemory {
         self.seen = true;
 
         let step = filter.grid_step.as_ns();
-        let Some((last_time, last_temperature)) = self.last.replace((time, temperature)) else {
+        let last = self.last.replace((time, temperature));
+        let last = last.filter(|(last, _)| time.since(*last) <= filter.longest_bridged());
+        let Some((last_time, last_temperature)) = last else {
             self.refill(filter, temperature);
             on_point(&self.state);
             return Verdict::Restarted;
         };
         let (from, to) = (last_time.as_ns().div_euclid(step), time.as_ns().div_euclid(step));
-        if time.since(last_time) > filter.longest_bridged() {
-            self.refill(filter, temperature);
-            on_point(&self.state);
-            return Verdict::Restarted;
-        }
         let span_s = time.seconds_from(last_time);
         let mut points = 0;
         for index in from + 1..=to {

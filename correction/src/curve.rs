@@ -50,7 +50,7 @@ pub enum CurveParts {
 }
 
 /// Range of a constant: wider than any temperature or rate.
-const ANYWHERE: [f64; 2] = [-1e9, 1e9];
+pub(crate) const ANYWHERE: [f64; 2] = [-1e9, 1e9];
 
 impl CurveParts {
     /// The value at an argument, clamped to the fitted range; `None` where the numbers make no curve.
@@ -145,7 +145,12 @@ impl Curve {
         Evaluated { value, clamped }
     }
 
-    /// First and last argument of the fitted range; infinite for a constant.
+    /// Arguments at which one stretch of the curve ends and another begins; the reference of a polynomial.
+    pub(crate) fn knots(&self) -> impl Iterator<Item = f64> {
+        self.pieces.iter().map(|piece| piece.origin)
+    }
+
+    /// First and last argument of the fitted range; without end where there is none.
     #[must_use]
     pub const fn range(&self) -> [f64; 2] {
         self.range

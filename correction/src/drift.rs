@@ -45,25 +45,17 @@ pub use ring::{CELL, LARGEST_UNOBSERVED_SHARE, RING_CELLS};
 
 use crate::stated::{OutOfRange, outside};
 
-/// Smallest and largest sigma of the Markov part (rad/s); zero means that there is none.
-pub const SIGMA_RANGE_RAD_PER_S: [f64; 2] = [0.0, 0.1];
 /// Shortest and longest correlation time (s): drift faster than a reference span is noise, not drift.
-pub const CORRELATION_TIME_RANGE_S: [f64; 2] = [60.0, 1e9];
-/// Smallest and largest sigma of the trend rate (rad/s²); zero means that there is none.
-pub const TREND_SIGMA_RANGE_RAD_PER_S2: [f64; 2] = [0.0, 1e-4];
-/// Smallest and largest initial sigma of the constant part (rad/s).
-pub const INITIAL_SIGMA_RANGE_RAD_PER_S: [f64; 2] = [1e-12, 0.1];
-/// Smallest and largest angle random walk (rad/√s): a measurement without noise is none.
-pub const ANGLE_RANDOM_WALK_RANGE_RAD_PER_SQRT_S: [f64; 2] = [1e-12, 1.0];
+const CORRELATION_TIME_RANGE_S: [f64; 2] = [60.0, 1e9];
 
 /// The drift of one gyro as the calibration document states it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DriftParts {
-    /// σ: stationary sigma of the first-order Markov part (rad/s, 0…0.1).
+    /// σ: stationary sigma of the first-order Markov part (rad/s, 0…0.1; 0: there is none).
     pub sigma_rad_per_s: f64,
     /// τ: its correlation time (s, 60…10⁹).
     pub correlation_time_s: f64,
-    /// σ1: stationary sigma of the trend rate χ (rad/s², 0…10⁻⁴).
+    /// σ1: stationary sigma of the trend rate χ (rad/s², 0…10⁻⁴; 0: there is none).
     pub trend_sigma_rad_per_s2: f64,
     /// τ1: correlation time of the trend rate (s, 60…10⁹).
     pub trend_correlation_time_s: f64,
@@ -87,16 +79,13 @@ impl DriftModel {
     /// Everything that is wrong with it.
     pub fn new(parts: &DriftParts) -> Result<Self, Vec<OutOfRange>> {
         let outside = outside([
-            ("sigma_rad_per_s", parts.sigma_rad_per_s, SIGMA_RANGE_RAD_PER_S),
+            ("sigma_rad_per_s", parts.sigma_rad_per_s, [0.0, 0.1]),
             ("correlation_time_s", parts.correlation_time_s, CORRELATION_TIME_RANGE_S),
-            ("trend_sigma_rad_per_s2", parts.trend_sigma_rad_per_s2, TREND_SIGMA_RANGE_RAD_PER_S2),
+            ("trend_sigma_rad_per_s2", parts.trend_sigma_rad_per_s2, [0.0, 1e-4]),
             ("trend_correlation_time_s", parts.trend_correlation_time_s, CORRELATION_TIME_RANGE_S),
-            ("initial_sigma_rad_per_s", parts.initial_sigma_rad_per_s, INITIAL_SIGMA_RANGE_RAD_PER_S),
-            (
-                "angle_random_walk_rad_per_sqrt_s",
-                parts.angle_random_walk_rad_per_sqrt_s,
-                ANGLE_RANDOM_WALK_RANGE_RAD_PER_SQRT_S,
-            ),
+            ("initial_sigma_rad_per_s", parts.initial_sigma_rad_per_s, [1e-12, 0.1]),
+            // A measurement without noise is none.
+            ("angle_random_walk_rad_per_sqrt_s", parts.angle_random_walk_rad_per_sqrt_s, [1e-12, 1.0]),
         ]);
         let errors: Vec<_> = outside.collect();
         if errors.is_empty() { Ok(Self { parts: *parts }) } else { Err(errors) }

@@ -16,6 +16,7 @@
 //! | [`stated`] | a stated number outside its range |
 //! | [`sample`] | what goes in (raw ticks, temperature readings) and what comes out (corrected ticks, flags) |
 //! | [`calibration`] | the immutable, validated coefficient set |
+//! | [`vector`] | vectors of three |
 //! | [`curve`] | polynomial, piecewise-linear table and cubic spline, clamped to their fitted range |
 //! | [`lanes`] | sensor beside sensor: one number of each |
 //! | [`channel`] | temperature channel: gating, smoothing, three-point derivatives |
@@ -63,5 +64,5 @@ pub mod stated;
 pub mod thermal;
 pub mod unit;
 pub mod units;
-mod vector;
+pub mod vector;
 mod written;

@@ -92,7 +92,7 @@ pub struct StepSum {
     coning: [f64; 3],
     /// σ of the open step (m/s).
     sculling: [f64; 3],
-    /// Increments of the tick before: Δα (rad) and Δν (m/s); zero where there is none next to it.
+    /// Increments of the tick before: Δα (rad) and Δν (m/s); zero where there is none next to it, or it is of a raw step.
     last: ([f64; 3], [f64; 3]),
     /// Standard errors of the open step, which a tick's form leaves out.
     errors: Option<Box<Sigma>>,
@@ -200,7 +200,10 @@ impl StepSum {
         };
         (sum.revision, sum.series) = (self.revision, self.series);
         sum.sigma = self.errors.take();
-        if step.coning_sculling && !sum.flags.contains(TickFlags::UNCALIBRATED) {
+        if sum.flags.contains(TickFlags::UNCALIBRATED) {
+            // From counts nothing follows for the next step.
+            self.last = Default::default();
+        } else if step.coning_sculling {
             let rotated = rotation(sum.delta_angle, sum.delta_velocity);
             sum.delta_velocity = plus(sum.delta_velocity, plus(rotated, sculling));
             sum.delta_angle = plus(sum.delta_angle, coning);

@@ -182,12 +182,6 @@ impl Orientation {
         self.range_deg_c
     }
 
-    /// Length of the parity vector beyond which a sensor must be at fault (the sensor's unit).
-    #[must_use]
-    pub const fn parity_limit(&self) -> Option<f64> {
-        self.parity_limit
-    }
-
     /// C(T)⁺ over the sensors of `mask`: the inverse of three, the weighted pseudo-inverse
     /// (CᵀWC)⁻¹CᵀW of more.
     ///
@@ -238,7 +232,7 @@ impl Orientation {
     #[must_use]
     pub fn forward(&self, temperature_deg_c: f64, v: [f64; 3]) -> Sensors<f64> {
         let rows = self.rows_at(temperature_deg_c);
-        rows.iter().take(self.sensors).map(|row| dot(row, &v)).collect()
+        rows.iter().take(self.sensors).map(|row| dot(*row, v)).collect()
     }
 
     /// Direction cosines of the input axes, by case axis and sensor.

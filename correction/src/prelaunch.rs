@@ -278,22 +278,21 @@ impl PreLaunch {
 
     fn check_change(&self, gyro: usize, constants: &GyroConstants, refusals: &mut Vec<Refusal>) {
         let limits = &self.settings.limits;
-        let mut check = |constant, change: Option<f64>, limit_rad_per_s: f64| {
+        let static_bias = Some(constants.static_bias_change_rad_per_s);
+        let magnetic_bias = constants.magnetic_bias_change_rad_per_s;
+        for (constant, change, limit_rad_per_s) in [
+            (BiasConstant::Static, static_bias, limits.static_bias_change_rad_per_s),
+            (BiasConstant::Magnetic, magnetic_bias, limits.magnetic_bias_change_rad_per_s),
+        ] {
             // What is no number is beyond any limit.
             let beyond = change.filter(|change| change.is_nan() || change.abs() > limit_rad_per_s);
-            if let Some(change_rad_per_s) = beyond {
-                refusals.push(Refusal::ChangeBeyondLimit {
-                    gyro,
-                    constant,
-                    change_rad_per_s,
-                    limit_rad_per_s,
-                });
-            }
-        };
-        let static_bias = Some(constants.static_bias_change_rad_per_s);
-        check(BiasConstant::Static, static_bias, limits.static_bias_change_rad_per_s);
-        let magnetic_bias = constants.magnetic_bias_change_rad_per_s;
-        check(BiasConstant::Magnetic, magnetic_bias, limits.magnetic_bias_change_rad_per_s);
+            refusals.extend(beyond.map(|change_rad_per_s| Refusal::ChangeBeyondLimit {
+                gyro,
+                constant,
+                change_rad_per_s,
+                limit_rad_per_s,
+            }));
+        }
     }
 }
 

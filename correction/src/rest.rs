@@ -36,8 +36,7 @@ use window::Window;
 use crate::by_mode::ByMode;
 use crate::calibration::Calibration;
 use crate::observation::Observation;
-use crate::sample::{LasingMode, OutputKind, TickFlags};
-use crate::thermal::AccelModel;
+use crate::sample::{LasingMode, TickFlags};
 use crate::units::{Angle, SpecificForce, Timestamp};
 
 /// Kinds of motion, each with the unit of measure of its value and limit.
@@ -137,14 +136,7 @@ impl RestMonitor {
     #[must_use]
     pub fn new(limits: &RestLimits, calibration: &Calibration) -> Self {
         let angle_rad = calibration.count_rad().fold(0.0, f64::max);
-        let velocity_m_per_s = match calibration.accel_output() {
-            OutputKind::Counts => {
-                let assumed_deg_c = calibration.filter.assumed_deg_c;
-                let per_m_per_s2 = |accel: &AccelModel| accel.scale_factor.at(assumed_deg_c).value;
-                calibration.accels.iter().map(|accel| 1.0 / per_m_per_s2(accel).abs()).fold(0.0, f64::max)
-            }
-            OutputKind::Mean => 0.0,
-        };
+        let velocity_m_per_s = calibration.count_m_per_s().fold(0.0, f64::max);
         Self {
             rate_scale: Scale::new(limits.turn_rad, limits.turn_ceiling_rad, limits.sigmas, angle_rad),
             force_scale: Scale::new(

@@ -68,8 +68,8 @@ struct LostTick {
     sensors: usize,
 }
 
-/// Good readings on one side of a switch, with their abscissas (s).
-type Window<'a> = ArrayVec<(f64, &'a Reading), { MAX_FIT_READINGS as usize }>;
+/// Good readings on one side of a switch, with their places among all and their abscissas (s).
+type Window<'a> = ArrayVec<(usize, f64, &'a Reading), { MAX_FIT_READINGS as usize }>;
 /// Those of one sensor.
 type Side = ArrayVec<[f64; 2], { MAX_FIT_READINGS as usize }>;
 
@@ -125,45 +125,7 @@ impl Substitution {
     /// A mode that differs from the last one without a command begins a transition at this tick; where ticks
     /// are missing before it the switch may have come later than the gap's start, so all n are counted
     /// from here. Ticks missing inside a transition count as ticks of it.
-    #[inline]
     pub fn tick(
-        &mut self,
-        reversal: &Reversal,
-        input: TickInput,
-        increments: &mut [f64],
-        counted: SensorMask,
-    ) -> TickFlags {
-        if !self.passes(&input) {
-            return self.bridge(reversal, input, increments, counted);
-        }
-        self.pass(&input, rates(increments, input.duration, counted));
-        TickFlags::empty()
-    }
-
-    /// Sensors whose increment in an `INTERPOLATED` or `ANGLE_RESTORED` tick just taken is none that a bridge made: without a reading to
-    /// predict from, or without one to fit behind the switch.
-    pub(crate) fn apart(&self) -> SensorMask {
-        self.apart
-    }
-
-    /// Whether a tick has nothing to do with a switch: it [passes](Self::pass) as it is.
-    #[inline]
-    pub(crate) fn passes(&self, input: &TickInput) -> bool {
-        self.is_settled() && !input.restart && !self.may_switch(input)
-    }
-
-    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); NaN where no reading counts.
-    #[expect(clippy::inline_always, reason = "once per tick: the reading is made where it is put")]
-    #[inline(always)]
-    pub(crate) fn pass(&mut self, input: &TickInput, rates: Lanes) {
-        self.change_due = false;
-        if let Some(reading) = Reading::of(input.end_time, input.duration, rates) {
-            self.history.push(reading);
-        }
-    }
-
-    /// Takes a tick in or about a switch.
-    fn bridge(
         &mut self,
         reversal: &Reversal,
         input: TickInput,
@@ -192,11 +154,33 @@ impl Substitution {
         flags
     }
 
+    /// Sensors whose increment in an `INTERPOLATED` or `ANGLE_RESTORED` tick just taken is none that a bridge made: without a reading to
+    /// predict from, or without one to fit behind the switch.
+    pub(crate) fn apart(&self) -> SensorMask {
+        self.apart
+    }
+
+    /// Whether a tick has nothing to do with a switch: it [passes](Self::pass) as it is, and [`tick`](Self::tick) would do the same.
+    #[inline]
+    pub(crate) fn passes(&self, input: &TickInput) -> bool {
+        self.is_settled() && !input.restart && !self.may_switch(input)
+    }
+
+    /// Remembers the rates (rad/s) of the sensors in a tick that [passes](Self::passes); NaN where no reading counts.
+    #[expect(clippy::inline_always, reason = "once per tick: the reading is made where it is put")]
+    #[inline(always)]
+    pub(crate) fn pass(&mut self, input: &TickInput, rates: Lanes) {
+        self.change_due = false;
+        if let Some(reading) = Reading::of(input.end_time, input.duration, rates) {
+            self.history.push(reading);
+        }
+    }
+
     /// Ticks of the transition still to come, the coming one included.
     fn left_from(&self, reversal: Reversal, input: &TickInput) -> u8 {
         let changed = matches!((self.mode, input.mode), (Some(old), Some(new)) if old != new);
         if input.switch_command || (changed && !input.restart && !self.change_due) {
-            reversal.transition_ticks(input.duration)
+            reversal.parts.transition.ticks(input.duration)
         } else if input.restart {
             0
         } else {
@@ -248,7 +232,7 @@ impl Substitution {
         let (end_time, duration) = (input.end_time, input.duration);
         lost.push(LostTick { end_time, duration, predicted, sensors: increments.len() });
         // What comes behind a transition that is cut is still part of it, and taken as it reads.
-        resolved && !(self.left == 0 && reversal.is_cut(duration))
+        resolved && !(self.left == 0 && reversal.parts.transition.is_cut(duration))
     }
 
     /// Steps 3 and 4. Returns false where an angle had to be given up.
@@ -299,18 +283,10 @@ impl Substitution {
     /// apart.
     fn predict(&mut self, reversal: Reversal, input: &TickInput) -> [f64; MAX_SENSORS] {
         let mut predicted = [0.0; MAX_SENSORS];
-        let Some(newest) = self.history.newest() else {
-            return predicted;
-        };
-        let reach = reach_s(reversal, newest.duration);
         let x = mid_time_s(input.end_time, input.duration, input.end_time);
-        let window = self.history.newest_first().take(reversal.parts.predict_readings.into());
-        let window: Window<'_> = window
-            .map(|reading| (reading.mid_time_s(input.end_time), reading))
-            .filter(|(at, _)| (x - at).abs() <= reach)
-            .collect();
+        let window: Window<'_> = predicting(&self.history, reversal, 0, (input.end_time, x)).collect();
         for (sensor, predicted) in predicted.iter_mut().enumerate() {
-            let points: Points = window.iter().filter_map(|(at, r)| r.point(*at, sensor)).collect();
+            let points: Points = window.iter().filter_map(|(_, at, r)| r.point(*at, sensor)).collect();
             if points.is_empty() && !window.is_empty() {
                 self.apart = self.apart.with(sensor);
             }
@@ -385,6 +361,21 @@ fn rates(increments: &[f64], duration: Span, counted: SensorMask) -> Lanes {
 /// How far a reading may be from a lost tick to say something about it (s), at ticks of a duration.
 fn reach_s(reversal: Reversal, duration: Span) -> f64 {
     f64::from(reversal.reach_ticks(duration)) * duration.as_s()
+}
+
+/// Readings that a lost tick is predicted from, of those before the newest `after`: the newest first, with their places among all and
+/// their abscissas from `origin`, from which `x` is that of the tick (s).
+fn predicting(
+    history: &History,
+    reversal: Reversal,
+    after: usize,
+    (origin, x): (Timestamp, f64),
+) -> impl Iterator<Item = (usize, f64, &Reading)> {
+    let mut readings = history.newest_first().enumerate().skip(after).peekable();
+    let reach = readings.peek().map_or(0.0, |(_, newest)| reach_s(reversal, newest.duration));
+    let timed = readings.take(reversal.parts.predict_readings.into());
+    let timed = timed.map(move |(place, reading)| (place, reading.mid_time_s(origin), reading));
+    timed.filter(move |(_, at, _)| (x - at).abs() <= reach)
 }
 
 /// Readings of one sensor for the fit over lost ticks: the first of the newest `after`, which came behind the switch, and the last ones

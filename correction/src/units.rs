@@ -79,6 +79,8 @@ pub struct Span(i64);
 impl Span {
     /// No time at all.
     pub const ZERO: Self = Self(0);
+    /// An hour.
+    pub(crate) const HOUR: Self = Self(3_600_000_000_000);
 
     /// From nanoseconds; negative values become zero.
     #[must_use]

@@ -3,22 +3,26 @@
 use serde::{Deserialize, Serialize};
 
 /// Sum of two vectors.
-pub(crate) fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+#[must_use]
+pub fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// Difference of two vectors.
-pub(crate) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+#[must_use]
+pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// Scalar product of two vectors.
-pub(crate) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+#[must_use]
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Vector product of two vectors.
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+#[must_use]
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

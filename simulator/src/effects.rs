@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::gyros::TickTime;
 use crate::thermal::Interval;
 use crate::trajectory::{Increments, Trajectory};
-use crate::vector::{Vector, add, cross, dot, scale};
+use crate::vector::{Vector, cross, dot, minus, plus, scale};
 
 /// Length over which a rate or a force counts as the one at its middle (s).
 const INSTANT_S: f64 = 1e-6;
@@ -259,7 +259,7 @@ impl EffectsState {
         let sense = |(((gyro, play), halves), deg_c): ((&(GyroEffects, PlayState), &mut [f64; 2]), &f64)| {
             let away_k = deg_c - gyro.reference_deg_c;
             let by_force =
-                add(gyro.acceleration_rad_per_s_per_m_per_s2, scale(gyro.acceleration_per_k, away_k));
+                plus(gyro.acceleration_rad_per_s_per_m_per_s2, scale(gyro.acceleration_per_k, away_k));
             let rate = (halves[0] + halves[1]) / length_s;
             let sign = if rate < 0.0 { -1.0 } else { 1.0 };
             let factor = 1.0 + gyro.scale_asymmetry * sign + gyro.scale_curvature_s2_per_rad2 * rate * rate;
@@ -302,8 +302,7 @@ impl EffectsState {
                 let felt = late.as_ref().unwrap_or(&on_time);
                 let mut sum = dot(axis, cross(felt.mean_change, arm));
                 if let Some(late) = &late {
-                    sum +=
-                        dot(axis, scale(add(late.velocity, scale(on_time.velocity, -1.0)), 1.0 / length_s));
+                    sum += dot(axis, scale(minus(late.velocity, on_time.velocity), 1.0 / length_s));
                 }
                 for (weight, (rate, force)) in &felt.instants {
                     let along = dot(axis, *force);
@@ -338,7 +337,7 @@ impl Felt {
         });
         let instants = nodes.map(|(weight, time_s)| (weight, at(time_s)));
         Self {
-            mean_change: scale(add(ends[0], scale(ends[1], -1.0)), 1.0 / length_s),
+            mean_change: scale(minus(ends[0], ends[1]), 1.0 / length_s),
             velocity: trajectory.increments(middle_s, length_s).velocity,
             instants: instants.collect(),
         }

@@ -4,13 +4,13 @@ use isotherm_correction::sample::Sensors;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::vector::{Vector, add, cross, dot, norm, scale};
+use crate::vector::{Vector, cross, dot, norm, plus, scale};
 
 /// Input axes of the sensors of one kind: s = C(T)·v, C(T) = C0 + C1·(T − T₀), T that of the housing.
 ///
 /// An axis is a direction, so every row is given unit length again at each temperature. A corrector that takes
-/// the linear matrix as it stands differs from that by at most ½·|C1·(T − T₀)|² per row, relative: see
-/// [`Orientation::stretch`]. The presets keep it below 1e-9.
+/// the linear matrix as it stands differs from that by at most ½·|C1·(T − T₀)|² per row, relative. The presets keep it below
+/// 1e-9.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Orientation {
@@ -52,7 +52,7 @@ impl Orientation {
     #[must_use]
     pub fn tilted(mut self, by_rad: &[[f64; 3]], by_rad_per_k: &[[f64; 3]]) -> Self {
         let turned =
-            self.rows.iter().zip(by_rad).map(|(&row, &by)| crate::vector::unit(add(row, cross(by, row))));
+            self.rows.iter().zip(by_rad).map(|(&row, &by)| crate::vector::unit(plus(row, cross(by, row))));
         self.rows = turned.collect();
         self.rows_per_k = self.rows.iter().zip(by_rad_per_k).map(|(&row, &by)| cross(by, row)).collect();
         self
@@ -72,19 +72,10 @@ impl Orientation {
             return at_reference.collect();
         }
         let turned = at_reference.zip(&self.rows_per_k).map(|(row, &per_k)| {
-            let row = add(row, scale(per_k, away_k));
+            let row = plus(row, scale(per_k, away_k));
             scale(row, 1.0 / norm(row))
         });
         turned.collect()
-    }
-
-    /// Largest difference from one of a row's length before it is renormalised, at a housing temperature.
-    #[must_use]
-    pub fn stretch(&self, housing_deg_c: f64) -> f64 {
-        let away_k = housing_deg_c - self.reference_deg_c;
-        let length = |(&row, &per_k): (&Vector, &Vector)| norm(add(row, scale(per_k, away_k)));
-        let lengths = self.rows.iter().zip(&self.rows_per_k).map(length);
-        lengths.fold(0.0, |worst: f64, length| worst.max(libm::fabs(length - 1.0)))
     }
 
     /// Determinant of Cᵀ·C at the reference temperature: zero where the axes lie in one plane.
@@ -112,7 +103,6 @@ mod tests {
         let turn = dot(orientation.axes(70.0)[1], orientation.axes(20.0)[0])
             - dot(orientation.axes(20.0)[1], orientation.axes(20.0)[0]);
         assert!((turn + 50.0 * 4e-6).abs() < 1e-6, "{turn}");
-        assert!(orientation.stretch(20.0) < 1e-15 && orientation.stretch(70.0) > 1e-9);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::surroundings::Surroundings;
 use crate::temperature::{Place, ThermometersState};
 use crate::trajectory::{Increments, Trajectory};
 use crate::truth::{Step, Truth};
-use crate::vector::{dot, scale};
+use crate::vector::dot;
 
 /// A running simulation: an iterator over the ticks of a scenario.
 ///
@@ -232,12 +232,10 @@ impl Simulation {
     }
 
     fn truth(&self, whole: Increments, time: TickTime, output: &GyroOutput) -> Truth {
-        let TickTime { length_s, share, housing_deg_c, .. } = time;
+        let TickTime { share, housing_deg_c, .. } = time;
         Truth {
             delta_angle: whole.angle,
             delta_velocity: whole.velocity,
-            mean_rate: scale(whole.angle, 1.0 / length_s),
-            mean_force: scale(whole.velocity, 1.0 / length_s),
             chamber_deg_c: self.surroundings.chamber_deg_c.at(share),
             housing_deg_c,
             board_deg_c: self.surroundings.board.deg_c.at(share),

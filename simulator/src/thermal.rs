@@ -16,14 +16,6 @@ pub struct Node {
     pub heating_deg_c: f64,
 }
 
-impl Node {
-    /// A part without power of its own.
-    #[must_use]
-    pub const fn passive(time_constant_s: f64) -> Self {
-        Self { time_constant_s, heating_deg_c: 0.0 }
-    }
-}
-
 /// A node with its temperature, stepped at a fixed interval.
 ///
 /// *Numerics*: exact for surroundings that change linearly over a step.
@@ -78,6 +70,11 @@ impl Interval {
 mod tests {
     use super::*;
 
+    /// A part without power of its own.
+    const fn passive(time_constant_s: f64) -> Node {
+        Node { time_constant_s, heating_deg_c: 0.0 }
+    }
+
     #[test]
     fn a_ramp_is_followed_with_a_lag_of_one_time_constant() {
         let (rate, tau) = (1.0 / 60.0, 200.0);
@@ -93,7 +90,7 @@ mod tests {
     #[test]
     fn a_step_decays_exponentially_whatever_the_interval() {
         for step_s in [0.1, 1.0, 10.0] {
-            let mut node = NodeState::new(Node::passive(30.0), step_s, 0.0);
+            let mut node = NodeState::new(passive(30.0), step_s, 0.0);
             let mut time_s = 0.0;
             while time_s < 59.95 {
                 node.step(1.0, 1.0);
@@ -105,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_node_without_inertia_follows_at_once() {
-        let mut node = NodeState::new(Node::passive(0.0), 1.0, 0.0);
+        let mut node = NodeState::new(passive(0.0), 1.0, 0.0);
         node.step(3.0, 4.0);
         assert!((node.deg_c.to - 4.0).abs() < 1e-15);
     }

@@ -1,7 +1,7 @@
 //! Exact integrals of body rate and specific force over any interval of a motion.
 
 use crate::motion::{Motion, Path};
-use crate::vector::{Vector, add, cross, dot, scale, unit};
+use crate::vector::{Vector, cross, dot, minus, plus, scale, unit};
 
 /// Integrals over one interval, in case axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -16,7 +16,7 @@ impl Increments {
     /// Increments over this interval and the next one together.
     #[must_use]
     pub fn plus(self, next: Self) -> Self {
-        Self { angle: add(self.angle, next.angle), velocity: add(self.velocity, next.velocity) }
+        Self { angle: plus(self.angle, next.angle), velocity: plus(self.velocity, next.velocity) }
     }
 }
 
@@ -31,8 +31,6 @@ pub struct Trajectory {
     earth_rad_per_s: Vector,
     /// Specific force at the attitude without movement, in case axes (m/s²).
     support_m_per_s2: Vector,
-    /// Level frame to case axes without movement, by rows.
-    level_to_case: [Vector; 3],
     turn: Turn,
 }
 
@@ -63,7 +61,6 @@ impl Trajectory {
         Self {
             earth_rad_per_s: level_to_case.map(|row| dot(row, earth)),
             support_m_per_s2: level_to_case.map(|row| dot(row, support)),
-            level_to_case,
             turn: Turn::new(&motion.path),
         }
     }
@@ -79,7 +76,7 @@ impl Trajectory {
                 let (sine, cosine) = libm::sincos(rate_rad_per_s * middle_s);
                 let seen = |v| turned_back(*axis, v, flat * cosine, flat * sine, length_s);
                 let own = scale(*axis, rate_rad_per_s * length_s);
-                Increments { angle: add(own, seen(earth)), velocity: seen(support) }
+                Increments { angle: plus(own, seen(earth)), velocity: seen(support) }
             }
             Turn::Sine { axis, amplitude_rad, pulsation, phase_rad, vibration } => {
                 let middle_rad = pulsation * middle_s + phase_rad;
@@ -94,35 +91,18 @@ impl Trajectory {
                     scale(vibration.amplitude_m_per_s2, mean * length_s)
                 });
                 Increments {
-                    angle: add(scale(*axis, turned_rad), seen(earth)),
-                    velocity: add(shaken, seen(support)),
+                    angle: plus(scale(*axis, turned_rad), seen(earth)),
+                    velocity: plus(shaken, seen(support)),
                 }
             }
             Turn::Coning { half_angle_rad, pulsation } => {
                 let cone = Cone::new(*half_angle_rad, *pulsation, middle_s, length_s);
                 Increments {
-                    angle: add(cone.own_angle(*pulsation), cone.seen(earth)),
+                    angle: plus(cone.own_angle(*pulsation), cone.seen(earth)),
                     velocity: cone.seen(support),
                 }
             }
         }
-    }
-
-    /// Attitude at a time: the quaternion (w, x, y, z) whose rotation takes case axes to north, east, down.
-    #[must_use]
-    pub fn attitude(&self, time_s: f64) -> [f64; 4] {
-        let own = match &self.turn {
-            Turn::Rest => [1.0, 0.0, 0.0, 0.0],
-            Turn::Constant { axis, rate_rad_per_s } => about(*axis, rate_rad_per_s * time_s),
-            Turn::Sine { axis, amplitude_rad, pulsation, phase_rad, .. } => {
-                about(*axis, amplitude_rad * libm::sin(pulsation * time_s + phase_rad))
-            }
-            Turn::Coning { half_angle_rad, pulsation } => {
-                let (sine, cosine) = libm::sincos(pulsation * time_s);
-                about([cosine, sine, 0.0], *half_angle_rad)
-            }
-        };
-        product(quaternion_to_level(self.level_to_case), own)
     }
 }
 
@@ -212,7 +192,7 @@ impl Cone {
         let (cc, ss, cs) = (0.5 * (self.length_s + cos_2), 0.5 * (self.length_s - cos_2), 0.5 * sin_2);
         let along = scale([cc * v[0] + cs * v[1], cs * v[0] + ss * v[1], 0.0], 2.0 * s * s);
         let straight = scale(v, self.length_s * (1.0 - 2.0 * s * s));
-        add(add(straight, along), scale(cross(axis, v), -2.0 * c))
+        plus(plus(straight, along), scale(cross(axis, v), -2.0 * c))
     }
 }
 
@@ -220,8 +200,8 @@ impl Cone {
 /// and sine of its angle.
 fn turned_back(axis: Vector, v: Vector, cosine: f64, sine: f64, length_s: f64) -> Vector {
     let along = scale(axis, dot(axis, v));
-    let across = add(v, scale(along, -1.0));
-    add(add(scale(along, length_s), scale(across, cosine)), scale(cross(axis, v), -sine))
+    let across = minus(v, along);
+    plus(plus(scale(along, length_s), scale(across, cosine)), scale(cross(axis, v), -sine))
 }
 
 /// ∫cos φ and ∫sin φ over an interval whose middle is offset zero.
@@ -257,6 +237,7 @@ fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { libm::sin(x) / x }
 }
 
+/// Level frame to case axes without movement, by rows.
 fn level_to_case(motion: &Motion) -> [Vector; 3] {
     let (sh, ch) = libm::sincos(motion.heading_deg.to_radians());
     let (sp, cp) = libm::sincos(motion.pitch_deg.to_radians());
@@ -266,32 +247,6 @@ fn level_to_case(motion: &Motion) -> [Vector; 3] {
         [sr * sp * ch - cr * sh, sr * sp * sh + cr * ch, sr * cp],
         [cr * sp * ch + sr * sh, cr * sp * sh - sr * ch, cr * cp],
     ]
-}
-
-fn about(axis: Vector, angle_rad: f64) -> [f64; 4] {
-    let (sine, cosine) = libm::sincos(0.5 * angle_rad);
-    [cosine, axis[0] * sine, axis[1] * sine, axis[2] * sine]
-}
-
-fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-    let (va, vb) = ([a[1], a[2], a[3]], [b[1], b[2], b[3]]);
-    let v = add(add(scale(vb, a[0]), scale(va, b[0])), cross(va, vb));
-    [a[0] * b[0] - dot(va, vb), v[0], v[1], v[2]]
-}
-
-/// The quaternion of the transposed matrix, by its largest element, so that no root is taken of a small number.
-fn quaternion_to_level(rows: [Vector; 3]) -> [f64; 4] {
-    let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = rows;
-    let candidates = [
-        [1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
-        [zy - yz, 1.0 + xx - yy - zz, yx + xy, xz + zx],
-        [xz - zx, yx + xy, 1.0 - xx + yy - zz, zy + yz],
-        [yx - xy, xz + zx, zy + yz, 1.0 - xx - yy + zz],
-    ];
-    let norm = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>();
-    let best = candidates.into_iter().fold([0.0; 4], |best, q| if norm(&q) > norm(&best) { q } else { best });
-    let length = libm::sqrt(norm(&best));
-    best.map(|x| x / length)
 }
 
 #[cfg(test)]

@@ -22,10 +22,6 @@ pub struct Truth {
     pub delta_angle: [f64; 3],
     /// ∫f dt along the case axes (m/s).
     pub delta_velocity: [f64; 3],
-    /// Mean ω (rad/s).
-    pub mean_rate: [f64; 3],
-    /// Mean specific force (m/s²).
-    pub mean_force: [f64; 3],
     /// Temperature of the chamber (°C).
     pub chamber_deg_c: f64,
     /// Temperature of the housing, which the orientation follows (°C).

@@ -1,18 +1,8 @@
-//! Three-vectors as plain arrays.
+//! Vectors of three as plain arrays.
+
+pub(crate) use isotherm_correction::vector::{cross, dot, minus, plus};
 
 pub(crate) type Vector = [f64; 3];
-
-pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(crate) fn add(a: Vector, b: Vector) -> Vector {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
 
 pub(crate) fn scale(a: Vector, factor: f64) -> Vector {
     a.map(|component| component * factor)

@@ -13,10 +13,10 @@ use crate::drift::DriftModel;
 use crate::lanes::Lanes;
 use crate::operation::SelfTestParts;
 use crate::reversal::Reversal;
-use crate::sample::{MAX_SENSORS, MIN_SENSORS, OutputKind};
+use crate::sample::{MAX_SENSORS, MIN_SENSORS};
 use crate::servo::Servo;
 use crate::sigma::SigmaModel;
-use crate::thermal::{AccelModel, GyroModel, Motion, Trends};
+use crate::thermal::{Motion, Trends};
 
 use sensors::{accel_model, gyro_model, orientation};
 
@@ -62,52 +62,49 @@ pub(super) fn compile(parts: &CalibrationParts) -> Result<Calibration, Vec<Defec
     check_self_test(checker, &parts.self_test);
     let servos = models.iter().filter_map(|gyro| gyro.servo.as_ref());
     match gyro_orientation {
-        Some(gyro_orientation) if checker.defects.is_empty() => Ok(Calibration {
-            filter,
-            channels: parts.channels.iter().chain(&parts.auxiliaries).cloned().map(Channel).collect(),
-            temperatures: parts.channels.len(),
-            regresses: models.iter().any(|gyro| !gyro.terms.regressors().is_empty())
-                || accels.iter().any(|accel| !accel.terms.regressors().is_empty()),
-            gyro_output: parts.gyro_output,
-            gyro_limits: limits(models.iter().map(|gyro| gyro.input_limit)),
-            accel_limits: limits(accels.iter().map(|accel| accel.input_limit)),
-            motion: Motion::of(
-                gyros_in_motion,
-                accels_in_motion,
-                parts.accels.iter().map(|accel| accel.position_m),
-                [
-                    parts.gyros.iter().map(|gyro| gyro.delay_ticks).collect(),
-                    parts.accels.iter().map(|accel| accel.delay_ticks).collect(),
-                ],
-            ),
-            sigma: sigma_model(parts, &models, &accels).map(Box::new),
-            trends: Trends::of(&models).map(Box::new),
-            servos_settle_s: servos.map(Servo::settle_time_s).reduce(f64::max),
-            gyros: models,
-            drifts,
-            gyro_orientation,
-            gyro_orientation_channels: parts.gyro_orientation_channels.clone(),
-            accel_output: parts.accel_output,
-            accels,
-            accel_orientation,
-            accel_orientation_channels: parts.accel_orientation_channels.clone(),
-            reversal,
-            self_test: parts.self_test.clone(),
-        }),
+        Some(gyro_orientation) if checker.defects.is_empty() => Ok(with_sigma(
+            parts,
+            Calibration {
+                filter,
+                channels: parts.channels.iter().chain(&parts.auxiliaries).cloned().map(Channel).collect(),
+                temperatures: parts.channels.len(),
+                regresses: models.iter().any(|gyro| !gyro.terms.regressors().is_empty())
+                    || accels.iter().any(|accel| !accel.terms.regressors().is_empty()),
+                gyro_output: parts.gyro_output,
+                gyro_limits: limits(models.iter().map(|gyro| gyro.input_limit)),
+                accel_limits: limits(accels.iter().map(|accel| accel.input_limit)),
+                motion: Motion::of(
+                    gyros_in_motion,
+                    accels_in_motion,
+                    parts.accels.iter().map(|accel| accel.position_m),
+                    [
+                        parts.gyros.iter().map(|gyro| gyro.delay_ticks).collect(),
+                        parts.accels.iter().map(|accel| accel.delay_ticks).collect(),
+                    ],
+                ),
+                sigma: None,
+                trends: Trends::of(&models).map(Box::new),
+                servos_settle_s: servos.map(Servo::settle_time_s).reduce(f64::max),
+                gyros: models,
+                drifts,
+                gyro_orientation,
+                gyro_orientation_channels: parts.gyro_orientation_channels.clone(),
+                accel_output: parts.accel_output,
+                accels,
+                accel_orientation,
+                accel_orientation_channels: parts.accel_orientation_channels.clone(),
+                reversal,
+                self_test: parts.self_test.clone(),
+            },
+        )),
         _ => Err(core::mem::take(&mut checker.defects)),
     }
 }
 
-/// What is stated of the sensors' errors; a count is worth as much as it is at the assumed temperature.
-fn sigma_model(parts: &CalibrationParts, gyros: &[GyroModel], accels: &[AccelModel]) -> Option<SigmaModel> {
-    let counted = |output, size: Option<f64>| size.filter(|_| output == OutputKind::Counts).map(f64::abs);
-    let gyro = |lane: usize| counted(parts.gyro_output, gyros.get(lane).map(|gyro| gyro.increment_weight));
-    let assumed_deg_c = parts.filter.assumed_deg_c;
-    let accel = |lane: usize| {
-        let accel: Option<&AccelModel> = accels.get(lane);
-        counted(parts.accel_output, accel.map(|accel| 1.0 / accel.scale_factor.at(assumed_deg_c).value))
-    };
-    SigmaModel::of(&parts.gyros, &parts.accels, [&gyro, &accel])
+/// With what is stated of the sensors' errors.
+fn with_sigma(parts: &CalibrationParts, calibration: Calibration) -> Calibration {
+    let sigma = SigmaModel::of(parts, &calibration).map(Box::new);
+    Calibration { sigma, ..calibration }
 }
 
 /// A lane for each sensor; infinite where there is none.

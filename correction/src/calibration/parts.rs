@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::channel::{ChannelParts, ThermalFilterParts};
-use crate::curve::CurveParts;
+use crate::curve::{ANYWHERE, CurveParts};
 use crate::drift::DriftParts;
 use crate::operation::SelfTestParts;
 use crate::orientation::OrientationParts;
@@ -47,7 +47,7 @@ pub struct CalibrationParts {
 }
 
 /// Range of what temperature does not change (°C): nothing lies outside.
-pub const EVERYWHERE_DEG_C: [f64; 2] = [-1e9, 1e9];
+pub const EVERYWHERE_DEG_C: [f64; 2] = ANYWHERE;
 /// Input limit where there is none: beyond every reading.
 pub const NO_LIMIT: f64 = 1e100;
 
@@ -216,18 +216,17 @@ impl TermParts {
     /// A term with a coefficient over temperature.
     #[must_use]
     pub fn new(feature: Feature, coefficient: CurveParts) -> Self {
-        Self { feature, parameter: 0.0, regressor: None, coefficient: CoefficientParts::Curve(coefficient) }
+        Self::of(feature, CoefficientParts::Curve(coefficient))
     }
 
     /// A term with a coefficient by thermal branch.
     #[must_use]
     pub fn branched(feature: Feature, coefficient: BranchedParts) -> Self {
-        Self {
-            feature,
-            parameter: 0.0,
-            regressor: None,
-            coefficient: CoefficientParts::Branched(coefficient),
-        }
+        Self::of(feature, CoefficientParts::Branched(coefficient))
+    }
+
+    fn of(feature: Feature, coefficient: CoefficientParts) -> Self {
+        Self { feature, parameter: 0.0, regressor: None, coefficient }
     }
 
     /// A thermal lag `g(T)·(T − L_τ[T])/τ` (models §2, §8); τ in s.
@@ -250,7 +249,7 @@ impl TermParts {
 }
 
 /// Polynomial of the time since turn-on, held constant outside its interval.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrendParts {
     /// Coefficients of t⁰…t² (rad/s per sʲ), one to three of them.
     pub coefficients: Vec<f64>,

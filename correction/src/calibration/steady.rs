@@ -5,9 +5,10 @@ use alloc::vec::Vec;
 use super::Calibration;
 use crate::channel::ThermalState;
 use crate::earth::EARTH_RATE;
+use crate::lanes::Lanes;
 use crate::orientation::{Inverse, Orientation, SensorMask};
-use crate::sample::{ChannelName, LasingMode, OutputKind, Sensors};
-use crate::thermal::{Follows, Motion, MotionTerms, TrendModel};
+use crate::sample::{ChannelName, LasingMode, MAX_SENSORS, OutputKind, Sensors};
+use crate::thermal::{Follows, Motion, MotionTerms};
 use crate::units::STANDARD_GRAVITY_M_PER_S2;
 
 /// What a calibration does to a unit that has been on for long and whose temperatures move steadily.
@@ -81,9 +82,10 @@ impl Calibration {
         let others = |source| Some(known.get(self.place(source)).copied()??.temperature);
         let sign = mode.map_or(1.0, LasingMode::sign);
 
-        let gyros = self.gyros.iter().map(|gyro| {
+        let trends: Lanes =
+            self.trends.as_ref().map_or([0.0; MAX_SENSORS], |trends| trends.at(f64::INFINITY));
+        let gyros = self.gyros.iter().zip(trends).map(|(gyro, trend)| {
             let [weight, bias, magnetic, meander] = gyro.steady(&state(gyro.channel), &self.filter, &others);
-            let trend = gyro.trend.as_ref().map_or(0.0, TrendModel::last);
             (bias + trend + sign * magnetic + meander, weight)
         });
         let (gyro_bias, gyro_weight): (Sensors<_>, Sensors<_>) = gyros.unzip();
@@ -185,17 +187,25 @@ fn step(
 ) -> [f64; 3] {
     let biases = ratios.iter().zip(bias).zip(next_bias).map(|((ratio, old), new)| ratio * old - new);
     let mut step = inverse.apply(&biases.collect::<Sensors<f64>>());
-    let columns = [0, 1, 2].map(|axis| {
-        let along = ratios.iter().zip(axes).map(|(ratio, row)| ratio * row[axis]);
-        inverse.apply(&along.collect::<Sensors<f64>>())
-    });
-    for (i, step) in step.iter_mut().enumerate() {
-        let unit = |j| if i == j { 1.0 } else { 0.0 };
-        let turned = columns.iter().enumerate().map(|(j, column)| column[i] - unit(j));
-        let square: f64 = turned.map(|turned| turned * turned).sum();
-        *step += libm::copysign(libm::sqrt(square) * size, *step);
-    }
+    let mut turned = columns(inverse, ratios, |sensor, axis| ratios[sensor] * axes[sensor][axis]);
+    (0..3).for_each(|axis| turned[axis][axis] -= 1.0);
+    widen(&mut step, largest(turned, size));
     step
+}
+
+/// `C⁺·M` by columns, M by sensor and case axis.
+fn columns(inverse: &Inverse, sensors: &[f64], of: impl Fn(usize, usize) -> f64) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|axis| {
+        inverse.apply(&(0..sensors.len()).map(|sensor| of(sensor, axis)).collect::<Sensors<f64>>())
+    })
+}
+
+/// Most that a matrix makes of a vector of a size along each axis, whatever its direction.
+fn largest(columns: [[f64; 3]; 3], size: f64) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
+        let square: f64 = columns.iter().map(|column| column[axis] * column[axis]).sum();
+        libm::sqrt(square) * size
+    })
 }
 
 /// Makes a step larger in its own direction.
@@ -205,15 +215,9 @@ fn widen(step: &mut [f64; 3], by: [f64; 3]) {
 
 /// Most that the difference of two sets of drifts with force does at 1 g, whatever its direction (rad/s).
 fn by_force(inverse: &Inverse, ratios: &[f64], (old, new): (&[[f64; 3]], &[[f64; 3]])) -> [f64; 3] {
-    let columns = [0, 1, 2].map(|axis| {
-        let along = |drifts: &[[f64; 3]], gyro: usize| drifts.get(gyro).map_or(0.0, |drift| drift[axis]);
-        let steps = ratios.iter().enumerate().map(|(i, ratio)| ratio * along(old, i) - along(new, i));
-        inverse.apply(&steps.collect::<Sensors<f64>>())
-    });
-    [0, 1, 2].map(|axis| {
-        let square: f64 = columns.iter().map(|column| column[axis] * column[axis]).sum();
-        libm::sqrt(square) * STANDARD_GRAVITY_M_PER_S2
-    })
+    let along = |drifts: &[[f64; 3]], gyro: usize, axis| drifts.get(gyro).map_or(0.0, |drift| drift[axis]);
+    let step = |gyro, axis| ratios[gyro] * along(old, gyro, axis) - along(new, gyro, axis);
+    largest(columns(inverse, ratios, step), STANDARD_GRAVITY_M_PER_S2)
 }
 
 /// Most that the difference of two sets of second-order terms does at 1 g along every input axis (m/s²).
@@ -222,8 +226,8 @@ fn by_square(inverse: &Inverse, sensors: usize, (old, new): (&[f64], &[f64])) ->
     for sensor in 0..sensors {
         let of = |terms: &[f64]| terms.get(sensor).copied().unwrap_or_default();
         let step = (of(old) - of(new)) * STANDARD_GRAVITY_M_PER_S2 * STANDARD_GRAVITY_M_PER_S2;
-        let alone: Sensors<f64> = (0..sensors).map(|i| if i == sensor { step } else { 0.0 }).collect();
-        most.iter_mut().zip(inverse.apply(&alone)).for_each(|(most, step)| *most += step.abs());
+        let column = inverse.column(sensor);
+        most.iter_mut().zip(column).for_each(|(most, share)| *most += (share * step).abs());
     }
     most
 }
@@ -235,7 +239,5 @@ fn inverse(orientation: &Orientation, temperature_deg_c: f64) -> Option<Inverse>
 
 /// Rows of C.
 fn rows(orientation: &Orientation, temperature_deg_c: f64) -> Sensors<[f64; 3]> {
-    let along = |axis| orientation.forward(temperature_deg_c, axis);
-    let (x, y, z) = (along([1.0, 0.0, 0.0]), along([0.0, 1.0, 0.0]), along([0.0, 0.0, 1.0]));
-    x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect()
+    orientation.rows_at(temperature_deg_c).into_iter().take(orientation.sensors()).collect()
 }

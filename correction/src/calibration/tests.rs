@@ -317,6 +317,23 @@ fn what_the_drift_estimator_expects_is_no_part_of_the_thermal_memory() {
 }
 
 #[test]
+fn a_scale_factor_that_crosses_zero_anywhere_is_refused() {
+    for (knots, sound) in [
+        (vec![[-40.0, 2.0], [19.9, 2.0], [20.0, -0.1], [20.1, 2.0], [65.0, 2.0]], false),
+        (vec![[-40.0, 2.0], [19.9, 2.0], [20.0, 0.1], [20.1, 2.0], [65.0, 2.0]], true),
+        (vec![[-40.0, -2.0], [65.0, 2.0]], false),
+    ] {
+        let mut parts = parts();
+        parts.accels[1].scale_factor = CurveParts::PiecewiseLinear { knots: knots.clone() };
+        let kinds = Calibration::new(&parts).err().unwrap_or_default();
+        let crosses = |defect: &Defect| {
+            defect.path == "accel.sensor[1].scale_factor" && matches!(defect.kind, DefectKind::Zero { .. })
+        };
+        assert_eq!((kinds.is_empty(), kinds.iter().any(crosses)), (sound, !sound), "{knots:?}");
+    }
+}
+
+#[test]
 fn limits_of_the_self_test_and_numbers_of_the_drift_are_checked_at_once() {
     let name = |name| ChannelName::from(name).unwrap();
     let mut broken = parts();

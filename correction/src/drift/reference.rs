@@ -193,13 +193,12 @@ impl Waiting {
 
     /// Drops references from another time, after a step of the producer's clock; how many.
     pub(super) fn restart(&mut self, now: Timestamp) -> usize {
-        const NEAR: Span = Span::from_ns(3_600_000_000_000);
         let before = self.references.len();
         if before == 0 {
             return 0;
         }
         // What ends before the first tick of the new time has no readings any more.
-        self.references.room().retain(|r| r.end > now && r.end.since(now) < NEAR);
+        self.references.room().retain(|r| r.end > now && r.end.since(now) < Span::HOUR);
         before - self.references.len()
     }
 }

@@ -102,6 +102,21 @@ fn raw_readings_are_summed_plainly_and_say_so() {
 }
 
 #[test]
+fn raw_readings_have_no_part_in_the_first_step_of_a_calibration() {
+    let calibrated: Vec<_> = (4..8).map(tick).collect();
+    let raw = CorrectedTick {
+        delta_angle: [-90.0, 4000.0, 15.0],
+        delta_velocity: [2500.0, 3.0, -70.0],
+        flags: TickFlags::UNCALIBRATED,
+        revision: 0,
+        ..tick(3)
+    };
+    let [alone, after_raw] =
+        [&calibrated[..], &[&[raw], &calibrated[..]].concat()].map(|ticks| summed(stated(4, true), ticks));
+    assert_eq!(alone[0], after_raw[1]);
+}
+
+#[test]
 fn a_sensor_that_is_not_there_in_every_tick_is_not_valid() {
     let mut ticks: Vec<_> = (0..3).map(tick).collect();
     ticks[0].gyro_flags.truncate(2);

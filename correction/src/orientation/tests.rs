@@ -275,8 +275,8 @@ fn a_reading_that_is_no_number_exceeds_and_blames_nobody() {
 
 fn unit_vector() -> impl Strategy<Value = [f64; 3]> {
     prop::array::uniform3(-1.0..1.0_f64)
-        .prop_filter("too short to normalise", |v| dot(v, v) > 0.01)
-        .prop_map(|v| v.map(|c| c / libm::sqrt(dot(&v, &v))))
+        .prop_filter("too short to normalise", |v| dot(*v, *v) > 0.01)
+        .prop_map(|v| v.map(|c| c / libm::sqrt(dot(v, v))))
 }
 
 proptest! {

@@ -2,6 +2,7 @@
 
 use super::fixture::{Still, calibration};
 use super::*;
+use crate::sample::OutputKind;
 use crate::units::Span;
 
 /// 0.05° (rad).

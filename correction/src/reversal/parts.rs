@@ -151,25 +151,8 @@ impl Reversal {
         checker.finish(Self { parts: *parts })
     }
 
-    /// n at ticks of a duration: see [`Transition::ticks`].
-    #[must_use]
-    pub fn transition_ticks(&self, duration: Span) -> u8 {
-        self.parts.transition.ticks(duration)
-    }
-
-    /// Whether a transition is longer than what is bridged, at ticks of a duration.
-    pub(super) fn is_cut(&self, duration: Span) -> bool {
-        self.parts.transition.is_cut(duration)
-    }
-
     /// Tick durations beyond which a reading says nothing about a lost tick, and most lost ticks that wait for one fit.
     pub(super) fn reach_ticks(&self, duration: Span) -> u8 {
-        REACH_TICKS.max(2 * self.transition_ticks(duration))
-    }
-
-    /// The statement it was made from.
-    #[must_use]
-    pub const fn parts(&self) -> &ReversalParts {
-        &self.parts
+        REACH_TICKS.max(2 * self.parts.transition.ticks(duration))
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fit::{Fit, Points};
 use super::history::{Reading, mid_time_s};
-use super::{LostTick, MAX_LOST_TICKS, Reversal, Substitution, fit_points, reach_s};
+use super::{LostTick, MAX_LOST_TICKS, Reversal, Substitution, fit_points, predicting};
 use crate::later::Later;
 use crate::sample::{MAX_SENSORS, TickFlags};
 use crate::units::{Span, Timestamp};
@@ -129,20 +129,13 @@ impl Weights {
         tick: &LostTick,
         times: f64,
     ) -> bool {
-        let parts = &reversal.parts;
-        let readings = substitution.history.newest_first().enumerate().skip(after);
-        let readings = readings.take(parts.predict_readings.into());
         let x = mid_time_s(tick.end_time, tick.duration, tick.end_time);
-        let used: ArrayVec<(usize, [f64; 2]), READINGS> = readings
-            .filter_map(|(place, reading)| {
-                let at = reading.mid_time_s(tick.end_time);
-                let near = (x - at).abs() <= reach_s(reversal, reading.duration);
-                Some((place, reading.point(at, sensor).filter(|_| near)?))
-            })
-            .collect();
+        let readings = predicting(&substitution.history, reversal, after, (tick.end_time, x));
+        let used = readings.filter_map(|(place, at, reading)| Some((place, reading.point(at, sensor)?)));
+        let used: ArrayVec<(usize, [f64; 2]), READINGS> = used.collect();
         let points: Points = used.iter().map(|(_, point)| *point).collect();
         for (index, (place, _)) in used.iter().enumerate() {
-            let fit = Fit::new(&unit(&points, index), parts.predict_degree.into());
+            let fit = Fit::new(&unit(&points, index), reversal.parts.predict_degree.into());
             let weight = fit.map_or(0.0, |fit| fit.at(x) * tick.duration.as_s());
             if let Some(to) = self.0.get_mut(*place) {
                 *to += times * weight;

@@ -570,7 +570,7 @@ proptest! {
 fn a_transition_stated_as_a_time_is_that_many_ticks_at_any_tick() {
     let ticks = |time_s: f64, tick_ns: i64| {
         let parts = ReversalParts { transition: Transition::Time(time_s), ..ReversalParts::default() };
-        reversal(parts).transition_ticks(Span::from_ns(tick_ns))
+        reversal(parts).parts.transition.ticks(Span::from_ns(tick_ns))
     };
     assert_eq!([1_000_000, 5_000_000, 20_000_000].map(|tick_ns| ticks(0.015, tick_ns)), [15, 3, 1]);
     // A clock that is a little off brings no tick in.
@@ -581,7 +581,7 @@ fn a_transition_stated_as_a_time_is_that_many_ticks_at_any_tick() {
     assert_eq!([ticks(0.0151, 5_000_000), ticks(0.0155, 5_000_000)], [3, 4]);
     assert_eq!([ticks(1.0, 1_000_000), ticks(1.0, 0), ticks(1e-4, i64::MAX)], [32, 32, 1]);
     let stated = reversal(ReversalParts { transition: Transition::Ticks(7), ..ReversalParts::default() });
-    assert_eq!(stated.transition_ticks(Span::from_ns(1)), 7);
+    assert_eq!(stated.parts.transition.ticks(Span::from_ns(1)), 7);
 }
 
 #[test]

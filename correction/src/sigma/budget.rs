@@ -124,7 +124,7 @@ impl Watched<'_> {
         let duration_s = self.out.duration.as_s();
         let (white, instants) = fast(parts);
         let own = if self.is_lost(lane) { 0.0 } else { white * duration_s + 2.0 * instants };
-        let along = dot(&self.gyros.rows[lane], rate);
+        let along = dot(self.gyros.rows[lane], *rate);
         let bias = if self.drift_sigma[lane].is_nan() {
             bias(parts, self.gyros.temperature_deg_c[lane])
         } else {
@@ -151,7 +151,7 @@ impl Watched<'_> {
         let Some(parts) = model.accels.get(lane) else { return Variances::default() };
         let duration_s = self.out.duration.as_s();
         let (white, instants) = fast(parts);
-        let along = dot(&accels.rows[lane], force);
+        let along = dot(accels.rows[lane], *force);
         let flags = self.seen.accels.flags[lane];
         let curves = self.calibration.accels.get(lane).map(AccelModel::curves_over_temperature);
         Variances([

@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::{AccelParts, GyroParts};
+use crate::calibration::{Calibration, CalibrationParts};
 
 /// Most coefficients of a bias that have a standard error.
 pub const MAX_BIAS_TERMS: usize = 4;
@@ -97,24 +97,20 @@ pub struct SigmaModel {
 }
 
 impl SigmaModel {
-    /// Those of the parts; `None` where no sensor states any, and none is asked for. A quantisation that is not stated is that of
-    /// counts, whose size (rad or m/s) `counts` gives for gyros and accelerometers; without counts it is 0.
-    pub(crate) fn of(
-        gyros: &[GyroParts],
-        accels: &[AccelParts],
-        counts: [&dyn Fn(usize) -> Option<f64>; 2],
-    ) -> Option<Self> {
-        let [of_gyro, of_accel] = counts;
-        let asked = gyros.iter().any(|gyro| gyro.sigma.is_some()) || accels.iter().any(|a| a.sigma.is_some());
-        let filled = |stated: &Option<SigmaParts>, count: Option<f64>| {
+    /// Those of the parts that a calibration was made from; `None` where no sensor states any, and none is asked for. A quantisation
+    /// that is not stated is that of counts; without counts it is 0.
+    pub(crate) fn of(parts: &CalibrationParts, calibration: &Calibration) -> Option<Self> {
+        let (gyros, accels) =
+            (parts.gyros.iter().map(|gyro| &gyro.sigma), parts.accels.iter().map(|accel| &accel.sigma));
+        let filled = |(stated, count): (&Option<SigmaParts>, f64)| {
             let mut parts = stated.clone().unwrap_or_default();
-            let counted = count.map(|count| count / libm::sqrt(12.0));
-            parts.quantisation = parts.quantisation.or(counted).or(stated.is_some().then_some(0.0));
+            parts.quantisation.get_or_insert(count / libm::sqrt(12.0));
             parts
         };
-        let gyros = gyros.iter().enumerate().map(|(lane, gyro)| filled(&gyro.sigma, of_gyro(lane)));
-        let accels = accels.iter().enumerate().map(|(lane, accel)| filled(&accel.sigma, of_accel(lane)));
-        asked.then(|| Self { gyros: gyros.collect(), accels: accels.collect() })
+        gyros.clone().chain(accels.clone()).any(Option::is_some).then(|| Self {
+            gyros: gyros.zip(calibration.count_rad()).map(filled).collect(),
+            accels: accels.zip(calibration.count_m_per_s()).map(filled).collect(),
+        })
     }
 }
 

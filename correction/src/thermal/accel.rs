@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::bank::Follows;
 use super::declared::ACCEL_TERMS;
 use super::terms::{SensorState, Terms};
-use super::trail::Trail;
-use crate::calibration::{AccelParts, RegressorParts};
+use crate::calibration::AccelParts;
 use crate::channel::ThermalFilter;
 use crate::curve::Curve;
 use crate::defect::Checker;
@@ -54,12 +53,8 @@ impl Follows<2> for AccelModel {
         self.channel
     }
 
-    fn trails(&self) -> &[Trail] {
-        self.terms.trails()
-    }
-
-    fn regressors(&self) -> &[RegressorParts] {
-        self.terms.regressors()
+    fn with_memory(&self) -> Option<&Terms> {
+        Some(&self.terms)
     }
 
     fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; 2], bool) {

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
-use super::terms::{Others, SensorState};
+use super::terms::{Others, SensorState, Terms};
 use super::trail::{MAX_TRAILS, Trail, Trailed, advance, resume, settled};
 use crate::calibration::RegressorParts;
 use crate::channel::{ThermalFilter, ThermalState};
@@ -20,13 +20,13 @@ use crate::units::{Span, Timestamp};
 pub(crate) trait Follows<const T: usize> {
     /// The channel, by index; `None` for a sensor that stands at the assumed temperature.
     fn channel(&self) -> Option<usize>;
+    /// Those among its terms that more enters than the temperature as it is, if any.
+    fn with_memory(&self) -> Option<&Terms> {
+        None
+    }
     /// What trails behind the temperature and enters the terms.
     fn trails(&self) -> &[Trail] {
-        &[]
-    }
-    /// What other channels say and enters the terms.
-    fn regressors(&self) -> &[RegressorParts] {
-        &[]
+        self.with_memory().map_or(&[], Terms::trails)
     }
     /// Every term in a state, and whether an argument was clamped to its fitted range.
     fn terms(&self, state: &SensorState<'_>, filter: &ThermalFilter) -> ([f64; T], bool);
@@ -60,6 +60,12 @@ impl Pace {
     /// A way that takes this long from `start` on.
     pub(crate) fn new(start: Timestamp, over: Span) -> Self {
         if over == Span::ZERO { Self::default() } else { Self { start, per_second: 1.0 / over.as_s() } }
+    }
+
+    /// What is left of the way at `time`, as a way that begins there.
+    fn left(self, time: Timestamp) -> Self {
+        let left = 1.0 - self.share(time);
+        if left > 0.0 { Self { start: time, per_second: self.per_second / left } } else { Self::default() }
     }
 
     /// Whether the way begins at `time`.
@@ -105,6 +111,12 @@ impl Ramp {
         } else {
             Self { pace: Pace::new(start, over), from, step: target - from }
         };
+    }
+
+    /// Goes on as before, on a way that begins at `time`.
+    pub(crate) fn set_out(&mut self, time: Timestamp) {
+        let (from, to) = (self.at(time), self.from + self.step);
+        *self = Self { pace: self.pace.left(time), from, step: to - from };
     }
 
     /// Arrives at once.
@@ -222,9 +234,7 @@ impl<const T: usize> Bank<T> {
         let assumed = ThermalState { temperature: filter.assumed_deg_c, ..ThermalState::default() };
         for (lane, sensor) in sensors.iter().take(MAX_SENSORS).enumerate() {
             bank.share_of[lane] = paces.place(sensor.channel());
-            let state = SensorState { thermal: &assumed, trailed: bank.trailed(lane), others: &|_| None };
-            let (terms, clamped) = sensor.terms(&state, filter);
-            bank.hold(lane, terms, clamped);
+            bank.head(lane, sensor, &assumed, (filter, &|_| None), None);
         }
         bank
     }
@@ -235,8 +245,22 @@ impl<const T: usize> Bank<T> {
         self.trailed.get(lane).unwrap_or(NOTHING)
     }
 
-    fn hold(&mut self, lane: usize, terms: [f64; T], clamped: bool) {
-        self.lines.iter_mut().zip(terms).for_each(|(line, term)| line.hold(lane, term));
+    /// Evaluates the terms of one sensor, which then are on their way to the result from where they are at a share of their present
+    /// way; without one they are there.
+    fn head<S: Follows<T>>(
+        &mut self,
+        lane: usize,
+        sensor: &S,
+        thermal: &ThermalState,
+        (filter, others): (&ThermalFilter, Others<'_>),
+        share: Option<f64>,
+    ) {
+        let state = SensorState { thermal, trailed: self.trailed(lane), others };
+        let (terms, clamped) = sensor.terms(&state, filter);
+        self.lines.iter_mut().zip(terms).for_each(|(line, term)| match share {
+            Some(share) => line.turn(lane, share, term),
+            None => line.hold(lane, term),
+        });
         self.clamped = self.clamped.set(lane, clamped);
     }
 
@@ -250,30 +274,33 @@ impl<const T: usize> Bank<T> {
         }
     }
 
-    /// Goes on with what trails in an earlier bank, of the sensors that `kept` names and where it is the same.
+    /// Goes on with what trails in an earlier bank, where it is the same and `same` says so of the channels that the sensors follow.
     pub(crate) fn carry_trails<S: Follows<T>>(
         &mut self,
         sensors: &[S],
         (old_sensors, old): (&[S], &Self),
-        kept: impl Fn(usize) -> bool,
+        same: impl Fn(Option<usize>, Option<usize>) -> bool,
     ) {
         let trailed = self.trailed.iter_mut().zip(&old.trailed);
-        for (lane, ((sensor, before), (trailed, old))) in
-            sensors.iter().zip(old_sensors).zip(trailed).enumerate()
-        {
-            if kept(lane) && sensor.trails() == before.trails() {
+        for ((sensor, before), (trailed, old)) in sensors.iter().zip(old_sensors).zip(trailed) {
+            if same(sensor.channel(), before.channel()) && sensor.trails() == before.trails() {
                 *trailed = *old;
             }
         }
     }
 
-    /// Goes on with everything of one sensor in an earlier bank, on its way as it is.
-    pub(crate) fn carry(&mut self, old: &Self, lane: usize) {
-        self.lines.iter_mut().zip(&old.lines).for_each(|(line, old)| line.copy_lane(old, lane));
-        self.started = self.started.set(lane, old.started.contains(lane));
-        self.clamped = self.clamped.set(lane, old.clamped.contains(lane));
-        if let (Some(trailed), Some(old)) = (self.trailed.get_mut(lane), old.trailed.get(lane)) {
-            *trailed = *old;
+    /// Goes on with everything of the sensors that are the same in an earlier bank, on its way as it is.
+    pub(crate) fn carry<S: PartialEq>(&mut self, sensors: &[S], (old_sensors, old): (&[S], &Self)) {
+        for (lane, (sensor, before)) in sensors.iter().zip(old_sensors).enumerate() {
+            if sensor != before {
+                continue;
+            }
+            self.lines.iter_mut().zip(&old.lines).for_each(|(line, old)| line.copy_lane(old, lane));
+            self.started = self.started.set(lane, old.started.contains(lane));
+            self.clamped = self.clamped.set(lane, old.clamped.contains(lane));
+            if let (Some(trailed), Some(old)) = (self.trailed.get_mut(lane), old.trailed.get(lane)) {
+                *trailed = *old;
+            }
         }
     }
 
@@ -291,28 +318,20 @@ impl<const T: usize> Bank<T> {
         }
     }
 
-    /// Evaluates every term of a channel's sensors, which then are on their way to the result from where they are so far along
-    /// their present way; or there `at_once`.
+    /// Evaluates every term of a channel's sensors, which then are on their way to the result from where they are at a share of their
+    /// present way; without one, and those that had no reading yet, are there at once.
     pub(crate) fn update<S: Follows<T>>(
         &mut self,
         sensors: &[S],
         (channel, thermal): (usize, &ThermalState),
-        (filter, others): (&ThermalFilter, Others<'_>),
-        (share, at_once): (f64, bool),
+        within: (&ThermalFilter, Others<'_>),
+        share: Option<f64>,
     ) {
         for (lane, sensor) in sensors.iter().enumerate() {
-            if sensor.channel() != Some(channel) {
-                continue;
+            if sensor.channel() == Some(channel) {
+                self.head(lane, sensor, thermal, within, share.filter(|_| self.started.contains(lane)));
+                self.started = self.started.with(lane);
             }
-            let state = SensorState { thermal, trailed: self.trailed(lane), others };
-            let (terms, clamped) = sensor.terms(&state, filter);
-            if at_once || !self.started.contains(lane) {
-                self.hold(lane, terms, clamped);
-            } else {
-                self.lines.iter_mut().zip(terms).for_each(|(line, term)| line.turn(lane, share, term));
-                self.clamped = self.clamped.set(lane, clamped);
-            }
-            self.started = self.started.with(lane);
         }
     }
 
@@ -325,22 +344,15 @@ impl<const T: usize> Bank<T> {
         sensors: &[S],
         rests_on: impl Fn(&RegressorParts) -> bool,
         own_state: impl Fn(usize) -> Option<ThermalState>,
-        (filter, others): (&ThermalFilter, Others<'_>),
+        within: (&ThermalFilter, Others<'_>),
         (paces, start, first): (&Paces, Timestamp, bool),
     ) {
         for (lane, sensor) in sensors.iter().enumerate() {
-            let concerned = self.started.contains(lane) && sensor.regressors().iter().any(&rests_on);
+            let regressors = sensor.with_memory().map_or(&[][..], Terms::regressors);
+            let concerned = self.started.contains(lane) && regressors.iter().any(&rests_on);
             let Some(own) = sensor.channel().filter(|_| concerned) else { continue };
-            let Some(thermal) = own_state(own).filter(|_| first || paces.starts(own, start)) else {
-                continue;
-            };
-            let state = SensorState { thermal: &thermal, trailed: self.trailed(lane), others };
-            let (terms, clamped) = sensor.terms(&state, filter);
-            if first {
-                self.hold(lane, terms, clamped);
-            } else {
-                self.lines.iter_mut().zip(terms).for_each(|(line, term)| line.turn(lane, 0.0, term));
-                self.clamped = self.clamped.set(lane, clamped);
+            if let Some(thermal) = own_state(own).filter(|_| first || paces.starts(own, start)) {
+                self.head(lane, sensor, &thermal, within, (!first).then_some(0.0));
             }
         }
     }

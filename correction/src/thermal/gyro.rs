@@ -2,14 +2,12 @@
 
 use core::array;
 
-use arrayvec::ArrayVec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
 use super::declared::GYRO_TERMS;
 use super::terms::{SensorState, Terms};
-use super::trail::Trail;
-use crate::calibration::{GyroParts, RegressorParts};
+use crate::calibration::{GyroParts, TrendParts};
 use crate::channel::ThermalFilter;
 use crate::defect::Checker;
 use crate::lanes::Lanes;
@@ -23,7 +21,7 @@ pub struct GyroModel {
     pub(crate) increment_weight: f64,
     pub(crate) input_limit: f64,
     pub(crate) terms: Terms,
-    pub(crate) trend: Option<TrendModel>,
+    pub(crate) trend: Option<TrendParts>,
     pub(crate) servo: Option<Servo>,
 }
 
@@ -40,35 +38,9 @@ impl GyroModel {
             increment_weight: parts.increment_weight,
             input_limit: parts.input_limit,
             terms: Terms::new(&GYRO_TERMS, &parts.terms, false, filter, checker)?,
-            trend: parts.trend.as_ref().map(|trend| TrendModel {
-                coefficients: trend.coefficients.iter().copied().take(3).collect(),
-                interval_s: trend.interval_s,
-            }),
+            trend: parts.trend.clone(),
             servo,
         })
-    }
-}
-
-/// Polynomial of the time since turn-on, held outside its interval.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TrendModel {
-    coefficients: ArrayVec<f64, 3>,
-    interval_s: [f64; 2],
-}
-
-impl TrendModel {
-    /// Rate (rad/s) at a time since turn-on (s).
-    #[must_use]
-    pub fn at(&self, since_turn_on_s: f64) -> f64 {
-        let [from, to] = self.interval_s;
-        let t = since_turn_on_s.max(from).min(to);
-        self.coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
-    }
-
-    /// Rate (rad/s) from the end of the interval on.
-    #[must_use]
-    pub fn last(&self) -> f64 {
-        self.at(self.interval_s[1])
     }
 }
 
@@ -99,7 +71,7 @@ impl Trends {
         models.iter().any(|model| model.trend.is_some()).then_some(trends)
     }
 
-    /// As [`TrendModel::at`] of each gyro; zero for one without a trend.
+    /// Rate of each gyro (rad/s) at a time since turn-on (s); zero for one without a trend.
     pub(crate) fn at<const N: usize>(&self, since_turn_on_s: f64) -> [f64; N] {
         array::from_fn(|i| {
             let t = since_turn_on_s.max(self.from_s[i]).min(self.to_s[i]);
@@ -113,12 +85,8 @@ impl Follows<4> for GyroModel {
         self.channel
     }
 
-    fn trails(&self) -> &[Trail] {
-        self.terms.trails()
-    }
-
-    fn regressors(&self) -> &[RegressorParts] {
-        self.terms.regressors()
+    fn with_memory(&self) -> Option<&Terms> {
+        Some(&self.terms)
     }
 
     /// K(T) (rad per count, or rad per rad); the sum of the terms that no mode or meander changes, the magnetic term for mode sign +1, the

@@ -6,11 +6,11 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::bank::Follows;
-use super::declared::{ACCEL_TERMS, GYRO_TERMS};
+use super::declared::Term;
 use super::terms::{SensorState, Terms};
-use crate::calibration::{AccelParts, GyroParts};
+use crate::calibration::TermParts;
 use crate::channel::ThermalFilter;
-use crate::curve::Curve;
+use crate::curve::{Curve, CurveParts};
 use crate::defect::Checker;
 use crate::lanes::Lanes;
 use crate::sample::{MAX_SENSORS, Sensors};
@@ -25,25 +25,21 @@ pub(crate) struct MotionTerms {
 }
 
 impl MotionTerms {
-    /// Compiles those of a gyro.
-    pub(crate) fn of_gyro(parts: &GyroParts, filter: &ThermalFilter, checker: &mut Checker) -> Option<Self> {
-        let terms = Terms::new(&GYRO_TERMS, &parts.terms, true, filter, checker);
-        let over_rate = parts.increment_weight_over_rate.as_ref();
-        let over_rate = over_rate.and_then(|curve| checker.curve("increment_weight_over_rate", curve));
-        Some(Self { channel: parts.channel, terms: terms?, over_rate })
-    }
-
-    /// Compiles those of an accelerometer.
-    pub(crate) fn of_accel(
-        parts: &AccelParts,
+    /// Compiles those among the terms of a sensor, and the curve over its rate.
+    pub(crate) fn new(
+        channel: Option<usize>,
+        (declared, parts): (&[Term], &[TermParts]),
+        over_rate: Option<&CurveParts>,
         filter: &ThermalFilter,
         checker: &mut Checker,
     ) -> Option<Self> {
-        let terms = Terms::new(&ACCEL_TERMS, &parts.terms, true, filter, checker)?;
-        Some(Self { channel: parts.channel, terms, over_rate: None })
+        let terms = Terms::new(declared, parts, true, filter, checker);
+        let over_rate = over_rate.and_then(|curve| checker.curve("increment_weight_over_rate", curve));
+        Some(Self { channel, terms: terms?, over_rate })
     }
 
-    fn is_empty(&self) -> bool {
+    /// Whether there are none.
+    pub(crate) fn is_empty(&self) -> bool {
         self.terms.is_empty() && self.over_rate.is_none()
     }
 }

@@ -210,6 +210,7 @@ impl Axes {
     /// steps.
     fn choose(&mut self, orientation: &Orientation, mask: SensorMask, time: Timestamp) {
         self.mask = mask;
+        self.temperature.set_out(time);
         let now = self.temperature.at(time);
         let [from, to] = [now, self.target].map(|temperature| orientation.inverse(temperature, mask));
         self.set_out(orientation, (from, to), [now, self.target]);
@@ -315,6 +316,38 @@ mod tests {
         let found = run([22.0, 25.0], [TICK, long]);
         assert_eq!(found.map(f64::to_bits), run([24.5, 27.0], [long, TICK]).map(f64::to_bits), "{found:?}");
         assert!((found[0] - 24.0).abs() < 1e-12 && (found[3] - 25.85).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn a_change_of_sensors_on_the_way_is_all_that_steps() {
+        let slopes = vec![[0.0, 1e-3, 0.0], [0.0, 0.0, 2e-3], [-1e-3, 0.0, 0.0], [0.0; 3]];
+        let parts = OrientationParts {
+            reference_deg_c: 20.0,
+            rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, 0.8]],
+            slopes_per_deg_c: slopes,
+            plays: vec![],
+            weights: vec![],
+            range_deg_c: [0.0, 50.0],
+            parity_limit: None,
+            parity_confirm_ticks: 0,
+        };
+        let orientation = Orientation::new(&parts).unwrap();
+        let truth = [1e-5, 4e-5, -2e-5];
+        let mut axes = Axes::new(&orientation, 20.0);
+        axes.update(&orientation, 20.0, seconds(0), TICK);
+        axes.update(&orientation, 30.0, seconds(1), Span::from_ns(10 * TICK.as_ns()));
+        for (s, sensors) in [(3, 3), (4, 4), (6, 3), (7, 4), (11, 3), (12, 4)] {
+            let mut lanes = [0.0; 4];
+            let deg_c = f64::from(i32::try_from(20 + (s - 1).min(10)).unwrap());
+            let felt = orientation.forward(deg_c, truth);
+            lanes.iter_mut().zip(felt).for_each(|(lane, felt)| *lane = felt);
+            let (rate, _) = axes.resolve(&orientation, SensorMask::all(sensors), (&lanes, None), seconds(s));
+            let off = rate.iter().zip(truth).map(|(rate, truth)| (rate - truth).abs()).fold(0.0, f64::max);
+            assert!(
+                off < 1e-17 && (axes.temperature_deg_c(seconds(s)) - deg_c).abs() < 1e-12,
+                "{s} s: {off}"
+            );
+        }
     }
 
     #[test]

@@ -140,7 +140,7 @@ impl Corrector {
         let slew =
             (slew > Span::ZERO && same_output).then(|| Box::new(old.in_use(&old_calibration, takeover)));
         let same_basis = old_calibration.same_thermal_basis(calibration);
-        let same_bias = |i| same_basis && old_calibration.gyros.get(i) == calibration.gyros.get(i);
+        let same_bias = |i| same_basis && old_calibration.terms_of_gyro(i) == calibration.terms_of_gyro(i);
         let Self { mut drift, thermal, .. } = new;
         drift.carry(old.drift, same_bias);
         Self { drift, thermal, slew, slew_share: 0.0, calm: Calm::default(), ..old }

@@ -65,7 +65,7 @@ counters! {
         switches_unresolved,
         /// Ticks after a mode switch without the half-period counts that the servo's transient is taken from.
         servo_unmeasured,
-        /// Ticks not published because no calibration is installed and the unit holds back.
+        /// Ticks withheld: no running state, or no calibration where the unit holds back without one.
         ticks_held,
     }
 }

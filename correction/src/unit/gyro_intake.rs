@@ -19,7 +19,7 @@ pub(super) const LONGEST_KEPT: usize = 256;
 /// Longest tick (10 s).
 pub const MAX_TICK_DURATION: Span = Span::from_ns(10_000_000_000);
 /// A step of time larger than this, and than twice the ticks it claims to span, is not believed at once (1 h).
-const MAX_STEP: Span = Span::from_ns(3_600_000_000_000);
+const MAX_STEP: Span = Span::HOUR;
 /// So many consistent ticks in a row make a jump of sequence or time believed.
 const BELIEVED_AFTER: u32 = 8;
 /// The same where sequence and time both lie in the past: that is how a producer that was switched off and on looks,
@@ -80,8 +80,7 @@ impl Break {
 /// A jump of sequence or time that is not believed yet.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Jump {
-    sequence: u64,
-    end_time: Timestamp,
+    newest: Newest,
     consistent: u32,
     refused: u64,
 }
@@ -119,15 +118,17 @@ pub(super) struct GyroIntake {
     released: u128,
 }
 
-/// What became of a tick.
-enum Admission {
-    Admitted { restart: bool, refused_before: u64 },
-    Refused,
+impl Newest {
+    fn of(tick: &GyroTick) -> Self {
+        Self { sequence: tick.sequence, end_time: tick.end_time }
+    }
 }
 
-impl Admission {
-    /// Admitted as the next of its series.
-    const PLAIN: Self = Self::Admitted { restart: false, refused_before: 0 };
+/// A tick that was admitted, by default as the next of its series.
+#[derive(Default)]
+struct Admitted {
+    restart: bool,
+    refused_before: u64,
 }
 
 impl GyroIntake {
@@ -168,7 +169,7 @@ impl GyroIntake {
         let Some(last) = run.last() else { return };
         self.jump = None;
         self.unseen = 0;
-        self.newest = Some(Newest { sequence: last.sequence, end_time: last.end_time });
+        self.newest = Some(Newest::of(last));
         let count = u32::try_from(run.len()).unwrap_or(u32::MAX);
         // So many ones behind what there was.
         self.released = self.released.wrapping_add(1).checked_shl(count).unwrap_or(0).wrapping_sub(1);
@@ -195,13 +196,13 @@ impl GyroIntake {
             self.refuse();
             return false;
         }
-        let Admission::Admitted { restart, refused_before } = self.judge(tick, counters) else {
+        let Some(Admitted { restart, refused_before }) = self.judge(tick, counters) else {
             return false;
         };
         let refused_before = refused_before + core::mem::take(&mut self.unseen);
         let pending = Pending { tick: tick.clone(), output, batch_end: None, restart, refused_before };
         if restart || self.newest.is_none_or(|newest| tick.sequence > newest.sequence) {
-            self.newest = Some(Newest { sequence: tick.sequence, end_time: tick.end_time });
+            self.newest = Some(Newest::of(tick));
             self.restarts_pending += usize::from(restart);
             self.pending.push_back(pending);
             self.batch += 1;
@@ -242,14 +243,14 @@ impl GyroIntake {
     }
 
     /// Compares sequence and time with what came before.
-    fn judge(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
+    fn judge(&mut self, tick: &GyroTick, counters: &mut Counters) -> Option<Admitted> {
         let series = *self.series.get_or_insert(tick.series);
-        let Some(newest) = self.newest else { return Admission::PLAIN };
+        let Some(newest) = self.newest else { return Some(Admitted::default()) };
         if tick.series != series {
             if self.superseded == Some(tick.series) {
                 // Stragglers end; a run that goes on was interrupted by a stray tick of another, and takes over again.
                 let admission = self.follow_jump(tick, OLD_BELIEVED_AFTER, counters, |to| &mut to.gyro_late);
-                if let Admission::Admitted { .. } = admission {
+                if admission.is_some() {
                     self.superseded = self.series.replace(tick.series);
                 }
                 return admission;
@@ -258,11 +259,11 @@ impl GyroIntake {
             self.series = Some(tick.series);
             counters.restarts += 1;
             let refused_before = self.jump.take().map_or(0, |jump| jump.refused);
-            return Admission::Admitted { restart: true, refused_before };
+            return Some(Admitted { restart: true, refused_before });
         }
         if tick.sequence > newest.sequence && plausible_step(newest, tick) {
             self.jump = None;
-            return Admission::PLAIN;
+            return Some(Admitted::default());
         }
         if tick.sequence <= newest.sequence && tick.end_time <= newest.end_time {
             return self.judge_old(tick, counters);
@@ -271,16 +272,16 @@ impl GyroIntake {
     }
 
     /// A tick from before the newest one: late, doubled, filling a hole, or the sign of a restart.
-    fn judge_old(&mut self, tick: &GyroTick, counters: &mut Counters) -> Admission {
+    fn judge_old(&mut self, tick: &GyroTick, counters: &mut Counters) -> Option<Admitted> {
         if self.restarts_pending > 0
             && let Some(first) = self.pending.iter().rfind(|pending| pending.restart)
         {
             // What was released is of another series; behind the first tick of this one all may still be joined.
             return match tick.sequence.cmp(&first.tick.sequence) {
-                Ordering::Greater => Admission::PLAIN,
+                Ordering::Greater => Some(Admitted::default()),
                 Ordering::Equal => {
                     counters.gyro_duplicates += 1;
-                    Admission::Refused
+                    None
                 }
                 Ordering::Less => {
                     self.follow_jump(tick, OLD_BELIEVED_AFTER, counters, |to| &mut to.gyro_implausible)
@@ -288,7 +289,7 @@ impl GyroIntake {
             };
         }
         let Some(age) = self.last.and_then(|last| last.checked_sub(tick.sequence)) else {
-            return Admission::PLAIN;
+            return Some(Admitted::default());
         };
         let known = u32::try_from(age)
             .ok()
@@ -296,14 +297,14 @@ impl GyroIntake {
             .is_some_and(|bits| bits & 1 == 1);
         if known {
             counters.gyro_duplicates += 1;
-            return Admission::Refused;
+            return None;
         }
         // Too far back to tell late from anew: a producer that was switched off and on begins like this.
         if age >= u64::from(u128::BITS) {
             return self.follow_jump(tick, OLD_BELIEVED_AFTER, counters, |to| &mut to.gyro_implausible);
         }
         counters.gyro_late += 1;
-        Admission::Refused
+        None
     }
 
     /// Refuses a jump until enough ticks agree with it, then follows it; `refused` counts those before.
@@ -313,26 +314,19 @@ impl GyroIntake {
         believed_after: u32,
         counters: &mut Counters,
         refused: fn(&mut Counters) -> &mut u64,
-    ) -> Admission {
-        let before = self.jump.filter(|jump| {
-            let place = Newest { sequence: jump.sequence, end_time: jump.end_time };
-            tick.sequence > jump.sequence && plausible_step(place, tick)
-        });
+    ) -> Option<Admitted> {
+        let goes_on = |jump: &Jump| tick.sequence > jump.newest.sequence && plausible_step(jump.newest, tick);
+        let before = self.jump.filter(goes_on);
         let refused_before = self.jump.map_or(0, |jump| jump.refused);
         let consistent = before.map_or(1, |jump| jump.consistent + 1);
         if consistent <= believed_after {
             *refused(counters) += 1;
-            self.jump = Some(Jump {
-                sequence: tick.sequence,
-                end_time: tick.end_time,
-                consistent,
-                refused: refused_before + 1,
-            });
-            return Admission::Refused;
+            self.jump = Some(Jump { newest: Newest::of(tick), consistent, refused: refused_before + 1 });
+            return None;
         }
         self.jump = None;
         counters.restarts += 1;
-        Admission::Admitted { restart: true, refused_before }
+        Some(Admitted { restart: true, refused_before })
     }
 
     /// Puts a tick that came out of order in its place among those that wait.

@@ -69,8 +69,7 @@ impl Waiting {
 
     /// Drops readings from another time, after a step of the producer's clock.
     pub(super) fn restart(&mut self, now: Timestamp) {
-        const NEAR: Span = Span::from_ns(3_600_000_000_000);
-        self.readings.retain(|r| r.time.since(now) < NEAR && now.since(r.time) < NEAR);
+        self.readings.retain(|r| r.time.since(now) < Span::HOUR && now.since(r.time) < Span::HOUR);
     }
 }
 
@@ -153,35 +152,27 @@ impl ThermalMemory {
 
     /// Goes on with what trails behind a temperature that was filtered in the same way.
     fn carry_trails(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
-        let followed = |calibration: &Calibration, channel: Option<usize>| {
-            channel.and_then(|index| calibration.channels.get(index)).cloned()
+        let same = |new: Option<usize>, before: Option<usize>| {
+            let followed = new.and_then(|index| calibration.channels.get(index));
+            followed == before.and_then(|index| old.channels.get(index))
         };
-        let same = |new, before| followed(calibration, new) == followed(old, before);
-        self.gyros.carry_trails(&calibration.gyros, (&old.gyros, &old_memory.gyros), |lane| {
-            same(calibration.gyros[lane].channel, old.gyros[lane].channel)
-        });
-        self.accels.carry_trails(&calibration.accels, (&old.accels, &old_memory.accels), |lane| {
-            same(calibration.accels[lane].channel, old.accels[lane].channel)
-        });
+        self.gyros.carry_trails(&calibration.gyros, (&old.gyros, &old_memory.gyros), same);
+        let accels: &[AccelModel] = &calibration.accels;
+        self.accels.carry_trails(accels, (&old.accels, &old_memory.accels), same);
     }
 
     /// Goes on with what a swap did not change, on its way as it is: a swap to the same coefficients is no event.
     fn carry_unchanged(&mut self, calibration: &Calibration, (old, old_memory): (&Calibration, &Self)) {
         self.updated.clone_from(&old_memory.updated);
         self.paces.carry(&old_memory.paces);
-        for (lane, (new, old)) in calibration.gyros.iter().zip(&old.gyros).enumerate() {
-            if new == old {
-                self.gyros.carry(&old_memory.gyros, lane);
-            }
-        }
-        for (lane, (new, old)) in calibration.accels.iter().zip(&old.accels).enumerate() {
-            if new == old {
-                self.accels.carry(&old_memory.accels, lane);
-                self.boards.carry(&old_memory.boards, lane);
-            }
-        }
-        if calibration.motion == old.motion {
-            self.motion.clone_from(&old_memory.motion);
+        self.gyros.carry(&calibration.gyros, (&old.gyros, &old_memory.gyros));
+        self.accels.carry(&calibration.accels, (&old.accels, &old_memory.accels));
+        self.boards.carry(&calibration.accels, (&old.accels, &old_memory.boards));
+        if let (Some(banks), Some(motion)) = (&mut self.motion, &calibration.motion)
+            && let (Some(old_banks), Some(old)) = (&old_memory.motion, &old.motion)
+        {
+            banks.gyros.carry(&motion.gyros, (&old.gyros, &old_banks.gyros));
+            banks.accels.carry(&motion.accels, (&old.accels, &old_banks.accels));
         }
         if calibration.gyro_orientation == old.gyro_orientation
             && calibration.gyro_orientation_channels == old.gyro_orientation_channels
@@ -235,24 +226,20 @@ impl ThermalMemory {
             self.accels.grid_point(&calibration.accels, index, state);
         });
         let start = reading.time + delay;
-        match verdict {
-            Verdict::Rejected => counters.temperature_rejected += 1,
-            Verdict::OutOfOrder => counters.temperature_out_of_order += 1,
-            Verdict::Taken(0) => {}
-            Verdict::Taken(_) => {
-                let before = self.updated.get(index).copied().flatten();
-                let over = before.map_or(Span::ZERO, |before| start.since(before));
-                self.update(calibration, index, start, over.max(calibration.filter.grid_step));
-                self.join(calibration, index, start, first);
-            }
+        let before = match verdict {
+            Verdict::Rejected => return counters.temperature_rejected += 1,
+            Verdict::OutOfOrder => return counters.temperature_out_of_order += 1,
+            Verdict::Taken(0) => return,
+            Verdict::Taken(_) => self.updated.get(index).copied().flatten(),
             Verdict::Restarted => {
-                if let Some(state) = memory.state() {
-                    self.resume_trails(calibration, index, state.temperature);
-                }
-                self.update(calibration, index, start, calibration.filter.grid_step);
-                self.join(calibration, index, start, first);
+                let temperature = memory.state().map(|state| state.temperature);
+                self.resume_trails(calibration, index, temperature.unwrap_or_default());
+                None
             }
-        }
+        };
+        let over = before.map_or(Span::ZERO, |before| start.since(before));
+        self.update(calibration, index, start, over.max(calibration.filter.grid_step));
+        self.join(calibration, index, start, first);
     }
 
     fn resume_trails(&mut self, calibration: &Calibration, channel: usize, temperature: f64) {
@@ -270,7 +257,7 @@ impl ThermalMemory {
         let others = |source| value(channels, calibration, source);
         let (to, filter) = ((channel, &state), &calibration.filter);
         let within: (_, Others<'_>) = (filter, &others);
-        let way = (self.paces.share(channel, start), over == Span::ZERO);
+        let way = (over > Span::ZERO).then(|| self.paces.share(channel, start));
         self.gyros.update(&calibration.gyros, to, within, way);
         self.accels.update(&calibration.accels, to, within, way);
         self.boards.update(&calibration.accels, to, within, way);

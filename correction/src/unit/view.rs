@@ -2,6 +2,7 @@
 
 use alloc::sync::Arc;
 
+use super::correct::Corrector;
 use super::{Applied, At, AtRest, ChannelReport, Counters, PreLaunchView, SensorHealth, Unit, UnitSettings};
 use crate::calibration::Calibration;
 use crate::channel::ThermalState;
@@ -12,6 +13,11 @@ use crate::sample::{ChannelName, Sensors};
 use crate::units::Timestamp;
 
 impl Unit {
+    /// What corrects under the calibration in force.
+    fn corrector(&self) -> Option<&Corrector> {
+        self.pipeline.active.as_ref().map(|active| &active.corrector)
+    }
+
     /// What has been counted.
     #[must_use]
     pub fn counters(&self) -> &Counters {
@@ -59,7 +65,7 @@ impl Unit {
     /// How often [`temperatures`](Self::temperatures) may have changed since the unit was made or read back.
     #[must_use]
     pub fn temperature_changes(&self) -> u64 {
-        self.pipeline.active.as_ref().map_or(0, |active| active.corrector.thermal().changes)
+        self.corrector().map_or(0, |corrector| corrector.thermal().changes)
     }
 
     /// Revision of the navigation step that is being summed.
@@ -101,22 +107,19 @@ impl Unit {
     /// The last tick that was corrected, taken apart; `None` before the first one under a calibration.
     #[must_use]
     pub fn observation(&self) -> Option<&Observation> {
-        let seen = self.pipeline.active.as_ref().map(|active| &active.corrector.seen);
-        seen.filter(|seen| seen.gyros.count > 0)
+        self.corrector().map(|corrector| &corrector.seen).filter(|seen| seen.gyros.count > 0)
     }
 
     /// Account of each gyro, in the order of the calibration; empty without one.
     #[must_use]
     pub fn gyro_health(&self) -> Sensors<SensorHealth> {
-        let corrector = self.pipeline.active.as_ref().map(|active| &active.corrector);
-        corrector.map(|it| it.gyro_health.with(it.seen.gyros.flags)).unwrap_or_default()
+        self.corrector().map(|it| it.gyro_health.with(it.seen.gyros.flags)).unwrap_or_default()
     }
 
     /// Account of each accelerometer, likewise.
     #[must_use]
     pub fn accel_health(&self) -> Sensors<SensorHealth> {
-        let corrector = self.pipeline.active.as_ref().map(|active| &active.corrector);
-        corrector.map(|it| it.accel_health.with(it.seen.accels.flags)).unwrap_or_default()
+        self.corrector().map(|it| it.accel_health.with(it.seen.accels.flags)).unwrap_or_default()
     }
 
     /// What is presently subtracted from the readings, in case axes; `None` before the first corrected tick.
@@ -147,14 +150,13 @@ impl Unit {
     /// Estimated drift of each gyro at the last tick; `None` for one whose calibration has no parameters for it.
     #[must_use]
     pub fn drift(&self) -> Sensors<Option<DriftEstimate>> {
-        let active = self.pipeline.active.iter();
-        active.flat_map(|active| active.corrector.drift.estimates()).collect()
+        self.corrector().into_iter().flat_map(|corrector| corrector.drift.estimates()).collect()
     }
 
     /// What became of the references.
     #[must_use]
     pub fn reference_counters(&self) -> ReferenceCounters {
-        self.pipeline.active.as_ref().map(|active| *active.corrector.drift.counters()).unwrap_or_default()
+        self.corrector().map(|corrector| *corrector.drift.counters()).unwrap_or_default()
     }
 
     /// Ends a self-test that gets no ticks with what it has seen: for the owner's clock.

@@ -47,9 +47,14 @@ fn turning(axis: [f64; 3], rate_deg_per_s: f64) -> Motion {
     Motion::rest(0.0).along(Path::ConstantRate { axis, rate_deg_per_s })
 }
 
+/// Mean specific force of a step (m/s²).
+fn force(step: &Step) -> [f64; 3] {
+    step.truth.delta_velocity.map(|v| v / step.gyro.duration.as_s())
+}
+
 /// Mean over the steps of what an accelerometer reads beside the truth (m/s²).
 fn mean_excess(steps: &[Step], sensor: usize) -> f64 {
-    let excess = |step: &Step| step.accel.as_ref().unwrap().readings[sensor] - step.truth.mean_force[sensor];
+    let excess = |step: &Step| step.accel.as_ref().unwrap().readings[sensor] - force(step)[sensor];
     steps.iter().map(excess).sum::<f64>() / f64::from(u32::try_from(steps.len()).unwrap())
 }
 
@@ -123,7 +128,7 @@ fn an_accelerometer_away_from_the_centre_feels_it_turn() {
     let mut tangential = 0.0;
     for step in &steps {
         let seconds = step.gyro.duration.as_s();
-        tangential += (step.accel.as_ref().unwrap().readings[1] - step.truth.mean_force[1]) * seconds;
+        tangential += (step.accel.as_ref().unwrap().readings[1] - force(step)[1]) * seconds;
         let end = step.gyro.end_time.as_ns();
         #[expect(clippy::cast_precision_loss, reason = "a few seconds")]
         let rate = |ns: i64| {

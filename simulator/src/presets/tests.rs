@@ -4,6 +4,7 @@ use crate::failure::{FailingSensor, Failure, Fault};
 use crate::instrument::Gyros;
 use crate::scenario::Scenario;
 use crate::simulation::Simulation;
+use crate::vector::{norm, plus, scale};
 
 fn all() -> Vec<Scenario> {
     let failure = Failure { sensor: FailingSensor::Gyro(2), at_s: 100.0, fault: Fault::Stuck };
@@ -45,10 +46,13 @@ fn every_preset_survives_a_scenario_file() {
 #[test]
 fn temperature_changes_the_length_of_a_row_by_less_than_1e_9() {
     for scenario in all() {
-        let accelerometers = scenario.instrument.accelerometers.unwrap();
-        for deg_c in [-45.0, 90.0] {
-            assert!(scenario.instrument.gyro_orientation.stretch(deg_c) < 1e-9);
-            assert!(accelerometers.orientation.stretch(deg_c) < 1e-9);
+        let instrument = scenario.instrument;
+        for axes in [instrument.gyro_orientation, instrument.accelerometers.unwrap().orientation] {
+            for away_k in [-45.0, 90.0].map(|deg_c| deg_c - axes.reference_deg_c) {
+                for (row, per_k) in axes.rows.iter().zip(&axes.rows_per_k) {
+                    assert!((norm(plus(*row, scale(*per_k, away_k))) - 1.0).abs() < 1e-9, "{axes:?}");
+                }
+            }
         }
     }
 }

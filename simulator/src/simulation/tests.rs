@@ -84,7 +84,7 @@ fn the_quartz_accelerometers_follow_their_documented_formula() {
     let mut accumulated = [0.0_f64; 3];
     for step in Simulation::new(&scenario).unwrap() {
         let truth = &step.truth;
-        let force = block.orientation.project(truth.mean_force, truth.housing_deg_c);
+        let velocity = block.orientation.project(truth.delta_velocity, truth.housing_deg_c);
         for (index, sensor) in block.sensors.iter().enumerate() {
             let at = |c: [f64; 3], deg_c: f64| {
                 let away_k = deg_c - sensor.reference_deg_c;
@@ -92,7 +92,7 @@ fn the_quartz_accelerometers_follow_their_documented_formula() {
             };
             let deg_c = truth.accel_deg_c[index];
             let scale = at(sensor.scale_v_per_m_per_s2, deg_c) / at(sensor.board_ratio, truth.board_deg_c);
-            let volts = scale * force[index] + at(sensor.bias_v, deg_c);
+            let volts = scale * velocity[index] / step.gyro.duration.as_s() + at(sensor.bias_v, deg_c);
             let readings = &step.accel.as_ref().unwrap().readings;
             accumulated[index] += readings[index] - volts * 5.0e5 * step.gyro.duration.as_s();
             assert!(accumulated[index].abs() < 1.0 + 1e-6, "{accumulated:?}");
@@ -121,7 +121,7 @@ fn jittered_ticks_stay_contiguous_and_keep_the_truth() {
         assert_eq!(end + step.gyro.duration, step.gyro.end_time);
         assert!((8_000_000..=12_000_000).contains(&step.gyro.duration.as_ns()));
         end = step.gyro.end_time;
-        turned = crate::vector::add(turned, step.truth.delta_angle);
+        turned = crate::vector::plus(turned, step.truth.delta_angle);
     }
     let whole = Trajectory::new(&jittered.motion);
     let length_s = end.seconds_from(Timestamp::from_ns(0));
@@ -129,7 +129,7 @@ fn jittered_ticks_stay_contiguous_and_keep_the_truth() {
     for part in 0..6000_u32 {
         let part_s = length_s / 6000.0;
         expected =
-            crate::vector::add(expected, whole.increments((f64::from(part) + 0.5) * part_s, part_s).angle);
+            crate::vector::plus(expected, whole.increments((f64::from(part) + 0.5) * part_s, part_s).angle);
     }
     for axis in 0..3 {
         assert!((turned[axis] - expected[axis]).abs() < 1e-11, "{}", turned[axis] - expected[axis]);

@@ -1,13 +1,15 @@
 //! I3: a calibration takes effect at a tick boundary; every output names the revision that made it; no tick is lost,
 //! doubled or delayed by a swap.
 
-use isotherm_correction::calibration::CalibrationParts;
+use isotherm_correction::calibration::{CalibrationParts, GyroParts};
+use isotherm_correction::drift::Reference;
 use isotherm_correction::sample::{ChannelName, CorrectedTick, OutputKind, TemperatureReading};
+use isotherm_correction::unit::Unit;
 use isotherm_tests::calibrations::{
-    ALONG_CASE_AXES, Feature, PutTerms, channel, compile, constant, identity, polynomial,
+    ALONG_CASE_AXES, Feature, PutTerms, channel, compile, constant, identity, lively_drift, polynomial,
 };
 use isotherm_tests::drive::{self, Owned};
-use isotherm_tests::streams::{accel, gyro, temperature};
+use isotherm_tests::streams::{accel, end_of, gyro, temperature};
 
 const TICKS: u64 = 4000;
 
@@ -21,7 +23,7 @@ fn thermal(bias: f64) -> CalibrationParts {
 }
 
 /// A run in which `swap` may install something before each tick.
-fn run(mut swap: impl FnMut(u64, &mut isotherm_correction::unit::Unit)) -> Vec<CorrectedTick> {
+fn run(mut swap: impl FnMut(u64, &mut Unit)) -> Vec<CorrectedTick> {
     let mut unit = drive::unit(&compile(&thermal(1e-4)));
     let mut out = Vec::new();
     for k in 0..TICKS {
@@ -143,6 +145,66 @@ fn i3_lags_go_on_with_their_channel_wherever_it_stands() {
     let (swapped, plain) = (run(with(["t", "u"], 1), true), run(with(["t", "u"], 1), false));
     for (swapped, plain) in swapped.iter().zip(&plain).skip(2700) {
         assert!((at(swapped) - at(plain)).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn i3_what_a_swap_leaves_of_the_terms_that_follow_motion_stays_on_its_way() {
+    let with = |drift: f64| {
+        let mut parts = thermal(0.0);
+        for (gyro, drift) in parts.gyros.iter_mut().zip([drift, 1e-5]) {
+            gyro.terms.curve(Feature::ForceZ, polynomial(&[drift, 1e-5]));
+        }
+        compile(&parts)
+    };
+    let run = |swap: bool| {
+        run(|k, unit| match k {
+            0 => unit.install(with(2e-5), 1),
+            2345 if swap => unit.install(with(3e-5), 2),
+            _ => {}
+        })
+    };
+    for (swapped, plain) in run(true).iter().zip(&run(false)) {
+        let [changed, same] =
+            [0, 1].map(|axis| swapped.delta_angle[axis].to_bits() == plain.delta_angle[axis].to_bits());
+        assert_eq!((changed, same), (plain.sequence < 2345, true), "tick {}", plain.sequence);
+    }
+}
+
+#[test]
+fn i3_the_drift_of_a_gyro_goes_on_unless_a_swap_changes_its_biases() {
+    type Change<'a> = &'a dyn Fn(&mut GyroParts);
+    let with = |change: Change<'_>| {
+        let mut parts = identity();
+        parts.gyros.iter_mut().for_each(|gyro| gyro.drift = Some(lively_drift()));
+        change(&mut parts.gyros[1]);
+        compile(&parts)
+    };
+    let curve = |feature| move |gyro: &mut GyroParts| gyro.terms.curve(feature, constant(1e-6));
+    let changes: [(Change<'_>, u64); 5] = [
+        (&|gyro| gyro.input_limit *= 1.0, 1),
+        (&curve(Feature::One), 0),
+        (&curve(Feature::ForceX), 0),
+        (&curve(Feature::RateMagnitude), 0),
+        (&|gyro| gyro.increment_weight_over_rate = Some(constant(1e-6)), 0),
+    ];
+    for (index, (change, kept)) in changes.into_iter().enumerate() {
+        let mut unit = drive::unit(&with(&|_| {}));
+        let mut out = Vec::new();
+        for k in 0..1000 {
+            if k == 700 {
+                let [start, end] = [200, 600].map(end_of);
+                let reference = Reference { start, end, angular_rate: [0.0; 3], sigma: 1e-6 };
+                drive::hand(&mut unit, &Owned::Reference(reference), &mut out);
+            }
+            drive::hand(&mut unit, &Owned::Accel(vec![accel(k, &[0.0, 0.0, 9.8])]), &mut out);
+            drive::hand(&mut unit, &Owned::Gyro(vec![gyro(k, &[0.01, 0.02, 0.03])]), &mut out);
+        }
+        let updates =
+            |unit: &Unit| unit.drift().iter().map(|drift| drift.unwrap().updates).collect::<Vec<_>>();
+        assert_eq!(updates(&unit), [1, 1, 1]);
+        unit.install(with(change), 2);
+        assert_eq!(updates(&unit), [1, kept, 1], "change {index}");
     }
 }
 

@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use isotherm_correction::calibration::GyroParts;
-use isotherm_correction::reversal::{Reversal, ReversalParts, Transition};
+use isotherm_correction::curve::CurveParts;
+use isotherm_correction::reversal::{ReversalParts, Transition};
 use isotherm_correction::sample::{CorrectedTick, GyroTick, LasingMode, SensorFlags, TickFlags};
 use isotherm_correction::units::Span;
 use isotherm_tests::calibrations::{
@@ -48,7 +49,7 @@ fn run(
     missing: &[u64],
 ) -> Vec<CorrectedTick> {
     let calibration = compile(&mode_reversed(parts));
-    let n = u64::from(Reversal::new(&parts).unwrap().transition_ticks(Span::from_s(TICK_S)));
+    let n = u64::from(parts.transition.ticks(Span::from_s(TICK_S)));
     let ticks = (0..TICKS).filter(|k| !missing.contains(k)).map(|k| raw(k, frequency_hz, phase, switches, n));
     drive::run(&mut drive::unit(&calibration), &[Owned::Gyro(ticks.collect())])
 }
@@ -122,6 +123,22 @@ fn i5_shorter_transitions_are_bridged_too() {
 }
 
 #[test]
+fn i5_what_a_gyro_reads_in_a_transition_is_beyond_no_range() {
+    let mut parts = mode_reversed(ReversalParts::default());
+    for gyro in &mut parts.gyros {
+        gyro.increment_weight_over_rate =
+            Some(CurveParts::PiecewiseLinear { knots: vec![[-1.0, 1e-6], [1.0, 2e-6]] });
+    }
+    let ticks: Vec<_> = (0..TICKS).map(|k| raw(k, 1.0, 0.7, &[LAST_GOOD + 1], 3)).collect();
+    let out = drive::run(&mut drive::unit(&compile(&parts)), &[Owned::Gyro(ticks)]);
+    for tick in &out {
+        let clamped = tick.gyro_flags.iter().any(|flags| flags.contains(SensorFlags::CLAMPED_RATE));
+        assert!(!clamped, "tick {}: {:?}", tick.sequence, tick.flags);
+    }
+    assert_eq!(out.iter().filter(|tick| tick.flags.contains(TickFlags::INTERPOLATED)).count(), 3);
+}
+
+#[test]
 fn i5_a_switch_during_a_gap() {
     // The command and one more tick of the transition are lost: the published ticks still add up to the two-sided fit.
     let first = LAST_GOOD + 1;
@@ -183,7 +200,7 @@ fn i5_a_gyro_that_is_held_back_loses_nothing_and_the_next_two_ticks_are_flagged_
         stated.gyros[1].delay_ticks = delay_ticks;
         compile(&stated)
     };
-    let n = u64::from(Reversal::new(&parts).unwrap().transition_ticks(Span::from_s(TICK_S)));
+    let n = u64::from(parts.transition.ticks(Span::from_s(TICK_S)));
     let ticks: Vec<_> = (0..TICKS).map(|k| raw(k, 1.0, 0.3, &[LAST_GOOD + 1], n)).collect();
     let [plain, held] = [0.0, 0.6]
         .map(|delay| drive::run(&mut drive::unit(&calibration(delay)), &[Owned::Gyro(ticks.clone())]));

@@ -47,7 +47,8 @@ pub(super) fn gyro_model(
     sigma(checker, gyro.sigma.as_ref());
     let servo = gyro.servo.as_ref().and_then(|servo| checker.compiled("servo", Servo::new(servo)));
     let model = GyroModel::new(gyro, servo, filter, checker);
-    model.zip(MotionTerms::of_gyro(gyro, filter, checker))
+    let over_rate = gyro.increment_weight_over_rate.as_ref();
+    model.zip(MotionTerms::new(gyro.channel, (&GYRO_TERMS, &gyro.terms), over_rate, filter, checker))
 }
 
 pub(super) fn accel_model(
@@ -74,7 +75,7 @@ pub(super) fn accel_model(
     if let Some(at) = model.as_ref().and_then(|model| sign_change(&model.scale_factor)) {
         checker.push("scale_factor", DefectKind::Zero { at });
     }
-    model.zip(MotionTerms::of_accel(accel, filter, checker))
+    model.zip(MotionTerms::new(accel.channel, (&ACCEL_TERMS, &accel.terms), None, filter, checker))
 }
 
 /// Standard errors are numbers from 0 on, and correlations those of a covariance.
@@ -142,11 +143,12 @@ fn terms(
     }
 }
 
-/// First place on a grid over the curve's range where it is zero or has changed its sign.
+/// A place on a grid over the curve's range, or else a knot, where it is zero or has changed its sign.
 fn sign_change(curve: &Curve) -> Option<f64> {
     let [low, high] = curve.range();
     let first = curve.at(low).value;
-    (0..=256).map(|i| low + (high - low) * f64::from(i) / 256.0).find(|&x| {
+    let grid = (0..=256).map(|i| low + (high - low) * f64::from(i) / 256.0);
+    grid.chain(curve.knots()).find(|&x| {
         let same_sign = curve.at(x).value * first;
         same_sign.is_nan() || same_sign <= 0.0
     })

@@ -152,8 +152,8 @@ impl Corrector {
                         before[i] * duration_s
                     }
                 });
+                mark_clamped(&mut flags, clamped);
             }
-            mark_clamped(&mut flags, clamped);
         }
         // Before the substitution: the angle that it restores is a lump, not a rate.
         let mut rates: [f64; N] = increments.map(|increment| increment / duration_s);
