@@ -62,7 +62,7 @@ fn a_part_of_a_recording_is_the_same_whether_or_not_its_log_begins_before_time_0
         })
     });
     assert_eq!(before, after);
-    assert_eq!((before[0].len(), before[1].first()), (51, Some(&190)));
+    assert_eq!((before[0].len(), before[1].first()), (50, Some(&191)));
 }
 
 /// A text log to a recording, back to text, and once more to a recording: the same ticks, the same messages.
@@ -293,8 +293,13 @@ fn the_part_that_is_asked_for_is_converted() {
     record(&path("x.mcap"), &all);
     let part = ["x.mcap", "--out", "x.csv.gz", "--unit", "B-2", "--start", "0.2", "--duration", "0.3"];
     let summary = convert(folder.path(), &part, 0);
-    assert_eq!(files(&summary), pairs(&[("x.csv.gz", 31), ("x.mapping.toml", 1)]));
-    assert_eq!(events(&path("x.mapping.toml"), &path("x.csv.gz")).len(), 31);
+    assert_eq!(files(&summary), pairs(&[("x.csv.gz", 30), ("x.mapping.toml", 1)]));
+    assert_eq!(events(&path("x.mapping.toml"), &path("x.csv.gz")).len(), 30);
+    // A part that adjoins has the next message, and none of these again.
+    let next = ["x.mcap", "--out", "y.csv.gz", "--unit", "B-2", "--start", "0.5", "--duration", "0.1"];
+    convert(folder.path(), &next, 0);
+    let times = |name| events(&path("x.mapping.toml"), &path(name)).into_iter().map(|event| event.time());
+    assert_eq!(times("y.csv.gz").next(), times("x.csv.gz").next_back().map(|last| last + Span::from_ms(10)));
     insta::assert_snapshot!(told(folder.path(), &["convert", "x.mcap", "--out", "y.csv"]));
 }
 
