@@ -7,7 +7,7 @@ use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, 
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::{Message, Topic};
-use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
+use isotherm_log::recording::{Documents, RecordingOptions, RecordingReader, RecordingWriter};
 use isotherm_log::text::{LogEvent, LogReader};
 use isotherm_protocol::codec;
 use isotherm_protocol::raw::{
@@ -227,6 +227,19 @@ fn a_stream_that_is_empty_is_read_back_as_empty() {
     let document = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let bag = ["convert", "accel.mcap", "--to", "ros2", "--out", "bag", "--calibration", document];
     insta::assert_snapshot!(stderr(&replay(folder.path(), &bag)));
+}
+
+#[test]
+fn a_document_behind_the_last_message_says_what_readings_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/ZLG-0001.toml");
+    let mut writer =
+        RecordingWriter::create(&folder.path().join("x.mcap"), RecordingOptions::default()).unwrap();
+    writer.write(&gyro("ZLG-0001", 3, 0, 10)).unwrap();
+    writer.attach(&Documents::attachment(fs::read(document).unwrap(), 6)).unwrap();
+    writer.finish().unwrap();
+    let summary = convert(folder.path(), &["x.mcap", "--to", "ros2", "--out", "bag"], 0);
+    assert_eq!(summary["topics"][0]["name"], "/imu/ZLG_0001/data_raw");
 }
 
 #[test]
