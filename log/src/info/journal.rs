@@ -90,10 +90,12 @@ impl JournalSurvey {
         *self.info.entries.entry(entry.event.name()).or_default() += 1;
         if self.numbers.len() < MAX_LISTED || self.numbers.contains_key(&entry.instance) {
             let is_memory = matches!(entry.event, JournalEvent::Memory { .. });
-            let before = self.numbers.insert(entry.instance, entry.number);
+            let last = self.numbers.entry(entry.instance).or_insert(entry.number);
             // A memory bears the number of the entry before it.
-            let expected = before.map_or(entry.number, |number| number + u64::from(!is_memory));
+            let expected = last.saturating_add(u64::from(!is_memory));
             self.info.missing_entries += entry.number.saturating_sub(expected);
+            // One that comes late is no step back.
+            *last = entry.number.max(*last);
         }
         match entry.event {
             JournalEvent::Changed { revision, at, slew_ns, document, overlay, source }

@@ -281,8 +281,9 @@ fn a_journal_tells_swaps_commands_and_lost_entries() {
         accepted: true,
         words: "standby".into(),
     };
-    // Number 3 and 4 are lost.
-    let entries = [entry(1, changed), entry(2, commanded), entry(5, JournalEvent::Flushed)];
+    // Number 3 and 4 are passed over; one that comes late passes none over once more.
+    let late = [5, 4, 6].map(|number| entry(number, JournalEvent::Flushed));
+    let entries = [vec![entry(1, changed), entry(2, commanded)], late.to_vec()].concat();
     let messages: Vec<_> = entries
         .iter()
         .flat_map(split)
