@@ -16,7 +16,7 @@ mod metadata;
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use isotherm_log::error::Error;
@@ -152,7 +152,6 @@ impl BagWriter {
         let failed = |source| Error::file(&path, "write the bag", source);
         let mut buffered = self.writer.into_inner();
         buffered.flush().map_err(failed)?;
-        buffered.seek(io::SeekFrom::End(0)).map_err(failed)?;
         buffered.get_ref().sync_all().map_err(failed)?;
         let yaml = metadata::yaml(name, &self.summary);
         Ok((self.summary, yaml))
