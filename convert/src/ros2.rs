@@ -58,8 +58,8 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     }
     let folder = conversion.out.file_name().map_or("bag".into(), |name| name.to_string_lossy().into_owned());
     let file = format!("{folder}_0.mcap");
-    let bag = conversion.place.partial(&conversion.out.join(&file))?;
-    let mut writer = BagWriter::create(bag.writing())?;
+    let mut bag = conversion.place.partial(&conversion.out.join(&file))?;
+    let mut writer = BagWriter::create(&mut bag)?;
     writer.metadata("isotherm", conversion.provenance().into_iter().collect())?;
     let mut converted = Converted::default();
     let log = conversion.read_units(&mut units, &mut converted, |unit, _, decoded, converted| {

@@ -203,13 +203,12 @@ impl std::fmt::Debug for Table {
 impl Table {
     /// Creates the file for about so many rows. `provenance`: names and values for the file's metadata.
     pub(super) fn create(
-        partial: Partial,
+        mut partial: Partial,
         expected_rows: u64,
         provenance: Vec<(String, String)>,
     ) -> Result<Self, Error> {
-        let writing = partial.writing();
         Ok(Self {
-            file: File::create(writing).map_err(|source| Error::file(writing, "create", source))?,
+            file: partial.create()?,
             writer: None,
             partial,
             columns: Vec::new(),

@@ -61,6 +61,18 @@ fn rows_of_many_groups_are_read_back() {
 }
 
 #[test]
+fn a_file_that_is_being_written_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.parquet");
+    let mut other = Partial::of(&path);
+    let file = other.create().unwrap();
+    assert!(Table::create(Partial::of(&path), 1, Vec::new()).is_err());
+    assert!(other.writing().exists());
+    drop(file);
+    Table::create(Partial::of(&path), 1, Vec::new()).unwrap();
+}
+
+#[test]
 fn a_cell_that_does_not_fit_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let refused = [Cell::Empty, Cell::Integer(1)].map(|cell| {
