@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use isotherm_log::file::Sink;
+
 use super::common::{check, replay, root, stderr, stdout, told};
 use super::imports::{Expected, ROWS, TEN_MS, import, log, noise};
 
@@ -265,4 +267,24 @@ fn a_channel_has_a_name_that_fits_in_whatever_letters() {
     let parts = ["channel = \"температур\""];
     let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 1 };
     import("log.csv", text.as_bytes(), &[], &expected);
+}
+
+#[test]
+fn a_compressed_log_that_is_cut_short_is_imported_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv.gz");
+    let text = log("time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+        format!("{:.2},{:.3},1.5,2.5", f64::from(u32::try_from(row).unwrap()) * 0.01, noise(row, 1))
+    });
+    let mut sink = Sink::create(&path).unwrap();
+    sink.write(|writer| writer.write_all(text.as_bytes())).unwrap();
+    sink.finish().unwrap().keep().unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let output = replay(folder.path(), &["import", "log.csv.gz", "--no-plot", "--json"]);
+    check(&output, 3);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let reading = &report["info"]["reading"];
+    let rows = reading["rows"].as_u64().unwrap();
+    assert!(reading["cut_short"] == true && (50..450).contains(&rows), "{reading}");
 }
