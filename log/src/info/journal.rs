@@ -145,17 +145,18 @@ pub struct StatusInfo {
     pub versions: Vec<String>,
     /// Instances of the service, likewise.
     pub instances: Vec<String>,
+    #[serde(skip)]
+    last: Option<(State, Output)>,
 }
 
 impl StatusInfo {
     pub(super) fn take(&mut self, received_ns: u64, status: &Status) {
-        let now = (status.state, status.output);
-        let before = self.states.last().map(|state| (state.state, state.output));
-        if before != Some(now) {
+        let (state, output) = (status.state, status.output);
+        let before = self.last.replace((state, output));
+        if before != Some((state, output)) {
             self.changes += u64::from(before.is_some());
             if self.states.len() < MAX_LISTED {
                 let last_tick_ns = status.last_tick.map(|tick| tick.end_time_ns);
-                let (state, output) = now;
                 self.states.push(StateInfo { received_ns, last_tick_ns, state, output });
             }
         }
