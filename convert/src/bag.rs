@@ -16,10 +16,11 @@ mod metadata;
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use isotherm_log::error::Error;
+use isotherm_log::file::Partial;
 use isotherm_log::recording::io_error;
 use isotherm_log::ros2::{RosMessage, to_cdr};
 use mcap::records::MessageHeader;
@@ -90,8 +91,8 @@ impl BagWriter {
     ///
     /// # Errors
     /// [`Error::File`].
-    pub(crate) fn create(path: &Path) -> Result<Self, Error> {
-        let file = File::create(path).map_err(|source| Error::file(path, "create the bag", source))?;
+    pub(crate) fn create(partial: &mut Partial) -> Result<Self, Error> {
+        let (file, path) = (partial.create()?, partial.path());
         let writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("isotherm ", env!("CARGO_PKG_VERSION")))
@@ -152,7 +153,6 @@ impl BagWriter {
         let failed = |source| Error::file(&path, "write the bag", source);
         let mut buffered = self.writer.into_inner();
         buffered.flush().map_err(failed)?;
-        buffered.seek(io::SeekFrom::End(0)).map_err(failed)?;
         buffered.get_ref().sync_all().map_err(failed)?;
         let yaml = metadata::yaml(name, &self.summary);
         Ok((self.summary, yaml))
@@ -199,7 +199,8 @@ mod tests {
     fn a_bag_describes_itself() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x_0.mcap");
-        let mut bag = BagWriter::create(&path).unwrap();
+        let mut partial = Partial::of(&path);
+        let mut bag = BagWriter::create(&mut partial).unwrap();
         let origin = || BTreeMap::from([("unit".to_owned(), "A-1".to_owned())]);
         for (topic, time_ns) in [("/imu/A_1/temperature/b", 9), ("/imu/A_1/temperature/a", 4)] {
             let message = Temperature { header: header(), temperature: 1.5, variance: 0.0 };
@@ -212,6 +213,7 @@ mod tests {
             assert!(yaml.contains(line), "{line}\n{yaml}");
         }
 
+        partial.keep().unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
         assert_eq!(messages.len(), 3);

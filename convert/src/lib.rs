@@ -21,7 +21,7 @@ use clap::ValueEnum;
 use isotherm_cli::Bar;
 use isotherm_log::error::Error;
 use isotherm_log::message::Message;
-use isotherm_log::part::{LogFiles, Messages, Part};
+use isotherm_log::part::{LogFiles, Part};
 use isotherm_log::recording::{Attachment, RecordingReader};
 use isotherm_log::source::LogReport;
 use isotherm_log::streams::contents::Contents;
@@ -91,7 +91,7 @@ pub struct Conversion {
 }
 
 /// What the first reading of a log found.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Found {
     contents: Contents,
     /// Calibration documents in recordings, in their order.
@@ -114,30 +114,39 @@ impl Conversion {
 
     /// Finds out what the log holds.
     fn look(&self) -> Result<Found, Error> {
-        let mut found = Found::default();
-        self.read("looking", |message, attachments| {
-            found.contents.add(message);
-            found.documents.extend(attachments.iter().filter_map(document));
+        let mut contents = Contents::default();
+        let (_, documents) = self.read("looking", |message| {
+            contents.add(message);
             Ok(())
         })?;
-        if found.contents.units.is_empty() { Err(Error::Nothing("convert")) } else { Ok(found) }
+        if contents.units.is_empty() {
+            Err(Error::Nothing("convert"))
+        } else {
+            Ok(Found { contents, documents })
+        }
     }
 
-    /// Reads the log's part; `each` gets every message, and the files that stand before it in a recording.
+    /// Reads the log's part, of which `each` gets every message; what reading came to, and the calibration documents in recordings.
     fn read(
         &self,
         words: &'static str,
-        mut each: impl FnMut(&Message, &[Attachment]) -> Result<(), Error>,
-    ) -> Result<LogReport, Error> {
+        mut each: impl FnMut(&Message) -> Result<(), Error>,
+    ) -> Result<(LogReport, Vec<Document>), Error> {
         let mut messages = self.files.open(&self.part)?;
         let mut bar = Bar::over_logs(words);
         bar.begin(messages.progress().watch());
-        while let Some(message) = messages.next_message()? {
-            each(&message, &attachments(&mut messages))?;
+        let mut documents = Vec::new();
+        loop {
+            let message = messages.next_message()?;
+            // They may stand behind the last message.
+            let attached = messages.recording().map(RecordingReader::take_attachments).unwrap_or_default();
+            documents.extend(attached.iter().filter_map(document));
+            let Some(message) = message else { break };
+            each(&message)?;
             bar.step();
         }
         bar.finish();
-        Ok(messages.report())
+        Ok((messages.report(), documents))
     }
 
     /// Reads the log's part into its units; what is of none, or cannot be read, is counted.
@@ -147,7 +156,7 @@ impl Conversion {
         converted: &mut Converted,
         mut take: impl FnMut(&mut U, u64, &Decoded, &mut Converted) -> Result<(), Error>,
     ) -> Result<LogReport, Error> {
-        self.read("writing", |message, _| {
+        let (report, _) = self.read("writing", |message| {
             let Ok(decoded) = decode(message) else {
                 converted.lose("frames that cannot be read", 1);
                 return Ok(());
@@ -157,7 +166,8 @@ impl Conversion {
                 None => converted.leave_out("messages of no unit", 1),
             }
             Ok(())
-        })
+        })?;
+        Ok(report)
     }
 
     /// Names and values that every output carries.
@@ -170,11 +180,6 @@ impl Conversion {
         }
         words
     }
-}
-
-/// Files that were come across since the last message.
-fn attachments(messages: &mut Messages) -> Vec<Attachment> {
-    messages.recording().map(RecordingReader::take_attachments).unwrap_or_default()
 }
 
 /// A calibration document in a recording; what is none is passed over.

@@ -31,15 +31,11 @@ use streams::UnitTables;
 
 pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome, Error> {
     let provenance = conversion.provenance();
-    let mut partials: Vec<Partial> = Vec::new();
     let mut tables = BTreeMap::<UnitId, UnitTables>::new();
     for (unit, contents) in &found.contents.units {
         let created = UnitTables::create(unit, contents, &provenance, |stream| {
             let path = conversion.out.join(folder(unit)).join(format!("{stream}.parquet"));
-            let partial = conversion.place.partial(&path)?;
-            let writing = partial.writing().to_owned();
-            partials.push(partial);
-            Ok(writing)
+            conversion.place.partial(&path)
         })?;
         tables.insert(unit.clone(), created);
     }
@@ -50,14 +46,13 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
             converted.leave_out("journal messages", u64::from(!written));
             Ok(())
         })?;
+    let mut partials = Vec::new();
     for tables in tables.into_values() {
-        converted.files.extend(tables.finish()?);
-    }
-    for partial in partials {
-        if let Some(file) = converted.files.iter_mut().find(|file| file.path == partial.writing()) {
-            partial.path().clone_into(&mut file.path);
+        for (partial, written) in tables.finish()? {
+            partials.push(partial);
+            converted.files.push(written);
         }
-        partial.keep()?;
     }
+    partials.into_iter().try_for_each(Partial::keep)?;
     Ok(Outcome { converted, log })
 }

@@ -1,8 +1,5 @@
 //! A text log as a recording.
 
-use std::collections::BTreeSet;
-
-use isotherm_log::message::Topic;
 use isotherm_log::recording::{Metadata, RecordingOptions, RecordingWriter};
 
 use super::{Conversion, Converted, Outcome, Written};
@@ -20,21 +17,19 @@ pub(super) fn convert(conversion: &Conversion) -> Result<Outcome, Error> {
     let mut writer = RecordingWriter::create(partial.writing(), options)?;
     let origin = ("origin".to_owned(), "converted from a text log".to_owned());
     writer.metadata(&Metadata::of(conversion.provenance().into_iter().chain([origin])))?;
-    let mut topics = BTreeSet::<Topic>::new();
-    let log = conversion.read("writing", |message, _| {
-        if !topics.contains(&message.topic) {
-            topics.insert(message.topic.clone());
-        }
+    let (mut rows, mut unit) = (0, None);
+    let (log, _) = conversion.read("writing", |message| {
+        rows += 1;
+        unit = message.topic.unit().cloned();
         writer.write(message)
     })?;
-    if topics.is_empty() {
+    if rows == 0 {
         return Err(Error::Nothing("convert"));
     }
-    let rows = topics.iter().map(|topic| writer.messages(topic)).sum();
     writer.finish()?;
     let path = partial.path().to_owned();
     partial.keep()?;
-    let unit = topics.first().and_then(Topic::unit).map(ToString::to_string);
+    let unit = unit.map(|unit| unit.to_string());
     let files = vec![Written { path, unit, what: "recording", rows }];
     Ok(Outcome { converted: Converted { files, ..Converted::default() }, log })
 }

@@ -49,25 +49,24 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     for (unit, contents) in &found.contents.units {
         let documents = conversion.ros2.documents.iter().chain(&found.documents);
         let document = documents.into_iter().find(|document| document.unit == unit.as_str());
-        let mut units_own =
-            UnitBag::new(unit, contents, &names.get(unit.as_str()), &conversion.ros2, document);
-        notes.extend(units_own.note.take());
-        units.insert(unit.clone(), units_own);
+        let mut topics = UnitBag::new(unit, contents, &names.get(unit.as_str()), &conversion.ros2, document);
+        notes.extend(topics.note.take());
+        units.insert(unit.clone(), topics);
     }
     if !units.values().any(|unit| unit.corrected || unit.raw.is_some()) {
         return Err(Error::Usage(format!("the log has nothing for a ROS 2 bag:\n{}", notes.join("\n"))));
     }
     let folder = conversion.out.file_name().map_or("bag".into(), |name| name.to_string_lossy().into_owned());
     let file = format!("{folder}_0.mcap");
-    let bag = conversion.place.partial(&conversion.out.join(&file))?;
-    let mut writer = BagWriter::create(bag.writing())?;
+    let mut bag = conversion.place.partial(&conversion.out.join(&file))?;
+    let mut writer = BagWriter::create(&mut bag)?;
     writer.metadata("isotherm", conversion.provenance().into_iter().collect())?;
     let mut converted = Converted::default();
     let log = conversion.read_units(&mut units, &mut converted, |unit, _, decoded, converted| {
-        unit.take(decoded, &mut writer, converted)
+        unit.take(decoded, &mut Bag { writer: &mut writer, converted })
     })?;
     for unit in units.values_mut() {
-        unit.finish(&mut writer, &mut converted)?;
+        unit.finish(&mut Bag { writer: &mut writer, converted: &mut converted })?;
     }
     let (summary, yaml) = writer.finish(&file)?;
     let metadata = conversion.place.write(&conversion.out.join("metadata.yaml"), &yaml)?;
@@ -78,6 +77,12 @@ pub(super) fn convert(conversion: &Conversion, found: &Found) -> Result<Outcome,
     }
     (converted.topics, converted.notes) = (summary.topics, notes);
     Ok(Outcome { converted, log })
+}
+
+/// Where messages go, and where those are counted that do not.
+struct Bag<'a> {
+    writer: &'a mut BagWriter,
+    converted: &'a mut Converted,
 }
 
 /// The topics of a unit.
@@ -133,57 +138,42 @@ impl UnitBag {
         }
     }
 
-    fn take(
-        &mut self,
-        decoded: &Decoded,
-        bag: &mut BagWriter,
-        converted: &mut Converted,
-    ) -> Result<(), Error> {
+    fn take(&mut self, decoded: &Decoded, bag: &mut Bag<'_>) -> Result<(), Error> {
         match decoded {
-            Decoded::Corrected(batch) => self.write_corrected(batch, bag, converted)?,
+            Decoded::Corrected(batch) => self.write_corrected(batch, bag)?,
             Decoded::Gyro(_) | Decoded::Accel(_) | Decoded::Temperature(_) => match &mut self.raw {
                 Some((rows, _)) => {
                     rows.take(decoded);
-                    self.drain(bag, converted)?;
+                    self.drain(bag)?;
                 }
-                None => converted.leave_out("raw messages", 1),
+                None => bag.converted.leave_out("raw messages", 1),
             },
-            Decoded::Health(_) => converted.leave_out("health messages", 1),
-            Decoded::Reference(_) => converted.leave_out("rate references", 1),
-            Decoded::Status(_) => converted.leave_out("status messages", 1),
-            Decoded::Journal => converted.leave_out("journal messages", 1),
+            Decoded::Health(_) => bag.converted.leave_out("health messages", 1),
+            Decoded::Reference(_) => bag.converted.leave_out("rate references", 1),
+            Decoded::Status(_) => bag.converted.leave_out("status messages", 1),
+            Decoded::Journal => bag.converted.leave_out("journal messages", 1),
         }
         Ok(())
     }
 
-    fn finish(&mut self, bag: &mut BagWriter, converted: &mut Converted) -> Result<(), Error> {
+    fn finish(&mut self, bag: &mut Bag<'_>) -> Result<(), Error> {
         if let Some((rows, _)) = &mut self.raw {
             rows.finish();
-            self.drain(bag, converted)?;
+            bag.converted.add(&rows.tally());
         }
-        if let Some((rows, _)) = &self.raw {
-            converted.add(&rows.tally());
-        }
-        Ok(())
+        self.drain(bag)
     }
 
-    fn write_corrected(
-        &self,
-        batch: &CorrectedBatch,
-        bag: &mut BagWriter,
-        converted: &mut Converted,
-    ) -> Result<(), Error> {
-        let mut topic = String::new();
+    fn write_corrected(&self, batch: &CorrectedBatch, bag: &mut Bag<'_>) -> Result<(), Error> {
+        let topic = format!("{}/data", self.base);
         for tick in &batch.ticks {
             if tick.flags.contains(TickFlags::UNCALIBRATED) {
-                converted.leave_out("uncalibrated ticks, which have no unit of measure", 1);
+                bag.converted.leave_out("uncalibrated ticks, which have no unit of measure", 1);
             } else if tick.duration.as_ns() <= 0 {
-                converted.lose("ticks without a duration", 1);
+                bag.converted.lose("ticks without a duration", 1);
             } else {
-                topic.clone_from(&self.base);
-                topic.push_str("/data");
                 let imu = |header| Imu::of_tick(header, tick);
-                self.write(&topic, None, tick.end_time.as_ns(), imu, bag, converted)?;
+                self.write(&topic, None, tick.end_time.as_ns(), imu, bag)?;
             }
         }
         let Some(last) = batch.ticks.last() else { return Ok(()) };
@@ -191,56 +181,48 @@ impl UnitBag {
             let message =
                 |header| Temperature { header, temperature: applied.temperature_deg_c, variance: 0.0 };
             let topic = self.channel_topic("temperature", &applied.channel);
-            self.write(&topic, Some(&applied.channel), last.end_time.as_ns(), message, bag, converted)?;
+            self.write(&topic, Some(&applied.channel), last.end_time.as_ns(), message, bag)?;
         }
         Ok(())
     }
 
     /// Writes the raw rows that are ready.
-    fn drain(&mut self, bag: &mut BagWriter, converted: &mut Converted) -> Result<(), Error> {
+    fn drain(&mut self, bag: &mut Bag<'_>) -> Result<(), Error> {
         let Some((mut rows, nominal)) = self.raw.take() else { return Ok(()) };
         while let Some(step) = rows.next_step() {
             if let Step::Row(row) = step {
-                self.write_raw(&row, &nominal, bag, converted)?;
+                self.write_raw(&row, &nominal, bag)?;
             }
         }
         self.raw = Some((rows, nominal));
         Ok(())
     }
 
-    fn write_raw(
-        &self,
-        row: &Row,
-        nominal: &Nominal,
-        bag: &mut BagWriter,
-        converted: &mut Converted,
-    ) -> Result<(), Error> {
+    fn write_raw(&self, row: &Row, nominal: &Nominal, bag: &mut Bag<'_>) -> Result<(), Error> {
         for reading in &row.temperatures {
-            match nominal.temperature(&reading.channel, reading.raw) {
-                Some(temperature) => {
-                    let message = |header| Temperature { header, temperature, variance: 0.0 };
-                    let topic = self.channel_topic("temperature_raw", &reading.channel);
-                    self.write(&topic, Some(&reading.channel), row.time_ns, message, bag, converted)?;
-                }
-                None => {
-                    converted.leave_out("raw temperature readings without a document that converts them", 1);
-                }
-            }
+            let Some(temperature) = nominal.temperature(&reading.channel, reading.raw) else {
+                let words = "raw temperature readings without a document that converts them";
+                bag.converted.leave_out(words, 1);
+                continue;
+            };
+            let message = |header| Temperature { header, temperature, variance: 0.0 };
+            let topic = self.channel_topic("temperature_raw", &reading.channel);
+            self.write(&topic, Some(&reading.channel), row.time_ns, message, bag)?;
         }
         let Some((output, gyro)) = &row.gyro else {
-            converted
-                .leave_out("raw accelerometer ticks without a gyro tick", u64::from(row.accel.is_some()));
+            let alone = u64::from(row.accel.is_some());
+            bag.converted.leave_out("raw accelerometer ticks without a gyro tick", alone);
             return Ok(());
         };
         let Some(rate) = nominal.rate(*output, gyro) else {
-            converted.lose("raw ticks whose rate cannot be stated", 1);
+            bag.converted.lose("raw ticks whose rate cannot be stated", 1);
             return Ok(());
         };
         let force = row.accel.as_ref().and_then(|(output, accel)| nominal.force(*output, accel));
         let unstated = u64::from(row.accel.is_some() && force.is_none());
-        converted.leave_out("raw accelerometer readings without a document that scales them", unstated);
+        bag.converted.leave_out("raw accelerometer readings without a document that scales them", unstated);
         let imu = |header| Imu::new(header, Some(rate), force);
-        self.write(&format!("{}/data_raw", self.base), None, row.time_ns, imu, bag, converted)
+        self.write(&format!("{}/data_raw", self.base), None, row.time_ns, imu, bag)
     }
 
     fn channel_topic(&self, kind: &str, channel: &str) -> String {
@@ -254,11 +236,10 @@ impl UnitBag {
         channel: Option<&str>,
         time_ns: i64,
         message: impl FnOnce(Header) -> M,
-        bag: &mut BagWriter,
-        converted: &mut Converted,
+        bag: &mut Bag<'_>,
     ) -> Result<(), Error> {
         let Some((stamp, log_ns)) = time(time_ns).zip(u64::try_from(time_ns).ok()) else {
-            converted.lose(NO_TIME, 1);
+            bag.converted.lose(NO_TIME, 1);
             return Ok(());
         };
         let message = message(Header { stamp, frame_id: self.frame.clone() });
@@ -267,6 +248,6 @@ impl UnitBag {
             origin.extend(channel.map(|channel| ("channel".to_owned(), channel.to_owned())));
             origin
         };
-        bag.write(topic, log_ns, &message, origin)
+        bag.writer.write(topic, log_ns, &message, origin)
     }
 }

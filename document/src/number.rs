@@ -104,8 +104,28 @@ pub(crate) fn number(value: &DeValue<'_>) -> Option<f64> {
                 reason = "an integer beyond 2⁵³ is rounded like any other literal"
             )]
             let exact = whole(value).map(|whole| whole as f64);
-            exact.or_else(|| integer.as_str().parse().ok())
+            // Beyond 64 bits. Digits of another base would be read as decimal ones.
+            exact.or_else(|| integer.as_str().parse().ok().filter(|_| integer.radix() == 10))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_what_their_digits_say_in_their_base_or_none() {
+        for (text, expected) in [
+            ("12", Some(12.0)),
+            ("0x1f", Some(31.0)),
+            ("10000000000000000000", Some(1e19)),
+            ("0x99999999999999999", None),
+            ("1e3", Some(1000.0)),
+            ("true", None),
+        ] {
+            assert_eq!(number(DeValue::parse(text).unwrap().get_ref()), expected, "{text}");
+        }
     }
 }

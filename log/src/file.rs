@@ -142,6 +142,16 @@ impl Partial {
         Self { path: path.to_owned(), writing, kept, own: false }
     }
 
+    /// Creates it, to be written by nobody else at the same time.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn create(&mut self) -> Result<File, Error> {
+        let file = create_alone(&self.writing, true)?;
+        self.own = true;
+        Ok(file)
+    }
+
     /// Where it is written to.
     #[must_use]
     pub fn writing(&self) -> &Path {
@@ -207,8 +217,7 @@ impl Sink {
     /// [`Error::File`].
     pub fn create(path: &Path) -> Result<Self, Error> {
         let mut partial = Partial::of(path);
-        let file = BufWriter::with_capacity(BLOCK, create_alone(partial.writing(), true)?);
-        partial.own = true;
+        let file = BufWriter::with_capacity(BLOCK, partial.create()?);
         let stream = if path.extension().is_some_and(|extension| extension == "gz") {
             Stream::Gzip(Box::new(GzEncoder::new(file, Compression::default())))
         } else {

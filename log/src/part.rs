@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::key::UnitId;
@@ -53,10 +54,11 @@ impl Part {
     }
 }
 
-/// Where in the time of a part a log is that is taken tick by tick.
+/// Where in the time of a part a log is.
 ///
-/// The log begins with the start of its first tick, or the time of its first temperature reading. A tick belongs to the part that it
-/// ends in: parts that adjoin share no tick and lack none.
+/// A log that is taken tick by tick begins with the start of its first tick, or the time of its first temperature reading; a recording
+/// with the reception of its first message. A tick belongs to the part that it ends in, a message to the one that it is received in: parts
+/// that adjoin share nothing and lack nothing.
 #[derive(Debug, Default)]
 pub(crate) struct Stretch {
     start: Span,
@@ -90,21 +92,24 @@ impl LogFiles {
     /// # Errors
     /// [`Error::File`]; for a text log as [`crate::text::LogReader::open`].
     pub fn open(&self, part: &Part) -> Result<Messages, Error> {
-        let mut beginning_ns = None;
-        let ((source, progress), window) = match self {
+        let units = part.units.clone();
+        match self {
             Self::Recordings(paths) => {
-                let mut before_ns = 0;
-                if part.start > Span::ZERO {
-                    beginning_ns = self.beginning_ns()?;
-                    before_ns = beginning_ns.map_or(0, |beginning| later_ns(beginning, part.start));
+                let (mut stretch, mut before_ns) = (Stretch::of(part), 0);
+                if part.start > Span::ZERO
+                    && let Some(beginning) = self.beginning_ns()?
+                {
+                    stretch.beginning = Some(received(beginning));
+                    before_ns = later_ns(beginning, part.start);
                 }
-                (Source::recordings(paths, before_ns)?, part.window())
+                let (source, progress) = Source::recordings(paths, before_ns)?;
+                Ok(Messages { source, progress, units, stretch })
             }
             Self::Text { paths, mapping, unit, batch_ticks } => {
-                (Source::text(paths, mapping, unit, *batch_ticks, part)?, None)
+                let (source, progress) = Source::text(paths, mapping, unit, *batch_ticks, part)?;
+                Ok(Messages { source, progress, units, stretch: Stretch::default() })
             }
-        };
-        Ok(Messages { source, progress, units: part.units.clone(), window, beginning_ns, over: false })
+        }
     }
 
     /// Lets a part begin with the log, for who must be given all that came before it; from which time of reception on messages belong
@@ -117,15 +122,11 @@ impl LogFiles {
         if start == Span::ZERO {
             return Ok(0);
         }
-        let from_ns = self.beginning_ns()?.map_or(0, |beginning| later_ns(beginning, start));
-        match self {
-            Self::Recordings(_) => Ok(from_ns),
-            Self::Text { batch_ticks, .. } => {
-                *batch_ticks = 1;
-                // A tick that ends with the time before the part is of that time.
-                Ok(from_ns.saturating_add(1))
-            }
+        if let Self::Text { batch_ticks, .. } = self {
+            *batch_ticks = 1;
         }
+        // What ends with the time before the part is of that time.
+        Ok(self.beginning_ns()?.map_or(0, |beginning| later_ns(beginning, start).saturating_add(1)))
     }
 
     /// The last time of reception that belongs to a part; `None` where it goes to the end.
@@ -141,7 +142,7 @@ impl LogFiles {
     fn beginning_ns(&self) -> Result<Option<u64>, Error> {
         match self {
             Self::Recordings(paths) => {
-                let first = Source::recordings(paths, 0)?.0.next_message()?;
+                let first = RecordingReader::open(paths, Arc::default())?.next_message()?;
                 Ok(first.map(|message| message.received_ns))
             }
             Self::Text { paths, mapping, .. } => {
@@ -157,16 +158,19 @@ fn later_ns(time_ns: u64, by: Span) -> u64 {
     time_ns.saturating_add(u64::try_from(by.as_ns()).unwrap_or(0))
 }
 
+/// A time of reception.
+fn received(ns: u64) -> Timestamp {
+    Timestamp::from_ns(i64::try_from(ns).unwrap_or(i64::MAX))
+}
+
 /// The messages of a part of a log, one by one in constant memory.
 #[derive(Debug)]
 pub struct Messages {
     source: Source,
     progress: Progress,
     units: BTreeSet<UnitId>,
-    /// Begin and end after the first message, of a recording.
-    window: Option<(Span, Option<Span>)>,
-    beginning_ns: Option<u64>,
-    over: bool,
+    /// Of a recording; another source gives its part alone.
+    stretch: Stretch,
 }
 
 impl Messages {
@@ -176,8 +180,7 @@ impl Messages {
     /// [`Error::File`].
     pub fn of_corrected(path: &Path, unit: &UnitId, part: &Part) -> Result<Self, Error> {
         let (source, progress) = Source::corrected(path, unit, part)?;
-        let units = part.units.clone();
-        Ok(Self { source, progress, units, window: None, beginning_ns: None, over: false })
+        Ok(Self { source, progress, units: part.units.clone(), stretch: Stretch::default() })
     }
 
     /// The next message; `None` behind the last.
@@ -185,27 +188,20 @@ impl Messages {
     /// # Errors
     /// [`Error::File`] and [`Error::Log`].
     pub fn next_message(&mut self) -> Result<Option<Message>, Error> {
-        while !self.over {
-            let Some(message) = self.source.next_message()? else { break };
-            if self.holds(&message) {
+        while !self.stretch.over {
+            let next = match &mut self.source {
+                Source::Recording(reader) => reader.next_message()?,
+                Source::Text(text) => text.next_message()?,
+                Source::Corrected(csv) => csv.next_message()?,
+            };
+            let Some(message) = next else { break };
+            let received = received(message.received_ns);
+            let is_taken = |unit| self.units.is_empty() || self.units.contains(unit);
+            if self.stretch.holds(received, received) && message.topic.unit().is_none_or(is_taken) {
                 return Ok(Some(message));
             }
         }
         Ok(None)
-    }
-
-    /// Whether a message belongs to the part; notes when the part is over.
-    fn holds(&mut self, message: &Message) -> bool {
-        if let Some((start, end)) = self.window {
-            let beginning = *self.beginning_ns.get_or_insert(message.received_ns);
-            // Receive times may stand still or go back a little; what is before the first is at its beginning.
-            let after = i64::try_from(message.received_ns.saturating_sub(beginning)).unwrap_or(i64::MAX);
-            self.over = end.is_some_and(|end| after > end.as_ns());
-            if self.over || after < start.as_ns() {
-                return false;
-            }
-        }
-        self.units.is_empty() || message.topic.unit().is_none_or(|unit| self.units.contains(unit))
     }
 
     /// How far the log has been read.
@@ -217,12 +213,19 @@ impl Messages {
     /// What reading came to so far.
     #[must_use]
     pub fn report(&self) -> LogReport {
-        self.source.report()
+        match &self.source {
+            Source::Recording(reader) => LogReport::Recording(reader.report().clone()),
+            Source::Text(text) => LogReport::Text(text.report()),
+            Source::Corrected(csv) => LogReport::Text(csv.report()),
+        }
     }
 
     /// The recordings that are read, for what they hold beside messages; `None` for a text log.
     pub fn recording(&mut self) -> Option<&mut RecordingReader> {
-        self.source.recording()
+        match &mut self.source {
+            Source::Recording(reader) => Some(reader),
+            Source::Text(_) | Source::Corrected(_) => None,
+        }
     }
 }
 

@@ -290,12 +290,6 @@ impl Replica {
         self.report.note(Notice::OtherMemory { entry: number, words });
     }
 
-    /// Serial of the unit.
-    #[must_use]
-    pub fn id(&self) -> &UnitId {
-        &self.id
-    }
-
     /// The stream, once it has begun.
     #[must_use]
     pub fn stream(&self) -> Option<&UnitStream> {

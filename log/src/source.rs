@@ -106,35 +106,6 @@ impl Source {
         let csv = CorrectedCsv { ticks, ready: VecDeque::new(), rows: 0 };
         Ok((Self::Corrected(Box::new(csv)), progress))
     }
-
-    /// The next message; `None` behind the last.
-    ///
-    /// # Errors
-    /// [`Error::File`] and [`Error::Log`].
-    pub(crate) fn next_message(&mut self) -> Result<Option<Message>, Error> {
-        match self {
-            Self::Recording(reader) => reader.next_message(),
-            Self::Text(text) => text.next_message(),
-            Self::Corrected(csv) => csv.next_message(),
-        }
-    }
-
-    /// What reading came to so far.
-    pub(crate) fn report(&self) -> LogReport {
-        match self {
-            Self::Recording(reader) => LogReport::Recording(reader.report().clone()),
-            Self::Text(text) => LogReport::Text(text.events.report()),
-            Self::Corrected(csv) => LogReport::Text(ReadReport { rows: csv.rows, ..ReadReport::default() }),
-        }
-    }
-
-    /// The recordings behind it, for what they hold beside messages; `None` for a text log.
-    pub(crate) fn recording(&mut self) -> Option<&mut RecordingReader> {
-        match self {
-            Self::Recording(reader) => Some(reader),
-            Self::Text(_) | Self::Corrected(_) => None,
-        }
-    }
 }
 
 /// Corrected ticks of a CSV, put into batches of one calibration each.
@@ -146,7 +117,11 @@ pub(crate) struct CorrectedCsv {
 }
 
 impl CorrectedCsv {
-    fn next_message(&mut self) -> Result<Option<Message>, Error> {
+    pub(crate) fn report(&self) -> ReadReport {
+        ReadReport { rows: self.rows, ..ReadReport::default() }
+    }
+
+    pub(crate) fn next_message(&mut self) -> Result<Option<Message>, Error> {
         while self.ready.is_empty() {
             let Some(Ticks { unit, ticks }) = self.ticks.next_ticks()? else { return Ok(None) };
             self.rows += ticks.len() as u64;
@@ -186,7 +161,11 @@ pub(crate) struct TextLog {
 }
 
 impl TextLog {
-    fn next_message(&mut self) -> Result<Option<Message>, Error> {
+    pub(crate) fn report(&self) -> ReadReport {
+        self.events.report()
+    }
+
+    pub(crate) fn next_message(&mut self) -> Result<Option<Message>, Error> {
         loop {
             if let Some(frame) = self.batcher.next_frame() {
                 let frame = frame.map_err(|source| Error::Batch { unit: self.unit.clone(), source })?;

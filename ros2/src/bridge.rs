@@ -33,7 +33,7 @@ use crate::name::{self, Kind, Node};
 use crate::qos::Qos;
 use crate::totals::Totals;
 use account::Unit;
-use feeding::{Arrived, Queue};
+use feeding::{Arrived, Input, Queue};
 use publishing::Outlet;
 
 /// Longest wait for what is under way when the bridge stops: what a service flushes by the clock comes within it.
@@ -115,13 +115,13 @@ impl Declarer {
         topic: &str,
         interface: Interface,
         queue: Queue,
-        arrived: impl Fn(feeding::Message) -> Arrived + Send + Sync + 'static,
+        input: Input,
     ) -> Result<Subscriber<()>, BusError> {
         self.endpoint(Kind::Subscription, topic, interface, Qos::SENSOR_DATA).await?;
         let key = self.key(topic, interface);
         let subscriber = self.session.declare_subscriber(&key).callback(move |sample| {
-            let payload = sample.payload().clone();
-            queue.push(arrived(feeding::Message { payload, attachment: sample.attachment().cloned() }));
+            let (payload, attachment) = (sample.payload().clone(), sample.attachment().cloned());
+            queue.push(Arrived::Message(input, feeding::Message { payload, attachment }));
         });
         subscriber.await.map_err(|source| BusError::Declare { key, source })
     }
@@ -255,11 +255,10 @@ async fn subscribe(
 ) -> Result<Vec<Subscriber<()>>, BusError> {
     let mut subscribers = Vec::new();
     for (index, temperature) in mapping.temperatures.iter().enumerate() {
-        let arrived = move |message| Arrived::Temperature(index, message);
-        subscribers
-            .push(declarer.subscription(&temperature.topic, TEMPERATURE, queue.clone(), arrived).await?);
+        let (topic, input) = (&temperature.topic, Input::Temperature(index));
+        subscribers.push(declarer.subscription(topic, TEMPERATURE, queue.clone(), input).await?);
     }
-    subscribers.push(declarer.subscription(&mapping.raw, IMU, queue.clone(), Arrived::Imu).await?);
+    subscribers.push(declarer.subscription(&mapping.raw, IMU, queue.clone(), Input::Imu).await?);
     Ok(subscribers)
 }
 

@@ -7,9 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A type of a topic or a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interface {
-    /// As ROS writes it: `sensor_msgs/msg/Imu`.
-    pub name: &'static str,
-    /// As keys have it: `sensor_msgs::msg::dds_::Imu_`.
+    /// `sensor_msgs/msg/Imu` as keys have it: `sensor_msgs::msg::dds_::Imu_`.
     pub dds: &'static str,
     /// `RIHS01_` and 64 hexadecimal digits, the same in jazzy, kilted, lyrical and rolling.
     pub hash: &'static str,
@@ -20,28 +18,24 @@ pub const NO_HASH: &str = "TypeHashNotSupported";
 
 /// `sensor_msgs/msg/Imu`.
 pub const IMU: Interface = Interface {
-    name: "sensor_msgs/msg/Imu",
     dds: "sensor_msgs::msg::dds_::Imu_",
     hash: "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b",
 };
 
 /// `sensor_msgs/msg/Temperature`.
 pub const TEMPERATURE: Interface = Interface {
-    name: "sensor_msgs/msg/Temperature",
     dds: "sensor_msgs::msg::dds_::Temperature_",
     hash: "RIHS01_72514a14126ab9f8a9abec974c78e5610a367b59db5da355ff1fb982d5bad4b8",
 };
 
 /// `diagnostic_msgs/msg/DiagnosticArray`.
 pub const DIAGNOSTICS: Interface = Interface {
-    name: "diagnostic_msgs/msg/DiagnosticArray",
     dds: "diagnostic_msgs::msg::dds_::DiagnosticArray_",
     hash: "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
 };
 
 /// `std_srvs/srv/Trigger`.
 pub const TRIGGER: Interface = Interface {
-    name: "std_srvs/srv/Trigger",
     dds: "std_srvs::srv::dds_::Trigger_",
     hash: "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
 };

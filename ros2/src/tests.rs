@@ -40,10 +40,13 @@ fn payloads() -> Vec<Value> {
     let worst = status(Level::Stale, Vec::new());
     let status = vec![status(Level::Ok, vec![value("imu in", "7"), value("ä", "")]), worst];
     vec![
-        payload(IMU.name, &imu("imu_link")),
-        payload(IMU.name, &imu("")),
-        payload(TEMPERATURE.name, &Temperature { header: header("imu"), temperature: 21.5, variance: 0.0 }),
-        payload(DIAGNOSTICS.name, &DiagnosticArray { header: header(""), status }),
+        payload("sensor_msgs/msg/Imu", &imu("imu_link")),
+        payload("sensor_msgs/msg/Imu", &imu("")),
+        payload(
+            "sensor_msgs/msg/Temperature",
+            &Temperature { header: header("imu"), temperature: 21.5, variance: 0.0 },
+        ),
+        payload("diagnostic_msgs/msg/DiagnosticArray", &DiagnosticArray { header: header(""), status }),
         payload("std_srvs/srv/Trigger_Request", &TriggerRequest::default()),
         payload(
             "std_srvs/srv/Trigger_Response",
@@ -63,8 +66,9 @@ fn endpoints(node: &Node) -> Vec<Value> {
     ];
     let endpoint = |(number, kind, name, topic, interface, qos): (u32, Kind, &str, &str, Interface, Qos)| {
         let token = node.endpoint(number, kind, topic, interface, qos);
+        let ros = interface.dds.replace("dds_::", "").replace("::", "/");
         json!({
-            "number": number, "kind": name, "topic": topic, "type": interface.name, "dds": interface.dds,
+            "number": number, "kind": name, "topic": topic, "type": ros.trim_end_matches('_'), "dds": interface.dds,
             "hash": interface.hash, "qos": qos.to_string(), "key": key(node.domain, topic, interface),
             "gid": hex(&gid(&token)), "token": token,
         })

@@ -43,6 +43,12 @@ impl UnitTotals {
     pub fn all_refused(&self) -> u64 {
         self.refused.values().sum()
     }
+
+    /// Ticks taken or corrected that got lost on their way between ROS 2 and the service.
+    #[must_use]
+    pub fn all_lost(&self) -> u64 {
+        self.lost + self.unsent + self.unpublished
+    }
 }
 
 /// Account of the bridge.
@@ -56,9 +62,7 @@ impl Totals {
     /// The exit code that these totals stand for: whether what was taken was lost inside.
     #[must_use]
     pub fn exit(&self) -> Exit {
-        let lost = |unit: &UnitTotals| {
-            unit.lost + unit.unsent + unit.unpublished + unit.refused.get("queue_full").unwrap_or(&0) > 0
-        };
+        let lost = |unit: &UnitTotals| unit.all_lost() > 0 || unit.refused.contains_key("queue_full");
         if self.units.values().any(lost) { Exit::DataLoss } else { Exit::Ok }
     }
 
@@ -67,14 +71,13 @@ impl Totals {
     pub fn table(&self) -> String {
         let head = ["unit", "in", "out", "refused", "missing", "uncalibrated", "lost", "runs"];
         let row = |(unit, totals): (&String, &UnitTotals)| {
-            let lost = totals.lost + totals.unsent + totals.unpublished;
             let figures = [
                 totals.imu_in,
                 totals.imu_out,
                 totals.all_refused(),
                 totals.missing,
                 totals.uncalibrated,
-                lost,
+                totals.all_lost(),
                 totals.runs,
             ];
             std::iter::once(unit.clone()).chain(figures.map(|figure| figure.to_string()))

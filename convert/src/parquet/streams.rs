@@ -1,13 +1,12 @@
 //! The streams of a unit as tables.
 
-use std::path::PathBuf;
-
 use isotherm_protocol::key::UnitId;
 
 use super::rows::{self, Sensors};
 use super::table::{Row, Table, U64};
 use crate::Written;
 use isotherm_log::error::Error;
+use isotherm_log::file::Partial;
 use isotherm_log::streams::contents::{CorrectedShape, Shapes, UnitContents};
 use isotherm_log::streams::decoded::Decoded;
 
@@ -23,17 +22,17 @@ pub(crate) struct UnitTables {
 }
 
 impl UnitTables {
-    /// Creates the files for what a log holds of a unit; `path` gives the place of a stream's file.
+    /// Creates the files for what a log holds of a unit; `place` gives that of a stream's file.
     ///
     /// `provenance`: names and values for the metadata of every file; unit and stream are added.
     ///
     /// # Errors
-    /// [`Error::File`], and those of `path`.
+    /// [`Error::File`], and those of `place`.
     pub(crate) fn create(
         unit: &UnitId,
         contents: &UnitContents,
         provenance: &[(String, String)],
-        mut path: impl FnMut(&'static str) -> Result<PathBuf, Error>,
+        place: impl Fn(&'static str) -> Result<Partial, Error>,
     ) -> Result<Self, Error> {
         let ticks = |shapes: &Shapes| shapes.values().sum::<u64>();
         let (gyros, accels) = (Sensors::of(&contents.gyro), Sensors::of(&contents.accel));
@@ -55,7 +54,7 @@ impl UnitTables {
             let mut words = provenance.to_vec();
             words.push(("unit".to_owned(), unit.to_string()));
             words.push(("stream".to_owned(), stream.to_owned()));
-            tables.push((stream, Table::create(&path(stream)?, expected, words)?));
+            tables.push((stream, Table::create(place(stream)?, expected, words)?));
         }
         Ok(Self { unit: unit.clone(), tables, gyros, accels, shape })
     }
@@ -130,15 +129,16 @@ impl UnitTables {
         })
     }
 
-    /// Ends the files; gives each stream with its rows.
+    /// Ends the files, which are to be given their names; gives each stream with its rows.
     ///
     /// # Errors
     /// [`Error::File`].
-    pub(crate) fn finish(self) -> Result<Vec<Written>, Error> {
+    pub(crate) fn finish(self) -> Result<Vec<(Partial, Written)>, Error> {
         let unit = self.unit.to_string();
         let written = self.tables.into_iter().map(|(what, table)| {
-            let path = table.path().to_owned();
-            Ok(Written { path, unit: Some(unit.clone()), what, rows: table.finish()? })
+            let (partial, rows) = table.finish()?;
+            let written = Written { path: partial.path().to_owned(), unit: Some(unit.clone()), what, rows };
+            Ok((partial, written))
         });
         written.collect()
     }

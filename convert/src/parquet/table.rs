@@ -3,7 +3,6 @@
 use std::fs::File;
 use std::io::{self, BufWriter, IntoInnerError};
 use std::mem;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use parquet::basic::{Compression, Encoding, LogicalType, Repetition, Type as Physical};
@@ -15,6 +14,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 
 use isotherm_log::error::Error;
+use isotherm_log::file::Partial;
 
 /// Rows that are written together, where the file does not need larger groups.
 const GROUP_ROWS: u64 = 1 << 14;
@@ -182,7 +182,7 @@ pub(super) struct Table {
     file: File,
     /// From the first group on: the first row gives the columns.
     writer: Option<SerializedFileWriter<BufWriter<File>>>,
-    path: PathBuf,
+    partial: Partial,
     columns: Vec<Column>,
     provenance: Vec<KeyValue>,
     group_rows: u64,
@@ -193,21 +193,24 @@ pub(super) struct Table {
 
 impl std::fmt::Debug for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Table").field("path", &self.path).field("rows", &self.rows).finish_non_exhaustive()
+        f.debug_struct("Table")
+            .field("partial", &self.partial)
+            .field("rows", &self.rows)
+            .finish_non_exhaustive()
     }
 }
 
 impl Table {
     /// Creates the file for about so many rows. `provenance`: names and values for the file's metadata.
     pub(super) fn create(
-        path: &Path,
+        mut partial: Partial,
         expected_rows: u64,
         provenance: Vec<(String, String)>,
     ) -> Result<Self, Error> {
         Ok(Self {
-            file: File::create(path).map_err(|source| Error::file(path, "create", source))?,
+            file: partial.create()?,
             writer: None,
-            path: path.to_owned(),
+            partial,
             columns: Vec::new(),
             provenance: provenance.into_iter().map(|(name, value)| KeyValue::new(name, value)).collect(),
             group_rows: GROUP_ROWS.max(expected_rows / MOST_GROUPS + 1),
@@ -221,26 +224,25 @@ impl Table {
         let mut cells = Row { columns: &mut self.columns, next: 0, misfit: None };
         row(&mut cells);
         if let Some(words) = cells.misfit {
-            return Err(Error::file(&self.path, "write", io::Error::other(words)));
+            return Err(self.failed(words));
         }
         self.rows += 1;
         self.waiting += 1;
         if self.waiting < self.group_rows {
             return Ok(());
         }
-        self.write_group().map_err(|error| failed(&self.path, error))
+        self.write_group().map_err(|error| self.failed(error))
     }
 
-    /// Where it is written to.
-    pub(super) fn path(&self) -> &Path {
-        &self.path
+    /// Ends the file, on the disk: it is to be given its name; and its rows.
+    pub(super) fn finish(mut self) -> Result<(Partial, u64), Error> {
+        let written = self.write_group().and_then(|()| self.writer.take().map_or(Ok(()), on_disk));
+        written.map_err(|error| self.failed(error))?;
+        Ok((self.partial, self.rows))
     }
 
-    /// Ends the file, on the disk.
-    pub(super) fn finish(mut self) -> Result<u64, Error> {
-        let written = self.write_group().and_then(|()| self.writer.map_or(Ok(()), on_disk));
-        written.map_err(|error| failed(&self.path, error))?;
-        Ok(self.rows)
+    fn failed(&self, error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+        Error::file(self.partial.path(), "write", io::Error::other(error))
     }
 
     /// Writes the rows that wait.
@@ -369,8 +371,4 @@ fn field(column: &Column) -> Result<TypePtr, ParquetError> {
         .with_repetition(repetition)
         .with_logical_type(logical);
     field.build().map(Arc::new)
-}
-
-fn failed(path: &Path, error: ParquetError) -> Error {
-    Error::file(path, "write", io::Error::other(error))
 }

@@ -16,6 +16,7 @@ use parquet::record::Field;
 
 use super::UnitTables;
 use super::table::{Cell, I64, Kind, Row, Table};
+use isotherm_log::file::Partial;
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::streams::contents::Contents;
 use isotherm_log::streams::decoded::Decoded;
@@ -39,11 +40,13 @@ fn rows_of_many_groups_are_read_back() {
         row.full("name", Kind::Text, ["a", "b"][usize::from(n % 2 == 0)]);
     };
     let words = [("unit".to_owned(), "A-1".to_owned())];
-    let mut table = Table::create(&path, 40_000, words.to_vec()).unwrap();
+    let mut table = Table::create(Partial::of(&path), 40_000, words.to_vec()).unwrap();
     for n in 0..40_000 {
         table.push(|row| give(row, n)).unwrap();
     }
-    assert_eq!(table.finish().unwrap(), 40_000);
+    let (partial, rows) = table.finish().unwrap();
+    assert_eq!(rows, 40_000);
+    partial.keep().unwrap();
     let reader = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
     assert_eq!(reader.num_row_groups(), 3);
     let metadata = reader.metadata().file_metadata().key_value_metadata().unwrap();
@@ -58,10 +61,23 @@ fn rows_of_many_groups_are_read_back() {
 }
 
 #[test]
+fn a_file_that_is_being_written_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.parquet");
+    let mut other = Partial::of(&path);
+    let file = other.create().unwrap();
+    assert!(Table::create(Partial::of(&path), 1, Vec::new()).is_err());
+    assert!(other.writing().exists());
+    drop(file);
+    Table::create(Partial::of(&path), 1, Vec::new()).unwrap();
+}
+
+#[test]
 fn a_cell_that_does_not_fit_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let refused = [Cell::Empty, Cell::Integer(1)].map(|cell| {
-        let mut table = Table::create(&folder.path().join("x.parquet"), 1, Vec::new()).unwrap();
+        let partial = Partial::of(&folder.path().join("x.parquet"));
+        let mut table = Table::create(partial, 1, Vec::new()).unwrap();
         table.push(|row| row.full("value", Kind::Double, cell)).unwrap_err().to_string()
     });
     insta::assert_snapshot!(refused.join("\n").replace(folder.path().to_str().unwrap(), "FOLDER"));
@@ -125,9 +141,8 @@ fn streams_have_columns_for_every_shape_of_tick() {
     let status = Status { unit: "A-1".to_owned(), ..Status::default() };
     contents.add(&frame("imu/A-1/status", isotherm_protocol::codec::encode(&status).unwrap()));
     contents.add(&frame("imu/A-1/corrected", isotherm_protocol::codec::encode(&corrected).unwrap()));
-    let mut tables =
-        UnitTables::create(&unit, &contents.units[&unit], &[], |stream| Ok(folder.path().join(stream)))
-            .unwrap();
+    let place = |stream| Ok(Partial::of(&folder.path().join(stream)));
+    let mut tables = UnitTables::create(&unit, &contents.units[&unit], &[], place).unwrap();
     let status = Decoded::Status(Box::new(status));
     for decoded in
         [Decoded::Gyro(counts), Decoded::Gyro(means), Decoded::Corrected(Box::new(corrected)), status]
@@ -135,7 +150,11 @@ fn streams_have_columns_for_every_shape_of_tick() {
         assert!(tables.take(99, &decoded).unwrap());
     }
     assert!(!tables.take(99, &Decoded::Journal).unwrap());
-    let written: Vec<_> = tables.finish().unwrap().iter().map(|file| (file.what, file.rows)).collect();
+    let mut written = Vec::new();
+    for (partial, file) in tables.finish().unwrap() {
+        partial.keep().unwrap();
+        written.push((file.what, file.rows));
+    }
     assert_eq!(written, [("raw_gyro", 4), ("corrected", 1), ("status", 1)]);
 
     let (columns, rows) = read(&folder.path().join("raw_gyro"));

@@ -15,14 +15,15 @@ pub(super) fn rate_in(lines: &[String]) -> Option<f64> {
         let (head, rest) = line.split_once("rate")?;
         let begins =
             head.ends_with(|c: char| !c.is_alphabetic()) || head.is_empty() || head.ends_with("output");
-        let number: String = rest
-            .trim_start_matches([':', '=', ' ', ',', ';', '\t', '(', ')'])
-            .trim_start_matches("hz")
-            .trim_start_matches(|c: char| !c.is_ascii_digit())
-            .chars()
-            .take_while(|c| c.is_ascii_digit() || *c == '.')
-            .collect();
-        number.parse().ok().filter(|rate: &f64| begins && line.contains("hz") && (1e-3..=1e6).contains(rate))
+        let is_digit = |c: char| c.is_ascii_digit();
+        let (before, rest) = rest.split_at(rest.find(is_digit)?);
+        let end = rest.find(|c: char| !is_digit(c) && c != '.').unwrap_or(rest.len());
+        let (number, behind) = rest.split_at(end);
+        let kilo = before.contains("khz") || behind.trim_start().starts_with("khz");
+        let rate = number.parse::<f64>().ok()? * if kilo { 1e3 } else { 1.0 };
+        // "1,000 Hz" is one or a thousand.
+        let is_clear = !behind.strip_prefix(',').is_some_and(|behind| behind.starts_with(is_digit));
+        (begins && is_clear && line.contains("hz") && (1e-3..=1e6).contains(&rate)).then_some(rate)
     })
 }
 
@@ -66,6 +67,9 @@ mod tests {
             ("Sample Rate (Hz),125", Some(125.0)),
             ("OutputRate:,60 Hz", Some(60.0)),
             ("# calibrated at 20 Hz", None),
+            ("# data rate = 2 kHz", Some(2000.0)),
+            ("Rate (kHz): 0.5", Some(500.0)),
+            ("# Sample rate: 1,000 Hz", None),
         ] {
             assert_eq!(rate_in(&[line.to_owned()]), expected, "{line}");
         }

@@ -37,6 +37,10 @@ pub(super) struct Column {
     pub(super) minimum: f64,
     pub(super) maximum: f64,
     pub(super) steps: Steps,
+    /// Rows from each cell that is filled to the next.
+    pub(super) spacing: Steps,
+    /// Empty cells since the last that is filled.
+    blanks: u32,
     /// Times of day that are of the day after that before them.
     pub(super) midnights: u64,
     /// The first cell that is not greater than the one before it: its line, and both.
@@ -115,8 +119,10 @@ impl Column {
     fn take(&mut self, cell: &str, mark: u8, order: TimeUnit, line: u64) {
         if cell.is_empty() {
             self.empty += 1;
+            self.blanks = self.blanks.saturating_add(1);
             return;
         }
+        self.spacing.take(f64::from(std::mem::take(&mut self.blanks)) + 1.0);
         self.count(cell);
         let number = parse_float(cell, mark).filter(|number| number.is_finite());
         let (number, parts) = if let Some(number) = number {
@@ -270,6 +276,7 @@ impl Figures {
         }
         for column in &mut figures.columns {
             column.steps.settle();
+            column.spacing.settle();
         }
         Ok(figures)
     }

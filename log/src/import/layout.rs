@@ -37,6 +37,8 @@ pub(super) struct Found {
     /// Cells of a row of units below the header.
     pub(super) units: Vec<String>,
     pub(super) drop_rows: usize,
+    /// Rows of other figures before the data.
+    pub(super) odd: usize,
     pub(super) width: usize,
     /// Columns of the date and of the time of day, where they are two.
     pub(super) date_and_time: Option<(usize, usize)>,
@@ -235,18 +237,18 @@ fn dressed(lines: &[String], block: Block, encoding: Encoding) -> Found {
         lines.iter().skip(start).filter(|line| !line.trim().is_empty()).cloned().collect();
     let odd = if header_at.is_none() { odd_rows(&rows, delimiter, mark) } else { 0 };
     rows.drain(..odd);
-    let skip_lines = skip_lines + odd;
     let date_and_time = date_and_time(&rows, block, comment);
     Found {
         encoding,
         delimiter,
         decimal_mark: mark,
         comment,
-        skip_lines,
+        skip_lines: skip_lines + odd,
         header,
         by_name,
         units,
         drop_rows,
+        odd,
         width,
         date_and_time,
         preamble,

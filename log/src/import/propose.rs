@@ -18,6 +18,9 @@ use written::name_line;
 /// Standard gravity in the units that an accelerometer may have.
 const GRAVITY: [(&str, f64); 3] = [("m_per_s2", 9.80665), ("g", 1.0), ("mg", 1000.0)];
 
+/// Longest beginning of a channel's name (bytes): an axis and a number may follow.
+const LONGEST_STEM: usize = 20;
+
 /// Proposes a mapping for the files of one log.
 ///
 /// # Errors
@@ -140,6 +143,10 @@ impl<'a> File<'a> {
             self.found.width,
             self.figures.rows
         ));
+        if self.found.odd > 0 {
+            let (name, odd) = (self.name, self.found.odd);
+            proposal.notes.push(format!("{name}: {odd} rows of other figures before the data: passed over"));
+        }
         let meanings = self.meanings();
         let groups = [Kind::Gyro, Kind::Accel].map(|kind| Self::group(&meanings, kind));
         let of_temperatures = named && meanings.iter().any(|(_, meaning)| meaning.kind == Kind::Temperature);
@@ -147,16 +154,20 @@ impl<'a> File<'a> {
             self.ask_columns(proposal);
         }
         let counter = self.counter(&meanings, proposal);
-        let time = self.time(&meanings, counter.is_some(), proposal);
+        let in_some_rows = groups.map(|group| group.filter(|axes| self.are_in_some_rows(axes)));
+        let each_numbered = counter.is_some() && in_some_rows.iter().all(Option::is_none);
+        // The gyros set the pace, in a file without gyros the accelerometers.
+        let pace = groups.iter().zip(in_some_rows).find(|(group, _)| group.is_some());
+        let pace = pace.and_then(|(_, axes)| axes?.into_iter().flatten().next());
+        let spacing = pace.map_or(1.0, |(index, _)| self.figures.columns[index].spacing.usual);
+        let time = self.time(&meanings, each_numbered, spacing, proposal);
         let mut sensors = Vec::new();
         for (group, kind) in groups.into_iter().zip(["gyro", "accel"]) {
             let Some(axes) = group else { continue };
             let columns = axes.map(|axis| axis.map(|(index, _)| index));
             let units = self.sensor_units(axes, kind, proposal);
             let there: Vec<usize> = columns.into_iter().flatten().collect();
-            let may_be_empty = there
-                .iter()
-                .all(|column| self.figures.columns.get(*column).is_some_and(Column::is_in_some_rows));
+            let may_be_empty = self.are_in_some_rows(&axes);
             let mut said: Vec<_> = units
                 .iter()
                 .map(|(unit, scale)| scale.map_or_else(String::new, |scale| format!("{scale:?} ")) + unit)
@@ -180,11 +191,17 @@ impl<'a> File<'a> {
             if !minus.is_empty() {
                 proposal.notes.push(format!("{kind}: sign = -1 for {}, as named", self.listed(&minus)));
             }
+            if let Some(counter) = counter.filter(|_| may_be_empty) {
+                let counter = self.listed(&[counter]);
+                proposal.notes.push(format!("{kind}: in some rows only: not numbered by {counter}"));
+            }
+            let counter = counter.filter(|_| !may_be_empty);
             sensors.push(Sensors { kind, columns, units, turned, counter, may_be_empty });
         }
         let temperatures = self.temperatures(&meanings, proposal);
         let of_sensors = sensors.iter().flat_map(|it| it.columns).flatten();
-        let used = of_sensors.chain(temperatures.iter().map(|it| it.column)).chain(counter).chain(time.date);
+        let counters = sensors.iter().filter_map(|it| it.counter);
+        let used = of_sensors.chain(temperatures.iter().map(|it| it.column)).chain(counters).chain(time.date);
         self.note_states(proposal);
         self.unused(&used.chain(time.column).collect::<Vec<_>>(), &sensors, proposal);
         self.written(named, &time, &sensors, &temperatures)
@@ -231,6 +248,12 @@ impl<'a> File<'a> {
     /// Whether a number stands in a column; one without says nothing, whatever its name.
     fn has_numbers(self, index: usize) -> bool {
         self.figures.columns.get(index).is_some_and(|column| column.numbers > 0)
+    }
+
+    /// Whether sensors have a rhythm of their own.
+    fn are_in_some_rows(self, axes: &Axes<'_>) -> bool {
+        let column = |index: &usize| self.figures.columns.get(*index).is_some_and(Column::is_in_some_rows);
+        axes.iter().flatten().all(|(index, _)| column(index))
     }
 
     /// What the columns hold: by their names, else by the name of the file.
@@ -370,7 +393,10 @@ impl<'a> File<'a> {
                 meaning.stem.split(' ').filter(|word| !word.starts_with("temp") && *word != "out").collect();
             let mut channel = match words.join("_") {
                 none if none.is_empty() => "imu".to_owned(),
-                words => words.chars().take(20).collect(),
+                words => {
+                    let fits = |(at, c): &(usize, char)| at + c.len_utf8() <= LONGEST_STEM;
+                    words.char_indices().take_while(fits).map(|(_, c)| c).collect()
+                }
             };
             if let Some(axis) = meaning.axis {
                 channel = format!("{channel}_{}", ["x", "y", "z"][axis]);

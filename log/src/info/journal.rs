@@ -90,10 +90,12 @@ impl JournalSurvey {
         *self.info.entries.entry(entry.event.name()).or_default() += 1;
         if self.numbers.len() < MAX_LISTED || self.numbers.contains_key(&entry.instance) {
             let is_memory = matches!(entry.event, JournalEvent::Memory { .. });
-            let before = self.numbers.insert(entry.instance, entry.number);
+            let last = self.numbers.entry(entry.instance).or_insert(entry.number);
             // A memory bears the number of the entry before it.
-            let expected = before.map_or(entry.number, |number| number + u64::from(!is_memory));
+            let expected = last.saturating_add(u64::from(!is_memory));
             self.info.missing_entries += entry.number.saturating_sub(expected);
+            // One that comes late is no step back.
+            *last = entry.number.max(*last);
         }
         match entry.event {
             JournalEvent::Changed { revision, at, slew_ns, document, overlay, source }
@@ -143,17 +145,18 @@ pub struct StatusInfo {
     pub versions: Vec<String>,
     /// Instances of the service, likewise.
     pub instances: Vec<String>,
+    #[serde(skip)]
+    last: Option<(State, Output)>,
 }
 
 impl StatusInfo {
     pub(super) fn take(&mut self, received_ns: u64, status: &Status) {
-        let now = (status.state, status.output);
-        let before = self.states.last().map(|state| (state.state, state.output));
-        if before != Some(now) {
+        let (state, output) = (status.state, status.output);
+        let before = self.last.replace((state, output));
+        if before != Some((state, output)) {
             self.changes += u64::from(before.is_some());
             if self.states.len() < MAX_LISTED {
                 let last_tick_ns = status.last_tick.map(|tick| tick.end_time_ns);
-                let (state, output) = now;
                 self.states.push(StateInfo { received_ns, last_tick_ns, state, output });
             }
         }

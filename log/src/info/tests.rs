@@ -7,6 +7,7 @@ use isotherm_protocol::corrected::{CorrectedBatch, Revision, SigmaRun};
 use isotherm_protocol::journal::{JournalEntry, JournalEvent, split};
 use isotherm_protocol::key::RawStream;
 use isotherm_protocol::raw::{AccelBatch, GyroBatch, TemperatureBatch};
+use isotherm_protocol::status::{State, Status};
 
 use super::*;
 use crate::recording::{RecordingOptions, RecordingReport, RecordingWriter};
@@ -281,8 +282,9 @@ fn a_journal_tells_swaps_commands_and_lost_entries() {
         accepted: true,
         words: "standby".into(),
     };
-    // Number 3 and 4 are lost.
-    let entries = [entry(1, changed), entry(2, commanded), entry(5, JournalEvent::Flushed)];
+    // Number 3 and 4 are passed over; one that comes late passes none over once more.
+    let late = [5, 4, 6].map(|number| entry(number, JournalEvent::Flushed));
+    let entries = [vec![entry(1, changed), entry(2, commanded)], late.to_vec()].concat();
     let messages: Vec<_> = entries
         .iter()
         .flat_map(split)
@@ -299,6 +301,16 @@ fn a_journal_tells_swaps_commands_and_lost_entries() {
     assert_eq!((journal.swaps.len(), journal.swaps[0].source.as_str()), (1, "bus, by ann"));
     assert_eq!((journal.commands[0].command, journal.commands[0].accepted), ("standby", true));
     assert_eq!(topic(&info, "imu/ZLG-0001/journal").unreadable, 1);
+}
+
+#[test]
+fn states_beyond_those_listed_are_counted_where_they_change() {
+    let mut info = StatusInfo::default();
+    for n in 0..3000 {
+        let state = if n < 2000 && n % 2 == 0 { State::Standby } else { State::default() };
+        info.take(n, &Status { state, ..Status::default() });
+    }
+    assert_eq!((info.states.len(), info.changes), (MAX_LISTED, 1999));
 }
 
 #[test]

@@ -127,6 +127,9 @@ fn ticks<U: SensorUnit>(r: &mut Reader<'_>, path: &str, ticks: &TickMapping<U>) 
     if ticks.duration_column.is_some() && ticks.duration_unit.is_some_and(|unit| unit.scale().is_none()) {
         r.report(&unit, "must be \"ns\", \"us\", \"ms\" or \"s\": a duration has no date");
     }
+    if ticks.duration_column.is_none() && r.has(&unit) {
+        r.report(&unit, "needs a `duration_column`: add it, or remove this key");
+    }
     // What the readings stand for is not known: nothing can be said of their units.
     if r.is_damaged(&join(path, "output")) {
         return;

@@ -103,6 +103,7 @@ fn every_broken_line_is_named_with_its_place_and_key() {
         ("{ from = \"mode_change\" }", "{ }", 17, 10, "file[0].gyro.switch"),
         ("{ column = 5 }", "{ column = 5, unit = \"g\" }", 20, 33, "file[0].accel.sensors[0].unit"),
         ("{ column = 5 }", "{ column = 5, scale = 2.0 }", 20, 34, "file[0].accel.sensors[0].scale"),
+        ("\"counts\"", "\"counts\"\nduration_unit = \"ms\"", 20, 17, "file[0].accel.duration_unit"),
         ("[{ column = 5 }]", "[]", 20, 11, "file[0].accel.sensors"),
         ("[{ column = 5 }]", "5", 20, 11, "file[0].accel.sensors"),
         (

@@ -88,7 +88,7 @@ impl Sums {
     pub fn add(&mut self, tick: &CorrectedTick) {
         self.ticks += u64::from(tick.ticks);
         self.outputs += 1;
-        self.missed += tick.missed;
+        self.missed = self.missed.saturating_add(tick.missed);
         self.gaps += u64::from(tick.missed > 0);
         self.duration_ns = self.duration_ns.saturating_add(tick.duration.as_ns());
         for (sum, delta) in self.angle_rad.iter_mut().zip(tick.delta_angle) {

@@ -312,13 +312,9 @@ fn push(tracks: &mut BTreeMap<String, Track>, channel: &str, detail: usize, at_n
 /// Rates (°/h) and specific forces (m/s²) of a tick.
 pub(super) fn increments(tick: &CorrectedTick) -> [f64; 6] {
     let per_second = per_second(tick.duration);
-    let rates = tick.delta_angle.map(|angle| angle * per_second * DEG_PER_H);
-    let forces = tick.delta_velocity.map(|velocity| velocity * per_second);
-    let mut all = [0.0; 6];
-    for (to, from) in all.iter_mut().zip(rates.into_iter().chain(forces)) {
-        *to = from;
-    }
-    all
+    let [roll, pitch, yaw] = tick.delta_angle.map(|angle| angle * per_second * DEG_PER_H);
+    let [fx, fy, fz] = tick.delta_velocity.map(|velocity| velocity * per_second);
+    [roll, pitch, yaw, fx, fy, fz]
 }
 
 /// What to multiply increments with (1/s); not a number for no time at all.

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use isotherm_protocol::codec;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent, JournalPart};
+use isotherm_protocol::journal::{Joiner, JournalEntry, JournalEvent};
 use serde::Serialize;
 
 use super::Attachment;
+use crate::replica::join;
 
 /// Media type of a calibration document.
 const MEDIA_TYPE: &str = "application/toml";
@@ -37,11 +37,10 @@ pub struct Documents {
 impl Documents {
     /// Takes one message of a journal; the documents in the entry that it completes.
     pub fn take(&mut self, frame: &[u8], received_ns: u64) -> Vec<Attachment> {
-        let joined = codec::decode::<JournalPart>(frame).ok().map(|part| self.joiner.join(part));
-        let entry = match joined {
-            Some(Ok(Some(entry))) => entry,
-            Some(Ok(None)) => return Vec::new(),
-            Some(Err(_)) | None => {
+        let entry = match join(&mut self.joiner, frame) {
+            Ok(Some(entry)) => entry,
+            Ok(None) => return Vec::new(),
+            Err(_) => {
                 self.account.unreadable += 1;
                 return Vec::new();
             }
@@ -91,6 +90,7 @@ impl Documents {
 
 #[cfg(test)]
 mod tests {
+    use isotherm_protocol::codec;
     use isotherm_protocol::journal::split;
 
     use super::*;

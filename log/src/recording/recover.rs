@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::{RecordingOptions, writer};
 use crate::error::Error;
-use crate::file::{Partial, partial_of, refuse_overwriting, refuse_replacing};
+use crate::file::{Partial, refuse_overwriting, refuse_replacing};
 use crate::progress::Progress;
 use rescue::{Definitions, Rescue};
 use scan::{Piece, Scanner};
@@ -121,9 +121,7 @@ impl Recovery {
         options: RecordingOptions,
         mut watch: impl FnMut(&RecoveryReport),
     ) -> Result<RecoveryReport, Error> {
-        for new in [output, &partial_of(output)] {
-            refuse_overwriting(new, &[&self.input])?;
-        }
+        refuse_overwriting(output, &[&self.input])?;
         refuse_replacing(output, options.overwrite)?;
         let options = RecordingOptions { overwrite: true, ..options };
         let partial = Partial::of(output);

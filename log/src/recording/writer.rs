@@ -125,12 +125,6 @@ impl RecordingWriter {
         &self.path
     }
 
-    /// Messages of a topic so far.
-    #[must_use]
-    pub fn messages(&self, topic: &Topic) -> u64 {
-        self.channels.get(topic).map_or(0, |channel| channel.messages)
-    }
-
     /// Messages of the chunk that is being written: what a kill would cost now.
     #[must_use]
     pub fn waiting(&self) -> u64 {

@@ -108,19 +108,17 @@ impl Rows {
                 batch.ticks.iter().for_each(|tick| self.gyro(batch.output, tick.clone()));
             }
             Decoded::Accel(batch) => {
-                batch.ticks.iter().for_each(|tick| self.accel(batch.output, tick.clone()));
+                let event = |tick: &AccelTick| LogEvent::Accel { output: batch.output, tick: tick.clone() };
+                batch.ticks.iter().for_each(|tick| self.other(event(tick)));
             }
             Decoded::Temperature(batch) => {
-                for reading in &batch.readings {
-                    self.temperature(*reading);
-                }
+                batch.readings.iter().for_each(|reading| self.other(LogEvent::Temperature(*reading)));
             }
             _ => {}
         }
     }
 
-    /// Takes a gyro tick.
-    pub fn gyro(&mut self, output: OutputKind, tick: GyroTick) {
+    fn gyro(&mut self, output: OutputKind, tick: GyroTick) {
         let time_ns = tick.end_time.as_ns();
         let passed = self.is_passed(time_ns);
         let newest_ns = self.newest_ns.get(&Source::Gyro).copied().flatten();
@@ -153,16 +151,6 @@ impl Rows {
         }
         self.newest_gyro = self.newest_gyro.max(Some((time_ns, tick.sequence)));
         self.insert(LogEvent::Gyro { output, tick });
-    }
-
-    /// Takes an accelerometer tick.
-    pub fn accel(&mut self, output: OutputKind, tick: AccelTick) {
-        self.other(LogEvent::Accel { output, tick });
-    }
-
-    /// Takes a temperature reading.
-    pub fn temperature(&mut self, reading: TemperatureReading) {
-        self.other(LogEvent::Temperature(reading));
     }
 
     /// The next step that is ready.

@@ -126,13 +126,16 @@ impl Lines {
         Ok(Line::Read)
     }
 
-    /// The next line as text; characters that are none are replaced. A line that is too long is an empty one.
+    /// The next line as text; characters that are none are replaced. A line that is too long is an empty one, and where a compressed file
+    /// is cut short it ends.
     pub(crate) fn next_line(&mut self) -> io::Result<Option<String>> {
-        Ok(match self.advance()? {
-            Line::End => None,
-            Line::TooLong => Some(String::new()),
-            Line::Read => Some(String::from_utf8_lossy(&self.line).into_owned()),
-        })
+        match self.advance() {
+            Ok(Line::End) => Ok(None),
+            Ok(Line::TooLong) => Ok(Some(String::new())),
+            Ok(Line::Read) => Ok(Some(String::from_utf8_lossy(&self.line).into_owned())),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 
     /// The current line, without its end.

@@ -7,7 +7,7 @@ use isotherm_correction::sample::{AccelTick, ChannelName, GyroTick, OutputKind, 
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_log::mapping::Mapping;
 use isotherm_log::message::{Message, Topic};
-use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter};
+use isotherm_log::recording::{Documents, RecordingOptions, RecordingReader, RecordingWriter};
 use isotherm_log::text::{LogEvent, LogReader};
 use isotherm_protocol::codec;
 use isotherm_protocol::raw::{
@@ -62,7 +62,7 @@ fn a_part_of_a_recording_is_the_same_whether_or_not_its_log_begins_before_time_0
         })
     });
     assert_eq!(before, after);
-    assert_eq!((before[0].len(), before[1].first()), (51, Some(&190)));
+    assert_eq!((before[0].len(), before[1].first()), (50, Some(&191)));
 }
 
 /// A text log to a recording, back to text, and once more to a recording: the same ticks, the same messages.
@@ -230,6 +230,19 @@ fn a_stream_that_is_empty_is_read_back_as_empty() {
 }
 
 #[test]
+fn a_document_behind_the_last_message_says_what_readings_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let document = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/ZLG-0001.toml");
+    let mut writer =
+        RecordingWriter::create(&folder.path().join("x.mcap"), RecordingOptions::default()).unwrap();
+    writer.write(&gyro("ZLG-0001", 3, 0, 10)).unwrap();
+    writer.attach(&Documents::attachment(fs::read(document).unwrap(), 6)).unwrap();
+    writer.finish().unwrap();
+    let summary = convert(folder.path(), &["x.mcap", "--to", "ros2", "--out", "bag"], 0);
+    assert_eq!(summary["topics"][0]["name"], "/imu/ZLG_0001/data_raw");
+}
+
+#[test]
 fn doubled_and_late_ticks_and_new_runs_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -293,8 +306,13 @@ fn the_part_that_is_asked_for_is_converted() {
     record(&path("x.mcap"), &all);
     let part = ["x.mcap", "--out", "x.csv.gz", "--unit", "B-2", "--start", "0.2", "--duration", "0.3"];
     let summary = convert(folder.path(), &part, 0);
-    assert_eq!(files(&summary), pairs(&[("x.csv.gz", 31), ("x.mapping.toml", 1)]));
-    assert_eq!(events(&path("x.mapping.toml"), &path("x.csv.gz")).len(), 31);
+    assert_eq!(files(&summary), pairs(&[("x.csv.gz", 30), ("x.mapping.toml", 1)]));
+    assert_eq!(events(&path("x.mapping.toml"), &path("x.csv.gz")).len(), 30);
+    // A part that adjoins has the next message, and none of these again.
+    let next = ["x.mcap", "--out", "y.csv.gz", "--unit", "B-2", "--start", "0.5", "--duration", "0.1"];
+    convert(folder.path(), &next, 0);
+    let times = |name| events(&path("x.mapping.toml"), &path(name)).into_iter().map(|event| event.time());
+    assert_eq!(times("y.csv.gz").next(), times("x.csv.gz").next_back().map(|last| last + Span::from_ms(10)));
     insta::assert_snapshot!(told(folder.path(), &["convert", "x.mcap", "--out", "y.csv"]));
 }
 

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use isotherm_log::file::Sink;
+
 use super::common::{check, replay, root, stderr, stdout, told};
 use super::imports::{Expected, ROWS, TEN_MS, import, log, noise};
 
@@ -218,4 +220,71 @@ fn temperatures_of_a_second_file_are_read_and_doubted_where_their_clock_is_anoth
     };
     let same = imported(0.0, "T_block_K");
     insta::assert_snapshot!(format!("{same}---\n{}", imported(1000.0, "Temperature [K]")));
+}
+
+#[test]
+fn sensors_in_every_second_row_have_ticks_as_long_as_two_rows() {
+    for counter in ["n,", ""] {
+        // Two rows in the place of one, the second without gyros; two are missing.
+        let text = log(&format!("{counter}time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g\n"), |row| {
+            let pair = row + usize::from(row >= 100);
+            let line = |number: usize, gyros: &str| {
+                let own = if counter.is_empty() { String::new() } else { format!("{number},") };
+                format!("{own}{:.3},{gyros},0.1,0.2,0.9", f64::from(u32::try_from(number).unwrap()) * 0.005)
+            };
+            line(2 * pair, &format!("{:.3},1.5,2.5", noise(row, 1))) + "\n" + &line(2 * pair + 1, ",,")
+        });
+        let numbered =
+            if counter.is_empty() { "" } else { "[file.accel]\noutput = \"mean\"\nsequence_column = \"n\"" };
+        let parts = [
+            "[file.gyro]\noutput = \"mean\"\nmay_be_empty = true",
+            "time: a tick in every 2 rows, 10 ms long",
+            "gap_after_ticks = 1.5",
+            numbered,
+        ];
+        let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 1, temperatures: 0 };
+        import("turns.csv", text.as_bytes(), &[], &expected);
+    }
+}
+
+#[test]
+fn rows_of_other_figures_before_a_table_without_header_are_told() {
+    let odd = "0.5,1.5,2.5,1\n".repeat(6);
+    let text = log(&odd, |row| format!("{row},{},{},3.{}", row % 7, row % 5, row % 10));
+    let parts = ["#   odd.csv: 6 rows of other figures before the data: passed over", "skip_lines = 6"];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 1 };
+    let columns = "gx [deg/s],gy,gz,temp [degC]";
+    import("odd.csv", text.as_bytes(), &["--columns", columns, "--rate-hz", "100"], &expected);
+}
+
+#[test]
+fn a_channel_has_a_name_that_fits_in_whatever_letters() {
+    let text =
+        log("time_s,gx_dps,gy_dps,gz_dps,Температура внутри блока [°C]\n", |row| {
+            let time = f64::from(u32::try_from(row).unwrap()) * 0.01;
+            format!("{time:.2},{:.3},1.5,2.5,25.{}", noise(row, 1), row % 10)
+        });
+    let parts = ["channel = \"температур\""];
+    let expected = Expected { parts: &parts, period_ns: TEN_MS, gaps: 0, temperatures: 1 };
+    import("log.csv", text.as_bytes(), &[], &expected);
+}
+
+#[test]
+fn a_compressed_log_that_is_cut_short_is_imported_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv.gz");
+    let text = log("time_s,gx_dps,gy_dps,gz_dps\n", |row| {
+        format!("{:.2},{:.3},1.5,2.5", f64::from(u32::try_from(row).unwrap()) * 0.01, noise(row, 1))
+    });
+    let mut sink = Sink::create(&path).unwrap();
+    sink.write(|writer| writer.write_all(text.as_bytes())).unwrap();
+    sink.finish().unwrap().keep().unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let output = replay(folder.path(), &["import", "log.csv.gz", "--no-plot", "--json"]);
+    check(&output, 3);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let reading = &report["info"]["reading"];
+    let rows = reading["rows"].as_u64().unwrap();
+    assert!(reading["cut_short"] == true && (50..450).contains(&rows), "{reading}");
 }

@@ -8,6 +8,7 @@ use isotherm_protocol::key::UnitId;
 use isotherm_protocol::status::Status;
 use tokio::sync::Notify;
 
+use super::feeding::Input;
 use crate::feed::{Refusal, Ticks};
 use crate::mapping::UnitMapping;
 use crate::noise::Noise;
@@ -97,7 +98,13 @@ impl Unit {
     }
 
     /// Counts a refusal; the first of its kind is logged.
-    pub(super) fn refuse(&self, topic: &str, refusal: &Refusal) {
+    pub(super) fn refuse(&self, input: Input, refusal: &Refusal) {
+        let topic = match input {
+            Input::Imu => self.mapping.raw.as_str(),
+            Input::Temperature(index) => {
+                self.mapping.temperatures.get(index).map_or("", |temperature| &temperature.topic)
+            }
+        };
         let first = {
             let mut state = self.state();
             let count = state.totals.refused.entry(refusal.kind()).or_default();

@@ -84,7 +84,7 @@ fn judge(mapping: &UnitMapping, look: &Look, before: &UnitTotals) -> (Level, Str
         let last = last_refusal.as_ref().map_or_else(String::new, |last| format!(", the last on {last}"));
         found.push((Level::Error, format!("{refused} messages refused{last}")));
     }
-    if since(|totals| totals.lost + totals.unsent + totals.unpublished) > 0 {
+    if since(UnitTotals::all_lost) > 0 {
         found.push((Level::Error, "ticks lost between service and ROS 2".to_owned()));
     }
     if let Some(status) = status {
@@ -150,7 +150,7 @@ fn values(mapping: &UnitMapping, look: &Look) -> Vec<KeyValue> {
         ("ticks missing", totals.missing),
         ("ticks announced missing by the service", totals.announced_missing),
         ("ticks uncalibrated", totals.uncalibrated),
-        ("ticks lost", totals.lost + totals.unsent + totals.unpublished),
+        ("ticks lost", totals.all_lost()),
         ("runs", totals.runs),
     ] {
         say(key, count.to_string());

@@ -25,11 +25,17 @@ pub(super) struct Message {
 /// What came for a unit.
 #[derive(Debug)]
 pub(super) enum Arrived {
-    Imu(Message),
-    /// With the place of its topic in the mapping.
-    Temperature(usize, Message),
+    Message(Input, Message),
     /// A publisher has left the graph.
     Left(Gid),
+}
+
+/// What a message is for.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Input {
+    Imu,
+    /// By its place in the mapping.
+    Temperature(usize),
 }
 
 /// Way of what comes to the unit's task; receive threads must not wait.
@@ -45,15 +51,12 @@ impl Queue {
     }
 
     pub(super) fn push(&self, arrived: Arrived) {
-        let topic = match &arrived {
-            Arrived::Imu(_) => Some(&self.unit.mapping.raw),
-            Arrived::Temperature(index, _) => self.unit.mapping.temperatures.get(*index).map(|it| &it.topic),
-            Arrived::Left(_) => None,
-        };
         let waiting = self.unit.wait();
-        if let Some(topic) = topic.filter(|_| waiting > MOST_WAITING) {
+        if let Arrived::Message(input, _) = &arrived
+            && waiting > MOST_WAITING
+        {
             self.unit.waited();
-            self.unit.refuse(topic, &Refusal::QueueFull { waiting: MOST_WAITING });
+            self.unit.refuse(*input, &Refusal::QueueFull { waiting: MOST_WAITING });
             return;
         }
         // The task is gone at the end only; then nobody wants it.
@@ -96,34 +99,29 @@ struct Way {
 
 impl Way {
     async fn take(&mut self, arrived: Arrived) {
-        match arrived {
-            Arrived::Left(gid) => self.feeder.left(&gid),
-            Arrived::Imu(Message { payload, attachment }) => {
-                let attachment = attachment.as_ref().map(ZBytes::to_bytes);
-                match self.feeder.imu(&payload.to_bytes(), attachment.as_deref()) {
-                    Ok(ticks) => {
-                        self.unit.take(&ticks);
-                        let sent = self.send(ticks).await;
-                        self.judge(sent);
-                    }
-                    Err(refusal) => self.unit.refuse(&self.unit.mapping.raw, &refusal),
+        let (input, Message { payload, attachment }) = match arrived {
+            Arrived::Message(input, message) => (input, message),
+            Arrived::Left(gid) => return self.feeder.left(&gid),
+        };
+        let (payload, attachment) = (payload.to_bytes(), attachment.as_ref().map(ZBytes::to_bytes));
+        let attachment = attachment.as_deref();
+        let sent = match input {
+            Input::Imu => match self.feeder.imu(&payload, attachment) {
+                Ok(ticks) => {
+                    self.unit.take(&ticks);
+                    self.send(ticks).await
                 }
-            }
-            Arrived::Temperature(index, Message { payload, attachment }) => {
-                let attachment = attachment.as_ref().map(ZBytes::to_bytes);
-                match self.feeder.temperature(index, &payload.to_bytes(), attachment.as_deref()) {
-                    Ok(reading) => {
-                        self.unit.count(|totals| totals.temperature_in += 1);
-                        let sent = self.send_temperature(reading).await;
-                        self.judge(sent);
-                    }
-                    Err(refusal) => {
-                        let topic = self.unit.mapping.temperatures.get(index).map(|it| it.topic.as_str());
-                        self.unit.refuse(topic.unwrap_or_default(), &refusal);
-                    }
+                Err(refusal) => return self.unit.refuse(input, &refusal),
+            },
+            Input::Temperature(index) => match self.feeder.temperature(index, &payload, attachment) {
+                Ok(reading) => {
+                    self.unit.count(|totals| totals.temperature_in += 1);
+                    self.send_temperature(reading).await
                 }
-            }
-        }
+                Err(refusal) => return self.unit.refuse(input, &refusal),
+            },
+        };
+        self.judge(sent);
     }
 
     /// Counts what could not be sent; the first is logged.

@@ -20,7 +20,14 @@ pub(super) struct Time {
 }
 
 impl File<'_> {
-    pub(super) fn time(self, meanings: &Meanings, counted: bool, proposal: &mut Proposal) -> Time {
+    /// `counted`: every tick has its number. A tick is as long as so many rows are apart.
+    pub(super) fn time(
+        self,
+        meanings: &Meanings,
+        counted: bool,
+        rows_of_tick: f64,
+        proposal: &mut Proposal,
+    ) -> Time {
         let named = meanings.iter().filter(|(_, meaning)| meaning.kind == Kind::Time);
         let mut clocks: Vec<_> = named
             .map(|(index, meaning)| (meaning.rank, *index, meaning.unit, meaning.unknown.as_ref()))
@@ -81,19 +88,24 @@ impl File<'_> {
             "s".to_owned()
         });
         let ns = UNITS_NS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, ns)| *ns);
-        let tick_ns = (step * ns).max(1.0);
+        let row_ns = (step * ns).max(1.0);
         // Rounded to what stamps can say, so that 0.01 s is 10 000 000 ns.
-        let tick_ns = if tick_ns > 1e4 { (tick_ns / 10.0).round() * 10.0 } else { tick_ns };
+        let row_ns = if row_ns > 1e4 { (row_ns / 10.0).round() * 10.0 } else { row_ns };
+        let tick_ns = row_ns * rows_of_tick;
         let jitter = column.steps.p99 / step;
         let gap_after_ticks = (!counted && column.steps.gaps > 0).then(|| (jitter * GAP).max(1.5));
         proposal.notes.push(format!(
             "time: {} in {unit}, every {} ms ({:.6} Hz), {} gaps, longest step {} ms",
             self.listed(&[index]),
-            tick_ns / 1e6,
-            1e9 / tick_ns,
+            row_ns / 1e6,
+            1e9 / row_ns,
             column.steps.gaps,
             (column.steps.longest * ns).round() / 1e6
         ));
+        if rows_of_tick > 1.0 {
+            let note = format!("time: a tick in every {rows_of_tick} rows, {} ms long", tick_ns / 1e6);
+            proposal.notes.push(note);
+        }
         if self.figures.repeated > 0 {
             let note = format!("time: {} rows repeat the row before them: dropped", self.figures.repeated);
             proposal.notes.push(note);

@@ -57,8 +57,8 @@ pub(super) struct Rescue<'a> {
     writer: Writer<BufWriter<Arc<File>>>,
     file: Arc<File>,
     definitions: &'a mut Definitions,
-    /// By number in the old file; `None` where nothing names it.
-    targets: HashMap<u16, Option<Target>>,
+    /// By number in the old file.
+    targets: HashMap<u16, Target>,
     journal: Documents,
     /// Documents of the journal that are not attached yet.
     documents: BTreeMap<String, Attachment>,
@@ -165,11 +165,12 @@ impl<'a> Rescue<'a> {
     ) -> Result<(), McapError> {
         let number = header.channel_id;
         // Looked up each time where it is not known: its record may come later.
-        if self.targets.get(&number).is_none_or(Option::is_none) {
-            let target = self.declare(number)?;
+        if !self.targets.contains_key(&number)
+            && let Some(target) = self.declare(number)?
+        {
             self.targets.insert(number, target);
         }
-        let Some(Some(target)) = self.targets.get_mut(&number) else {
+        let Some(target) = self.targets.get_mut(&number) else {
             report.nameless += 1;
             return Ok(());
         };

@@ -17,18 +17,19 @@ fn gyro(series: u64, sequence: u64, end_ms: i64) -> GyroTick {
     }
 }
 
-fn accel(sequence: u64, end_ms: i64) -> AccelTick {
-    AccelTick {
+fn accel(sequence: u64, end_ms: i64) -> LogEvent {
+    let tick = AccelTick {
         sequence,
         end_time: Timestamp::from_ns(end_ms * 1_000_000),
         duration: Span::from_ms(10),
         ..AccelTick::default()
-    }
+    };
+    LogEvent::Accel { output: OutputKind::Mean, tick }
 }
 
-fn reading(end_ms: i64, raw: f64) -> TemperatureReading {
+fn reading(end_ms: i64, raw: f64) -> LogEvent {
     let channel = ChannelName::from("board").unwrap();
-    TemperatureReading { channel, time: Timestamp::from_ns(end_ms * 1_000_000), raw }
+    LogEvent::Temperature(TemperatureReading { channel, time: Timestamp::from_ns(end_ms * 1_000_000), raw })
 }
 
 /// Every step as words: `40ag` is a row at 40 ms with an accelerometer and a gyro tick.
@@ -56,10 +57,10 @@ fn what_comes_out_of_order_is_put_in_order_and_what_comes_twice_once() {
     for (sequence, end_ms) in [(1, 20), (0, 10), (3, 40), (0, 10), (2, 30)] {
         rows.gyro(OutputKind::Mean, gyro(7, sequence, end_ms));
     }
-    rows.accel(OutputKind::Mean, accel(0, 30));
-    rows.temperature(reading(15, 1.0));
-    rows.temperature(reading(15, 1.0));
-    rows.temperature(reading(15, 2.0));
+    rows.other(accel(0, 30));
+    rows.other(reading(15, 1.0));
+    rows.other(reading(15, 1.0));
+    rows.other(reading(15, 2.0));
     rows.gyro(OutputKind::Mean, gyro(7, 9, 40));
     let (words, tally) = steps(rows);
     assert_eq!(words, "10g 15t 20g 30ag 40g");
@@ -75,7 +76,7 @@ fn a_row_waits_until_every_stream_is_five_seconds_further() {
     rows.gyro(OutputKind::Mean, gyro(7, 501, 5020));
     assert!(matches!(rows.next_step(), Some(Step::Row(_))));
     rows.gyro(OutputKind::Mean, gyro(7, 0, 10));
-    rows.accel(OutputKind::Mean, accel(0, 5));
+    rows.other(accel(0, 5));
     let (words, tally) = steps(rows);
     assert_eq!(words, "5010g 5020g");
     assert_eq!(tally, Tally { late: 2, ..Tally::default() });
@@ -90,7 +91,7 @@ fn a_row_waits_until_every_stream_is_five_seconds_further() {
     }
     assert_eq!(rows.next_step(), None);
     for n in 0..60_u64 {
-        rows.accel(OutputKind::Mean, accel(n, 1000 * n.cast_signed()));
+        rows.other(accel(n, 1000 * n.cast_signed()));
     }
     assert!(matches!(rows.next_step(), Some(Step::Row(row)) if row.gyro.is_some() && row.accel.is_some()));
     assert_eq!(steps(rows).1, Tally::default());
@@ -99,7 +100,7 @@ fn a_row_waits_until_every_stream_is_five_seconds_further() {
 #[test]
 fn a_stream_that_ended_does_not_hold_the_others_for_ever() {
     let mut rows = Rows::default();
-    rows.temperature(reading(5, 1.0));
+    rows.other(reading(5, 1.0));
     for n in 0..100_000_u32 {
         rows.gyro(OutputKind::Mean, gyro(7, n.into(), 10 + 10 * i64::from(n)));
         assert!(rows.waiting.len() <= MOST_ROWS);
@@ -112,13 +113,13 @@ fn a_stream_that_ended_does_not_hold_the_others_for_ever() {
 fn another_series_is_a_new_run_with_what_came_shortly_before_it() {
     let mut rows = Rows::default();
     rows.gyro(OutputKind::Mean, gyro(7, 0, 10_000));
-    rows.accel(OutputKind::Mean, accel(0, 10_000));
+    rows.other(accel(0, 10_000));
     // Time goes on: the accelerometer tick of the new run comes first.
-    rows.accel(OutputKind::Mean, accel(0, 12_000));
+    rows.other(accel(0, 12_000));
     rows.gyro(OutputKind::Mean, gyro(8, 1, 12_000));
     // Time goes back, and the temperature comes first.
     rows.gyro(OutputKind::Mean, gyro(8, 2, 20_000));
-    rows.temperature(reading(5, 1.0));
+    rows.other(reading(5, 1.0));
     rows.gyro(OutputKind::Mean, gyro(9, 0, 10));
     // A straggler of a run that is over.
     rows.gyro(OutputKind::Mean, gyro(8, 3, 20_010));
