@@ -165,7 +165,7 @@ pub fn sigmas(made: &Made) -> Sigmas {
             let of_term: Vec<f64> =
                 own.map(|one| if is_kept(one.power) { 0.0 } else { tidy(one.sigma) }).collect();
             if !of_term.is_empty() {
-                sigmas.put("gyro", &sensor.name, key(term), of_term);
+                sigmas.put(("gyro", &sensor.name, key(term)), of_term);
             }
         }
     }

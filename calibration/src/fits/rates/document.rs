@@ -59,13 +59,13 @@ pub fn sigmas(made: &Made) -> Sigmas {
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let Ok(found) = found else { continue };
         let ppm = tidy(1e6 * found.gain[1] / found.gain[0].abs());
-        sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        sigmas.put(("gyro", &sensor.name, "increment_weight_ppm"), vec![ppm]);
         if let Some([_, sigma]) = found.weight_asymmetry_ppm() {
-            sigmas.put("gyro", &sensor.name, "increment_weight_asymmetry", vec![tidy(sigma)]);
+            sigmas.put(("gyro", &sensor.name, "increment_weight_asymmetry"), vec![tidy(sigma)]);
         }
         if found.axis.is_some() {
             let arcsec = found.axis_sigma.map(|sigma| tidy(Angle::from_rad(sigma).as_arcsec()));
-            sigmas.put("gyro", &sensor.name, "axis_arcsec", arcsec.to_vec());
+            sigmas.put(("gyro", &sensor.name, "axis_arcsec"), arcsec.to_vec());
         }
     }
     sigmas
