@@ -31,9 +31,7 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand) -> Result<Rest
     let mean_force = match force_m_per_s2 {
         Some(force) => Some(*force),
         None if document.accel.is_some() => {
-            let means = Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S))?;
-            let mean = |axis: usize| Size::of(means.force(axis)).mean;
-            Some([mean(0), mean(1), mean(2)])
+            Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S))?.mean_force()
         }
         None => None,
     };
