@@ -1,5 +1,7 @@
 //! Case axes, and what sensors are called.
 
+use crate::numbers::grouped;
+
 /// Names of the case axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -34,15 +36,8 @@ pub fn main_axis(row: &[f64; 3]) -> usize {
 
 /// What is said of sensors; those of which the same is said are named together.
 pub fn each(kind: &str, told: impl IntoIterator<Item = (usize, String)>, of: usize) -> Vec<String> {
-    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
-    for (sensor, words) in told {
-        match groups.iter_mut().find(|(said, _)| *said == words) {
-            Some((_, sensors)) => sensors.push(sensor),
-            None => groups.push((words, vec![sensor])),
-        }
-    }
     let named = |(words, sensors): (String, Vec<usize>)| format!("{}: {words}", several(kind, &sensors, of));
-    groups.into_iter().map(named).collect()
+    grouped(told).into_iter().map(named).collect()
 }
 
 /// The two axes beside one.

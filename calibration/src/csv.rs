@@ -57,6 +57,11 @@ pub(crate) fn rows<'a, T>(
     if let Some(name) = head.iter().find(|name| !known.contains(name)) {
         return Err(format!("line {first}: column {name:?} is not one of {}", known.join(", ")));
     }
+    if let Some(name) =
+        head.iter().enumerate().find_map(|(at, name)| head[..at].iter().find(|other| *other == name))
+    {
+        return Err(format!("line {first}: column {name:?} is given twice"));
+    }
     let row = |(line, text): (usize, &'a str)| {
         let cells: Vec<&str> = text.split(',').map(str::trim).collect();
         if cells.len() != head.len() {

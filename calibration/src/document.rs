@@ -16,7 +16,10 @@ pub mod show;
 mod written;
 
 use isotherm_correction::thermal::{GYRO_TERMS, Makes};
-use isotherm_protocol::document::{AccelSensor, Curve, Document, GyroSensor, Shape, StatedTerm};
+use isotherm_correction::units::Angle;
+use isotherm_protocol::document::{
+    AccelSensor, Curve, Document, GyroSensor, OrientationThermal, Shape, StatedTerm,
+};
 
 pub use fitted::{About, Fitted};
 pub(crate) use fitted::{by_name, rows};
@@ -39,6 +42,17 @@ pub(crate) fn accel_name(document: &Document, index: usize) -> &str {
 /// The accelerometers of a document.
 pub fn accelerometers(document: &Document) -> &[AccelSensor] {
     document.accel.as_ref().map_or(&[], |accel| &accel.sensor)
+}
+
+/// How a document turns an input axis at a temperature, within the range of its slopes, from where it lies at their reference (rad): not
+/// at all without slopes, or where the temperature is no number.
+pub(crate) fn turned(thermal: Option<&OrientationThermal>, sensor: usize, deg_c: f64) -> [f64; 3] {
+    let thermal = thermal.filter(|_| deg_c.is_finite());
+    let of_sensor = thermal.and_then(|thermal| Some((thermal, thermal.slopes_arcsec_per_deg_c.get(sensor)?)));
+    let Some((thermal, slopes)) = of_sensor else { return [0.0; 3] };
+    let [low, high] = thermal.range_deg_c;
+    let away = deg_c.clamp(low, high) - thermal.reference_deg_c;
+    slopes.map(|slope| Angle::from_arcsec(slope).as_rad() * away)
 }
 
 /// A curve that has one value everywhere.

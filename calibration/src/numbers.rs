@@ -21,6 +21,19 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / real(values.len())
 }
 
+/// Mean of what is a number; `None` without any.
+pub fn mean_if_any(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let known = values.into_iter().filter(|value| value.is_finite());
+    let (sum, count) = known.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    (count > 0.0).then(|| sum / count)
+}
+
+/// So many places from one end to the other.
+pub fn places([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+    let step = (high - low) / real(count.max(2) - 1);
+    (0..count).map(|index| low + step * real(index)).collect()
+}
+
 /// Smallest and largest; what is no number is left out, and without any the ends stand the wrong way round.
 pub fn ends(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     let none = [f64::INFINITY, f64::NEG_INFINITY];
@@ -61,6 +74,18 @@ pub fn once_each<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
         }
         known
     })
+}
+
+/// What is said of some things, each once with all that it holds of, in the order of the first.
+pub fn grouped<T, W: PartialEq>(told: impl IntoIterator<Item = (T, W)>) -> Vec<(W, Vec<T>)> {
+    let mut groups: Vec<(W, Vec<T>)> = Vec::new();
+    for (of, words) in told {
+        match groups.iter_mut().find(|(said, _)| *said == words) {
+            Some((_, all)) => all.push(of),
+            None => groups.push((words, vec![of])),
+        }
+    }
+    groups
 }
 
 /// Size of a set of numbers; those that are no number are left out.

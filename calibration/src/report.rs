@@ -36,7 +36,7 @@ pub(crate) use page::bars;
 pub use sigma::Sigmas;
 pub use verdict::{FLAT, SAME_SHARE, Verdict, beside, few, is_worse, residuals};
 
-pub(crate) use words::{grouped, gyros, of_logs, together};
+pub(crate) use words::{gyros, of_logs, together};
 
 use words::dozen;
 

@@ -202,7 +202,7 @@ impl Run {
     /// [`Error::Log`]; [`Error::Refused`] where it has no ticks, ticks too long to be corrected, or ticks of two instruments.
     pub fn series(&self) -> Result<Series, Error> {
         let mut series = Series::empty(self.unit.clone());
-        self.walk(|fed| series.take(&fed))?;
+        self.walk(|fed| series.take(&fed).map_err(|error| error.of(&self.name)))?;
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
             let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
             if usual_s > longest_s {

@@ -182,9 +182,8 @@ fn no_windows(run: &str, document: &str, (table, length_s): (&Table, f64)) -> Op
 /// What a run's curves show of sensors that do not work, and of gaps.
 fn doubts(name: &str, curves: &[Curve], means: &Table) -> Vec<String> {
     let mut doubts = Vec::new();
-    let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
-    if force.iter().all(|size| size.count > 0) {
-        let length = norm(force.map(|size| size.mean));
+    if let Some(force) = means.mean_force() {
+        let length = norm(force);
         if !is_one_g(length) {
             doubts.push(format!(
                 "{name}: the mean specific force is {} m/s², gravity is 9.76 to 9.84: check the unit of the columns, \
@@ -212,8 +211,7 @@ fn looks_swapped(name: &str, means: &Table, (rest, place): (&Rest, Option<&Place
     let sizes = |column: fn(&Table, usize) -> &[f64]| [0, 1, 2].map(|axis| Size::of(column(means, axis)));
     let (rates, forces) = (sizes(Table::rate), sizes(Table::force));
     let force = place.and_then(force_at_rest);
-    let measured = forces.iter().all(|size| size.count > 0).then(|| forces.map(|size| size.mean));
-    let opposite = rest.rate_deg_per_h.zip(force.or(measured));
+    let opposite = rest.rate_deg_per_h.zip(force.or(means.mean_force()));
     let opposite = opposite.map(|(earth, force)| at_opposite_latitude(earth, force));
     let gyros =
         rest.rate_deg_per_h.map(|earth| Shown::of(["gyros", "°/h"], rates, earth).or_opposite(opposite));
@@ -281,9 +279,7 @@ fn at_rest(name: &str, means: &Table) -> Option<String> {
             ));
         }
     }
-    let mean = [0, 1, 2].map(|axis| Size::of(means.force(axis)).mean);
-
-    let [a, b, c] = mean;
+    let mean @ [a, b, c] = means.mean_force()?;
     let forces = means.force(0).iter().zip(means.force(1)).zip(means.force(2));
     let sines =
         forces.filter(|((x, y), z)| x.is_finite() && y.is_finite() && z.is_finite()).map(|((x, y), z)| {
@@ -300,10 +296,7 @@ fn at_rest(name: &str, means: &Table) -> Option<String> {
 /// What the unit would put out without error.
 fn rest(name: &str, means: &Table, place: Option<&Place>) -> Result<Rest, Error> {
     let Some(place) = place else { return Ok(Rest::default()) };
-    let force = [0, 1, 2].map(|axis| Size::of(means.force(axis)));
-    let known = force.iter().all(|size| size.count > 0);
-    let rate =
-        earth_rate(place, known.then(|| force.map(|size| size.mean))).map_err(|error| error.of(name))?;
+    let rate = earth_rate(place, means.mean_force()).map_err(|error| error.of(name))?;
     let rate = rate.map(|rate| AngularRate::from_rad_per_s(rate).as_deg_per_h());
     Ok(Rest { rate_deg_per_h: Some(rate), ..Rest::default() })
 }

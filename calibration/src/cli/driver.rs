@@ -70,7 +70,8 @@ impl<'a> Task<'a> {
         of_unit: impl Fn(&Job<'_>) -> Result<Done, Error> + Sync,
     ) -> Result<(), Error> {
         let files = self.files;
-        files.check(&self.logs.inputs().into_iter().chain(self.beside).collect::<Vec<_>>())?;
+        let mut inputs: Vec<&Path> = self.logs.inputs().into_iter().chain(self.beside).collect();
+        files.check(&inputs)?;
         let mut units = units()?;
         let written = |job: &Job<'_>| {
             let done = of_unit(job).map_err(|error| error.beside(&job.work.cuts()))?;
@@ -91,7 +92,9 @@ impl<'a> Task<'a> {
             let refused = refusals(&report, self.accept_partial);
             return Error::end(refused.into_iter().collect(), work.cuts());
         }
-        units.iter().try_for_each(|(unit, _)| files.check_unit(unit.as_str()))?;
+        let documents = self.logs.documents(&units);
+        inputs.extend(documents.iter().map(PathBuf::as_path));
+        units.iter().try_for_each(|(unit, _)| files.check_unit(unit.as_str(), &inputs))?;
         let bar = Bar::counting("units done", units.len());
         let came = in_parallel(&units, |(unit, work)| {
             let came = match work {

@@ -56,10 +56,13 @@ impl Files<'_> {
         self.html.map_or(Ok(()), |html| writable(html, inputs, self.overwrite))
     }
 
-    /// Checks the files of one unit of several, before any of them is looked at.
-    pub(super) fn check_unit(&self, unit: &str) -> Result<(), Error> {
-        let mut outputs = self.out.into_iter().chain(self.html);
-        outputs.try_for_each(|out| Ok(refuse_replacing(&of_unit(out, unit), self.overwrite)?))
+    /// Checks the files of one unit of several, before any of them is looked at; `inputs` may not be replaced.
+    pub(super) fn check_unit(&self, unit: &str, inputs: &[&Path]) -> Result<(), Error> {
+        let mut outputs = self.out.into_iter().chain(self.html).map(|out| of_unit(out, unit));
+        outputs.try_for_each(|out| {
+            refuse_overwriting(&out, inputs)?;
+            Ok(refuse_replacing(&out, self.overwrite)?)
+        })
     }
 
     /// Says which files were written; a document is where one `came`.

@@ -14,12 +14,12 @@ use super::driver::emit;
 use super::files::PageArgs;
 use super::runs::{LogArgs, Reading};
 use super::units::{Logs, once_each_log};
-use crate::document::Written;
+use crate::document::{Written, name_of};
 use crate::error::Error;
 use crate::fits::drift::HOUR_S;
 use crate::fits::drift::columns::{Columns, Kind};
-use crate::fits::impact::over_starts;
 use crate::fits::impact::scenario::Voyage;
+use crate::fits::impact::{logged, over_starts};
 use crate::limits::within;
 use crate::report::short;
 use crate::runs::cut::Cut;
@@ -167,14 +167,25 @@ impl ImpactArgs {
         })
     }
 
-    /// Takes the sigma of the constant over starts from the logs that were given of them; what was found is said in a sentence.
-    fn starts(&self, parts: &mut [DriftParts; 3], cut: &Cut) -> Result<Option<String>, Error> {
+    /// Takes the sigma of the constant over starts from the logs that were given of them; gives what is to be said of the logs, and
+    /// what was found.
+    fn starts(&self, parts: &mut [DriftParts; 3], cut: &Cut) -> Result<Vec<String>, Error> {
+        let mut notes = Vec::new();
         if self.start_log.is_empty() {
-            return Ok(None);
+            return Ok(notes);
         }
         once_each_log(&self.start_log)?;
-        let means = |path: &PathBuf| Ok(over_starts::means(&self.columns(slice::from_ref(path), cut)?));
-        let means: Vec<[f64; 3]> = self.start_log.iter().map(means).collect::<Result<_, Error>>()?;
+        let mut means = Vec::new();
+        for path in &self.start_log {
+            let mut columns = self.columns(slice::from_ref(path), cut)?;
+            let name = name_of(path);
+            let said = logged::sound(&mut columns).map_err(|error| error.of(&name))?;
+            notes.extend(said.into_iter().map(|words| match words.strip_prefix("warning: ") {
+                Some(words) => format!("warning: {name}: {words}"),
+                None => format!("{name}: {words}"),
+            }));
+            means.push(over_starts::means(&columns));
+        }
         let found = over_starts::sigmas(&means).ok_or_else(|| {
             Error::Usage(
                 "--start-log: the sigma over starts needs two logs at least: give it once for each start"
@@ -188,12 +199,13 @@ impl ImpactArgs {
             let [low, high] = found.interval;
             format!("{} ({}…{})", short(found.sigma), short(low), short(high))
         };
-        Ok(Some(format!(
+        notes.push(format!(
             "Sigma of the constant over {} starts, with its 95 % interval, gyros x, y, z: {} °/h. It replaces \
              initial_sigma.",
             means.len(),
             found.iter().map(of).collect::<Vec<_>>().join(", ")
-        )))
+        ));
+        Ok(notes)
     }
 
     fn columns(&self, logs: &[PathBuf], cut: &Cut) -> Result<Columns, Error> {

@@ -136,6 +136,13 @@ impl<'a> Logs<'a> {
         self.files.iter().chain(self.judge).map(PathBuf::as_path).chain(self.document).collect()
     }
 
+    /// The documents of units, where each of a folder has its own.
+    pub(super) fn documents(&self, units: &[Unit]) -> Vec<PathBuf> {
+        let base = |(_, work): &Unit| Some(work.as_ref().ok()?.base.as_ref()?.name.clone());
+        let folder = self.document.into_iter();
+        folder.flat_map(|folder| units.iter().filter_map(base).map(|name| folder.join(name))).collect()
+    }
+
     /// A log counts once, and judges nothing that was fitted to it.
     fn each_once(&self) -> Result<(), Error> {
         let logs = self.files;

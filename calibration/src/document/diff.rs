@@ -21,10 +21,10 @@ use toml::Table;
 
 use crate::document::merge::sections::sections;
 use crate::document::show::terms::{terms, tree};
-use crate::document::show::{places, range_of, settled, steady};
+use crate::document::show::{range_of, settled, steady};
 use crate::document::{Written, about, accelerometers};
 use crate::error::Error;
-use crate::numbers::norm;
+use crate::numbers::{norm, places};
 use crate::report::Sigmas;
 
 /// Standard errors beyond which an axis has turned.

@@ -6,7 +6,10 @@ use isotherm_protocol::document::{Created, Document};
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 
+use super::merge::sections::{of_sigma, sections};
+use super::merge::weights::stated;
 use super::provenance::{BASE, MOST_LOGS, base_of};
+use super::show::terms::tree;
 use super::{Written, command_line, origin, tidy};
 use crate::error::Error;
 use crate::report::{Report, Sigmas, residuals};
@@ -83,6 +86,16 @@ impl About {
         }
         details.extend(kept(own).map(|own| (self.key.to_owned(), own)));
         details.insert(BASE.to_owned(), base_of(base));
+        if let Some(base) = base {
+            // What was made anew has no standard errors but its own.
+            let (own, new) = (sections(tree(&base.document)?), sections(tree(&document)?));
+            let with_new_weights = stated(&base.document, &document)?;
+            Sigmas::retain(&mut details, |of| {
+                let key = of_sigma(of, |key| new.contains_key(key));
+                let old = if of.2 == "increment_weight_ppm" { &own } else { &with_new_weights };
+                old.get(&key) == new.get(&key)
+            });
+        }
         self.sigmas.write(&mut details);
         origin.details = Some(details);
         document.origin = Some(origin);
@@ -118,7 +131,36 @@ pub(crate) fn by_name<'a>(all: impl IntoIterator<Item = (&'a str, Value)>) -> Va
 
 #[cfg(test)]
 mod tests {
+    use isotherm_correction::thermal::Feature;
+
     use super::*;
+    use crate::document::{constant, reweigh, weight};
+
+    #[test]
+    fn standard_errors_go_with_what_they_were_of() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
+        let mut document = Written::read(path.as_ref()).unwrap().document;
+        let mut sigmas = Sigmas::default();
+        for name in ["x", "y"] {
+            sigmas.put(("gyro", name, "static_bias"), vec![0.5]);
+            sigmas.put(("gyro", name, "increment_weight_ppm"), vec![9.0]);
+        }
+        let mut details = toml::Table::new();
+        sigmas.write(&mut details);
+        document.origin.get_or_insert_default().details = Some(details);
+        let base = Written::of(&document).unwrap();
+        // One gyro has another bias, the other another weight, and its bias goes with that.
+        document.gyro.sensor[0].set(Feature::One, constant(3.0));
+        let heavier = 1.01 * weight(&document.gyro.sensor[1]).unwrap();
+        reweigh(&mut document.gyro.sensor[1], heavier);
+        let about = About { method: "m", key: "fit", details: json!({}), ..About::default() };
+        let (report, created) = (Report::new("", ""), document.created.unwrap());
+        let made = about.complete(document, (Some(&base), &[]), &report, created).unwrap();
+        let sigmas = Sigmas::of(&made.document);
+        let stays = |name: &str, of: &str| sigmas.get("gyro", name, of).is_some();
+        assert!(!stays("x", "static_bias") && stays("x", "increment_weight_ppm"));
+        assert!(stays("y", "static_bias") && !stays("y", "increment_weight_ppm"));
+    }
 
     #[test]
     fn a_document_names_all_logs_that_it_rests_on_however_long_the_chain() {

@@ -14,7 +14,7 @@ mod origin;
 pub(crate) mod sections;
 #[cfg(test)]
 mod tests;
-mod weights;
+pub(crate) mod weights;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -127,18 +127,28 @@ fn pieces(name: &str) -> Vec<(String, u128)> {
 pub fn command_line() -> String {
     let mut words = std::env::args();
     let _ = words.next();
-    words.fold("isotherm-calibrate".to_owned(), |line, word| {
-        if word.is_empty() || word.chars().any(|c| c.is_whitespace() || "'\"\\$`".contains(c)) {
-            format!("{line} '{}'", word.replace('\'', r"'\''"))
-        } else {
-            format!("{line} {word}")
-        }
-    })
+    words.fold("isotherm-calibrate".to_owned(), |line, word| format!("{line} {}", quoted(&word)))
+}
+
+/// A word as a shell takes it for one and for nothing else.
+fn quoted(word: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "-_./=,:+@%".contains(letter);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_command_can_be_given_once_more() {
+        let words = ["a/b-1.mcap", "--axis=0,-1,0", "run (2).csv", "it's", "a&b", "*", ""].map(quoted);
+        let given = ["a/b-1.mcap", "--axis=0,-1,0", "'run (2).csv'", r"'it'\''s'", "'a&b'", "'*'", "''"];
+        assert_eq!(words, given);
+    }
 
     #[test]
     fn a_folder_has_the_digest_of_its_files_by_name() {

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::document::{Written, accelerometers};
 use crate::error::Error;
-use crate::numbers::{hull, real};
+use crate::numbers::{hull, places};
 use crate::report::{Report, alike, short};
 use terms::{HOURS, Term, terms, tree};
 
@@ -26,6 +26,14 @@ const USUAL: [f64; 2] = [-40.0, 60.0];
 const RANGE_DIGITS: f64 = 3.0;
 /// Ramps that the sums are shown on (°C/min).
 const RAMPS: [f64; 3] = [0.0, 1.0, -1.0];
+
+/// Arguments of terms: symbol, what the axis of a diagram is called, how headings of diagrams and of tables go on.
+const ARGUMENTS: [[&str; 4]; 4] = [
+    ["°C", "temperature", "temperature", "temperature (in brackets: clamped, outside the fitted range)"],
+    ["°C/s", "rate of temperature", "rate of temperature", "the temperature's rate"],
+    ["°C/s²", "acceleration of temperature", "its acceleration", "the temperature's acceleration"],
+    [HOURS, "time since turn-on", "time since turn-on", "the time since turn-on"],
+];
 
 /// Shows a document.
 ///
@@ -74,20 +82,8 @@ pub(crate) fn range_of(terms: &[Term]) -> [f64; 2] {
     hull(ranges).filter(|[low, high]| high > low).unwrap_or(USUAL)
 }
 
-/// So many places from one end to the other.
-pub(crate) fn places([low, high]: [f64; 2], count: usize) -> Vec<f64> {
-    let step = (high - low) / real(count.max(2) - 1);
-    (0..count).map(|index| low + step * real(index)).collect()
-}
-
 fn over_temperature(sheet: &mut Report, terms: &[Term], range: [f64; 2]) {
-    let headings = [
-        ("°C", "Over temperature (in brackets: clamped, outside the fitted range)"),
-        ("°C/s", "Over the temperature's rate"),
-        ("°C/s²", "Over the temperature's acceleration"),
-        (HOURS, "Over the time since turn-on"),
-    ];
-    for (argument, heading) in headings {
+    for [argument, .., words] in ARGUMENTS {
         let over = |term: &&Term| term.argument == argument && (term.range.is_some() || argument == "°C");
         let mine: Vec<&Term> = terms.iter().filter(over).collect();
         let own = hull(mine.iter().filter_map(|term| term.range)).unwrap_or_default();
@@ -101,7 +97,7 @@ fn over_temperature(sheet: &mut Report, terms: &[Term], range: [f64; 2]) {
             let cells = words.into_iter().zip(&values).map(cell);
             std::iter::once(format!("{}, {}", title(term), term.unit)).chain(cells).collect()
         };
-        sheet.table(heading, heads(&at, argument), mine.into_iter().map(row));
+        sheet.table(&format!("Over {words}"), heads(&at, argument), mine.into_iter().map(row));
     }
 }
 

@@ -30,7 +30,7 @@ impl Sigmas {
     }
 
     /// Enters standard errors; numbers that are not finite become 0, "not known".
-    pub fn put(&mut self, kind: &str, sensor: &str, term: &str, values: Vec<f64>) {
+    pub fn put(&mut self, (kind, sensor, term): (&str, &str, &str), values: Vec<f64>) {
         let values = values.into_iter().map(|sigma| if sigma.is_finite() { sigma } else { 0.0 }).collect();
         let of_kind = self.0.entry(kind.to_owned()).or_default();
         of_kind.entry(sensor.to_owned()).or_default().insert(term.to_owned(), values);
@@ -51,10 +51,18 @@ impl Sigmas {
         })
     }
 
+    /// Takes those out of the details of a document's origin that hold no longer.
+    pub fn retain(details: &mut Table, holds: impl Fn((&str, &str, &str)) -> bool) {
+        let (stated, mut kept) = (Self::of_details(details), Self::default());
+        stated.iter().filter(|(of, _)| holds(*of)).for_each(|(of, values)| kept.put(of, values.to_vec()));
+        details.remove(KEY);
+        kept.write(details);
+    }
+
     /// Adds them to the details of a document's origin, over those of the same that are there.
     pub fn write(&self, details: &mut Table) {
         let mut all = Self::of_details(details);
-        self.iter().for_each(|((kind, sensor, term), values)| all.put(kind, sensor, term, values.to_vec()));
+        self.iter().for_each(|(of, values)| all.put(of, values.to_vec()));
         if let (false, Ok(value)) = (self.0.is_empty(), Value::try_from(all)) {
             details.insert(KEY.to_owned(), value);
         }
@@ -72,8 +80,8 @@ mod tests {
         let mut document = Written::read(path.as_ref()).unwrap().document;
         assert_eq!(Sigmas::of(&document), Sigmas::default());
         let mut sigmas = Sigmas::default();
-        sigmas.put("accel", "x", "axis_arcsec", vec![0.5, 12.0, f64::NAN]);
-        sigmas.put("gyro", "z", "static_bias", vec![0.01]);
+        sigmas.put(("accel", "x", "axis_arcsec"), vec![0.5, 12.0, f64::NAN]);
+        sigmas.put(("gyro", "z", "static_bias"), vec![0.01]);
         let mut details = Table::new();
         details.insert("sigma".into(), Value::Integer(3));
         sigmas.write(&mut details);

@@ -1,5 +1,6 @@
 //! The lines of a terminal; one sentence for all gyros, or logs, that it holds of.
 
+use crate::numbers::grouped;
 use crate::report::counted;
 
 /// Lines of a terminal that a unit has at most: what an engineer decides by. The page and the JSON have the rest.
@@ -20,6 +21,7 @@ pub(crate) fn dozen(found: &[String], told: &[String], rest: &str) -> String {
 
 /// Sentences of gyros, each with the names of all that it holds of, in the order of the first.
 pub(crate) fn together(told: &[(&str, String)]) -> Vec<String> {
+    let told = told.iter().map(|(name, words)| (*name, words));
     grouped(told).into_iter().map(|(words, names)| format!("{}: {words}", gyros(&names))).collect()
 }
 
@@ -33,19 +35,8 @@ pub(crate) fn of_logs(told: &[(&str, String)]) -> Vec<String> {
         _ if names.len() > 1 => format!("{}, each", names.join(", ")),
         _ => names.join(", "),
     };
+    let told = told.iter().map(|(name, words)| (*name, words));
     grouped(told).into_iter().map(|(words, names)| format!("{}: {words}", logs(&names))).collect()
-}
-
-/// Sentences with the names of all that they hold of, in the order of the first.
-pub(crate) fn grouped<'a>(told: &'a [(&'a str, String)]) -> Vec<(&'a str, Vec<&'a str>)> {
-    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (name, words) in told {
-        match groups.iter_mut().find(|(of, _)| of == words) {
-            Some((_, names)) => names.push(name),
-            None => groups.push((words, vec![name])),
-        }
-    }
-    groups
 }
 
 /// "gyro x", "gyros x, y".

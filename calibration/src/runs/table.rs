@@ -13,7 +13,7 @@ use isotherm_log::offline::Loaded;
 use super::{Run, Troubles};
 use crate::error::Error;
 use crate::finding::Kind;
-use crate::numbers::{real, seconds};
+use crate::numbers::{Size, real, seconds};
 
 /// Flags of a tick that carries no reading of its own.
 const NOT_OWN: TickFlags = TickFlags::INTERPOLATED
@@ -254,6 +254,12 @@ impl Table {
         self.force_m_per_s2.get(axis).map_or(&[], Vec::as_slice)
     }
 
+    /// Mean specific force along the case axes (m/s²); `None` where an axis has no number.
+    pub fn mean_force(&self) -> Option<[f64; 3]> {
+        let sizes = [0, 1, 2].map(|axis| Size::of(self.force(axis)));
+        sizes.iter().all(|size| size.count > 0).then(|| sizes.map(|size| size.mean))
+    }
+
     /// Mean rate (°/h) over the rows whose middle lies in a window (s since the beginning).
     pub fn mean_rate_within(&self, [from_s, to_s]: [f64; 2]) -> [f64; 3] {
         let inside = || (0..self.len()).filter(|&row| (from_s..to_s).contains(&self.time_s[row]));
@@ -298,7 +304,6 @@ mod tests {
     use super::*;
     use crate::document::Written;
     use crate::fixture::simulated;
-    use crate::numbers::Size;
 
     #[test]
     fn windows_hold_the_mean_of_their_ticks() {
@@ -313,10 +318,13 @@ mod tests {
         let means = Table::of(&run, &written.loaded, 10.0).unwrap();
         let middles = [5.0, 15.0, 25.0, 35.0, 45.0, 55.0];
         assert!(means.time_s.iter().zip(middles).all(|(time, middle)| (time - middle).abs() < 1e-9));
-        for (axis, truth) in truth.iter().enumerate() {
-            let mean = Size::of(means.force(axis)).mean;
+        let force = means.mean_force().unwrap();
+        for (axis, (mean, truth)) in force.iter().zip(truth).enumerate() {
             assert!((mean - truth / 60.0).abs() < 0.02, "axis {axis}: {mean} {}", truth / 60.0);
         }
+        let mut without = means.clone();
+        without.force_m_per_s2[1].fill(f64::NAN);
+        assert_eq!(without.mean_force(), None, "it levels nothing");
         assert!(
             means
                 .temperature_deg_c

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use isotherm_calibration::document::Written;
 use isotherm_calibration::runs::Run;
+use isotherm_correction::sample::{CorrectedTick, SensorFlags};
+use isotherm_correction::units::{AngularRate, Span, Timestamp};
 use isotherm_log::message::{Message, Topic};
 use isotherm_log::offline::rows::{write_header, write_tick};
 use isotherm_log::offline::unit_id;
@@ -12,7 +14,7 @@ use isotherm_log::recording::{RecordingOptions, RecordingReader, RecordingWriter
 use isotherm_protocol::stream::UnitStream;
 use serde_json::Value;
 
-use crate::command::{calibrate, json, shipped, told};
+use crate::command::{calibrate, ended, json, shipped, told};
 use crate::simulated_logs::{fibre_optic, record, write_text};
 
 /// A recording of the simulated unit, and its ticks corrected as CSV and as a recording.
@@ -144,4 +146,50 @@ fn impact_sails_the_drift_of_a_log() {
     assert!(String::from_utf8_lossy(&short.stderr).contains("--calibration-hours"));
     let raw_alone = calibrate(&["impact", &raw, "--calibration-hours", "1"]);
     assert!(!raw_alone.status.success());
+}
+
+/// A log of corrected ticks with these rates (°/h), and a little noise where a gyro measures.
+fn at_rest(path: &str, rates_deg_per_h: [f64; 3], measures: [bool; 3]) {
+    let mut csv = Vec::new();
+    write_header(&mut csv).unwrap();
+    for sequence in 0..200 {
+        let noise = (sequence * 7 % 5) as f64 * 0.01 - 0.02;
+        let rate = |axis: usize| rates_deg_per_h[axis] + if measures[axis] { noise } else { 0.0 };
+        let tick = CorrectedTick {
+            sequence,
+            end_time: Timestamp::from_ns((sequence as i64 + 1) * 1_000_000_000),
+            duration: Span::from_ns(1_000_000_000),
+            ticks: 1,
+            delta_angle: [0, 1, 2].map(|axis| AngularRate::from_deg_per_h(rate(axis)).as_rad_per_s()),
+            gyro_flags: [SensorFlags::VALID; 3].into_iter().collect(),
+            ..CorrectedTick::default()
+        };
+        write_tick(&mut csv, &tick).unwrap();
+    }
+    std::fs::write(path, csv).unwrap();
+}
+
+#[test]
+fn starts_are_looked_at_before_their_means_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let [monday, tuesday, fast, turning, dead] =
+        ["monday.csv", "tuesday.csv", "fast.csv", "turning.csv", "dead.csv"].map(path);
+    at_rest(&monday, [10.0, 4.0, -12.0], [true; 3]);
+    at_rest(&tuesday, [10.02, 4.01, -12.03], [true; 3]);
+    at_rest(&fast, [10.02, 200.0, -12.03], [true; 3]);
+    at_rest(&turning, [10.0, 4.0, 30.0 * 3600.0], [true; 3]);
+    at_rest(&dead, [10.0, 4.0, 0.0], [true, true, false]);
+    let over = |other: &str| {
+        let starts = ["impact", "--start-log", &monday, "--start-log", other];
+        calibrate(&[&starts[..], &["--seeds", "1", "--hours", "1", "--json"]].concat())
+    };
+    let said = |other: &str| {
+        let report: Value = serde_json::from_slice(&over(other).stdout).unwrap();
+        let found = report["notes"].as_array().unwrap().iter().filter_map(Value::as_str);
+        let found: Vec<&str> = found.filter(|note| note.starts_with("Sigma of the constant")).collect();
+        format!("{:#}\n{}\n", report["warnings"], found.join("\n"))
+    };
+    let refused = [turning, dead].map(|other| ended(&over(&other)));
+    insta::assert_snapshot!([said(&tuesday), said(&fast), refused.concat()].concat());
 }

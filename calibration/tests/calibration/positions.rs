@@ -337,6 +337,10 @@ fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     squared.accel.as_mut().unwrap().sensor[1].set(Feature::ForceSquared, two);
     told.push(analyse(&own, &squared, &settings(plan.clone(), None)).unwrap_err().join("\n"));
     let mut rows = times(&plan, "room", &held);
+    let mut two = [own[0].clone(), own[0].clone()];
+    "cold".clone_into(&mut two[1].run);
+    let without_rows = settings(plan.clone(), Some(rows.clone()));
+    told.push(analyse(&two, &document.document, &without_rows).unwrap_err().join("\n"));
     let [start, end] = rows.rows[0].0;
     rows.rows.push(([0.5 * (start + end), end], rows.rows[0].1.clone(), None));
     told.push(analyse(&own, &document.document, &settings(plan.clone(), Some(rows))).unwrap_err().join("\n"));

@@ -18,6 +18,7 @@ mod scale;
 mod service;
 mod sparse;
 
+use clap::Parser;
 use isotherm_calibration::fits::thermal::bare::bare;
 use isotherm_calibration::fits::thermal::{Fitted, Method, Settings, Site, Stand, fit};
 use isotherm_calibration::report::Report;
@@ -30,6 +31,16 @@ use isotherm_simulator::Scenario;
 use isotherm_simulator::presets::{fibre_optic_chamber, judging_profile, paper_profile, training_profile};
 
 use crate::simulated_logs::{self, events};
+
+/// What the command asks for where nothing is said.
+fn usual() -> Settings {
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: Settings,
+    }
+    Line::parse_from(["thermal"]).settings
+}
 
 /// Length of a simulated tick (ns).
 const TICK_NS: i64 = 500_000_000;
@@ -57,7 +68,7 @@ fn settings(method: Method) -> Settings {
         method,
         stands: vec![Stand { site: Site::Known { place, force_m_per_s2: None }, turning: None }],
         window_s: Some(100.0),
-        ..Settings::default()
+        ..usual()
     }
 }
 

@@ -360,6 +360,17 @@ fn what_stays_in_the_document_is_not_found_once_more() {
     assert_eq!(with(&|gyro| gyro.set(Feature::LasingMode, flat(200.0))), "");
     assert_eq!(with(&|gyro| gyro.increment_weight_over_rate = Some(over_rate.clone())), "");
     assert_eq!(with(&|gyro| gyro.trend = Some(trend.clone())), "");
+    // What stays holds with the weight that was stated: it goes with the one that is found.
+    let mut heavy = plain.clone();
+    for gyro in &mut heavy.gyro.sensor {
+        gyro.increment_weight_rad_per_rad = Some(2.0);
+        gyro.set(Feature::LasingMode, flat(400.0));
+    }
+    let (weighed, _) = complete(&heavy, &tumble).unwrap();
+    for (gyro, weight) in weighed.gyro.sensor.iter().zip(tumble.gyro.as_ref().unwrap().weight) {
+        let term = gyro.terms.curve(Feature::LasingMode).unwrap().shape().at(25.0).unwrap();
+        assert!((term / (200.0 * weight) - 1.0).abs() < 1e-9, "{term} {weight}");
+    }
     // A drift that the poses do not show.
     let mut told = vec![with(&|gyro| gyro.set(Feature::ForceZ, flat(2000.0)))];
     let mut base = plain.clone();

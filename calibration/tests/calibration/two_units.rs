@@ -56,11 +56,16 @@ fn noise_and_drift_of_both_end_with_one_table() {
         of("new-FOG-0001.toml").gyro.sensor[0].drift.is_some()
             && Path::new(&path("drift-FOG-0001.html")).exists()
     );
+    // What is read is not replaced, though it may be.
+    std::fs::remove_file(&alone).unwrap();
+    let here = folder.path().to_str().unwrap();
+    all += &told(folder.path(), &["drift", &log, "--calibration", here, "--out", &out, "--overwrite"]);
     // Raw readings need no document; a unit without one does not stop the other.
-    assert_eq!(units(&json(&["drift", &log, "--json"])), UNITS);
+    let part = ["drift", &log, "--duration", "300"];
+    assert_eq!(units(&json(&[&part[..], &["--json"]].concat())), UNITS);
     std::fs::remove_file(&one).unwrap();
-    all += &told(folder.path(), &["drift", &log, "--calibration", &documents]);
-    all += &told(folder.path(), &["drift", &log, "--out", &out]);
+    all += &told(folder.path(), &[&part[..], &["--calibration", &documents]].concat());
+    all += &told(folder.path(), &[&part[..], &["--out", &out]].concat());
     insta::assert_snapshot!(all.replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
 

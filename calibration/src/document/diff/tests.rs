@@ -16,7 +16,7 @@ fn written(change: impl FnOnce(&mut Document)) -> Written {
 fn sigma(document: &mut Document, arcsec: f64) {
     let mut details = Table::new();
     let mut sigmas = Sigmas::default();
-    sigmas.put("accel", "x", "axis_arcsec", vec![0.0, arcsec, arcsec]);
+    sigmas.put(("accel", "x", "axis_arcsec"), vec![0.0, arcsec, arcsec]);
     sigmas.write(&mut details);
     document.origin.get_or_insert_default().details = Some(details);
 }
@@ -126,8 +126,8 @@ fn standard_errors_grow_away_from_the_temperature_that_a_curve_is_given_about() 
             });
             document.gyro.sensor[0].set(Feature::One, Curve::new(bias));
             let (mut details, mut sigmas) = (Table::new(), Sigmas::default());
-            sigmas.put("accel", "x", "axis_arcsec", vec![0.0, 3.0, 4.0]);
-            sigmas.put("gyro", "x", "static_bias", vec![0.6, 0.01]);
+            sigmas.put(("accel", "x", "axis_arcsec"), vec![0.0, 3.0, 4.0]);
+            sigmas.put(("gyro", "x", "static_bias"), vec![0.6, 0.01]);
             sigmas.write(&mut details);
             document.origin.get_or_insert_default().details = Some(details);
         })

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use isotherm_protocol::document::{Log, Origin};
 use toml::{Table, Value};
 
+use super::sections::of_sigma;
 use crate::document::provenance::{BASE, MOST_LOGS, base_of};
 use crate::document::show::terms::tree;
 use crate::document::{TOOL, Written, command_line};
@@ -56,19 +57,10 @@ pub(super) fn origin(
 fn sigmas(documents: &[&Written], from: &BTreeMap<String, String>) -> Sigmas {
     let mut sigmas = Sigmas::default();
     for document in documents {
-        for ((kind, sensor, term), values) in Sigmas::of(&document.document).iter() {
-            let key = match term {
-                "axis_arcsec" => format!("{kind}.orientation.rows"),
-                "increment_weight_ppm" => {
-                    let weight = format!("{kind}.sensor.{sensor}.increment_weight");
-                    let units = ["_rad_per_rad", "_arcsec_per_count"];
-                    let stated = units.map(|unit| format!("{weight}{unit}"));
-                    stated.into_iter().find(|key| from.contains_key(key)).unwrap_or_default()
-                }
-                term => format!("{kind}.sensor.{sensor}.{term}"),
-            };
+        for (of, values) in Sigmas::of(&document.document).iter() {
+            let key = of_sigma(of, |key| from.contains_key(key));
             if from.get(&key).is_some_and(|name| *name == document.name) {
-                sigmas.put(kind, sensor, term, values.to_vec());
+                sigmas.put(of, values.to_vec());
             }
         }
     }

@@ -20,8 +20,10 @@ pub(super) fn is_about(key: &str) -> bool {
 
 /// What is replaced together with a section.
 pub(super) fn group(key: &str) -> String {
-    let is_bias =
-        |terms: &[Term], key: &str| terms.iter().any(|term| term.key == key && term.makes == Makes::Bias);
+    // A drift with acceleration is one section with a term along each axis.
+    let is_bias = |terms: &[Term], key: &str| {
+        terms.iter().any(|term| term.makes == Makes::Bias && term.key.split('.').next() == Some(key))
+    };
     let together = match path(key)[..] {
         ["gyro", "sensor", _, term] if term == "trend" || is_bias(&GYRO_TERMS, term) => "bias",
         ["gyro", "sensor", _, term] if term.starts_with("increment_weight") => "weight",
@@ -31,6 +33,20 @@ pub(super) fn group(key: &str) -> String {
         _ => return key.to_owned(),
     };
     format!("{} {together}", key.rsplit_once('.').map_or("", |(of, _)| of))
+}
+
+/// The section that a standard error is of, as [`Sigmas`](crate::report::Sigmas) name it: by kind, sensor and what it is of.
+pub(crate) fn of_sigma((kind, sensor, of): (&str, &str, &str), has: impl Fn(&str) -> bool) -> String {
+    let of_sensor = format!("{kind}.sensor.{sensor}");
+    match of {
+        "axis_arcsec" => format!("{kind}.orientation.rows"),
+        "increment_weight_ppm" => {
+            let stated = ["rad_per_rad", "arcsec_per_count"];
+            let stated = stated.map(|unit| format!("{of_sensor}.increment_weight_{unit}"));
+            stated.into_iter().find(|key| has(key)).unwrap_or_default()
+        }
+        term => format!("{of_sensor}.{}", term.split('.').next().unwrap_or_default()),
+    }
 }
 
 /// The parts of a key; the name of a sensor or a channel is one, and may have dots.

@@ -24,6 +24,14 @@ fn bias(value: f64) -> impl FnOnce(&mut Document) {
     move |document| document.gyro.sensor[0].set(Feature::One, constant(value))
 }
 
+/// The same with a drift with acceleration.
+fn drifts(value: f64) -> impl FnOnce(&mut Document) {
+    move |document| {
+        bias(value)(document);
+        document.gyro.sensor[0].set(Feature::ForceX, constant(0.1 * value));
+    }
+}
+
 fn from<'a>(merged: &'a Merged, key: &str) -> &'a str {
     merged.taken.iter().find(|(taken, _)| taken == key).map_or("", |(_, from)| from)
 }
@@ -46,8 +54,10 @@ fn parts_made_from_one_base_go_together() {
         document.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 1e-5, 0.0];
         let mut details = toml::Table::new();
         let mut sigmas = Sigmas::default();
-        sigmas.put("accel", "x", "axis_arcsec", vec![0.0, 4.0, 4.0]);
-        sigmas.put("gyro", "x", "static_bias", vec![9.0]);
+        sigmas.put(("accel", "x", "axis_arcsec"), vec![0.0, 4.0, 4.0]);
+        sigmas.put(("gyro", "x", "static_bias"), vec![9.0]);
+        document.gyro.sensor[1].set(Feature::ForceX, constant(3.0));
+        sigmas.put(("gyro", "y", "acceleration_sensitive_drift.x"), vec![0.1]);
         sigmas.write(&mut details);
         document.origin.get_or_insert_default().details = Some(details);
     });
@@ -74,6 +84,7 @@ fn parts_made_from_one_base_go_together() {
     let sigmas = Sigmas::of(document);
     assert_eq!(sigmas.get("accel", "x", "axis_arcsec"), Some([0.0, 4.0, 4.0].as_slice()));
     assert_eq!(sigmas.get("gyro", "x", "static_bias"), None);
+    assert_eq!(sigmas.get("gyro", "y", "acceleration_sensitive_drift.x"), Some([0.1].as_slice()));
     // All of the base that nobody touched is there as it was.
     let mut back = document.clone();
     back.origin.clone_from(&base.document.origin);
@@ -81,6 +92,7 @@ fn parts_made_from_one_base_go_together() {
     let mut expected = base.document.clone();
     bias(7.0)(&mut expected);
     expected.accel.as_mut().unwrap().orientation.rows[0] = [1.0, 1e-5, 0.0];
+    expected.gyro.sensor[1].set(Feature::ForceX, constant(3.0));
     assert_eq!(back, expected);
 }
 
@@ -230,19 +242,19 @@ fn a_part_of_a_document_that_is_not_given_takes_nothing_back_without_a_word() {
 
 #[test]
 fn a_bias_goes_with_the_weight_that_is_taken() {
-    let base = named("base.toml", bias(100.0));
+    let base = named("base.toml", drifts(100.0));
     let weight = base.document.gyro.sensor[0].increment_weight_rad_per_rad.unwrap();
     let heavier = |document: &mut Document| {
-        bias(100.0)(document);
+        drifts(100.0)(document);
         reweigh(&mut document.gyro.sensor[0], 1.01 * weight);
     };
     let before = |document: &mut Document| {
         heavier(document);
-        bias(100.0)(document);
+        drifts(100.0)(document);
     };
-    let thermal = named("thermal.toml", bias(200.0));
+    let thermal = named("thermal.toml", drifts(200.0));
     let of_thermal = |document: &mut Document| {
-        bias(200.0)(document);
+        drifts(200.0)(document);
         reweigh(&mut document.gyro.sensor[0], 1.01 * weight);
     };
     for (rates, others, wanted) in [
@@ -256,7 +268,8 @@ fn a_bias_goes_with_the_weight_that_is_taken() {
         let merged = merge(&base, &parts, &[]).unwrap();
         let gyro = &merged.written.document.gyro.sensor[0];
         let value = gyro.terms.curve(Feature::One).unwrap().shape().at(20.0).unwrap();
-        assert!((value / wanted - 1.0).abs() < 1e-9, "{value}");
+        let by_force = gyro.terms.curve(Feature::ForceX).unwrap().shape().at(20.0).unwrap();
+        assert!((value / wanted - 1.0).abs() < 1e-9 && (by_force / value - 0.1).abs() < 1e-9, "{value}");
         assert_eq!((merged.notes.len(), merged.warnings.len()), (1, 0), "{:?}", merged.notes);
     }
 }
@@ -305,7 +318,7 @@ fn an_output_of_two_fits_is_warned_of_and_a_weight_has_the_error_of_its_document
             gyro.increment_weight_over_rate = None;
             gyro.set(Feature::RateMagnitude, constant(30.0));
             let (mut details, mut sigmas) = (toml::Table::new(), Sigmas::default());
-            sigmas.put("gyro", "x", "increment_weight_ppm", vec![ppm]);
+            sigmas.put(("gyro", "x", "increment_weight_ppm"), vec![ppm]);
             sigmas.write(&mut details);
             document.origin.get_or_insert_default().details = Some(details);
         }

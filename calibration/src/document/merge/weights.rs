@@ -12,7 +12,7 @@ use crate::document::{reweigh, tidy, weight};
 use crate::error::Error;
 
 /// The sections of a document with the increment weights of another one of the same gyros.
-pub(super) fn stated(document: &Document, other: &Document) -> Result<Sections, Error> {
+pub(crate) fn stated(document: &Document, other: &Document) -> Result<Sections, Error> {
     Ok(sections(tree(&with(document, other))?))
 }
 

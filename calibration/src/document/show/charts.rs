@@ -2,10 +2,10 @@
 
 use isotherm_pages::{Axis, Chart, Ink, Panel, Series};
 
-use super::terms::{HOURS, Term};
-use super::{Sum, places, ramp_words, settled, spoken, steady, sums};
+use super::terms::Term;
+use super::{ARGUMENTS, Sum, ramp_words, settled, spoken, steady, sums};
 use crate::document::Written;
-use crate::numbers::{ARCSEC_PER_RAD, Size, once_each};
+use crate::numbers::{ARCSEC_PER_RAD, Size, once_each, places};
 use crate::report::Report;
 
 /// Points of a curve.
@@ -18,13 +18,9 @@ pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], rang
     let sums = sum_panels(written, range);
     let caption =
         format!("All terms together, {}, all channels at one temperature.", settled([&written.document]));
-    add(sheet, "Bias in all", &caption, "°C", sums);
-    for (argument, label) in [
-        ("°C", "temperature"),
-        ("°C/s", "rate of temperature"),
-        ("°C/s²", "its acceleration"),
-        (HOURS, "time since turn-on"),
-    ] {
+    let temperature = || Axis::of("temperature", "°C");
+    sheet.chart("Bias in all", Chart::of(caption, temperature(), sums));
+    for [argument, label, words, _] in ARGUMENTS {
         for (kind, sensors) in [("gyro", "Gyros"), ("accel", "Accelerometers")] {
             let mine: Vec<&Term> =
                 terms.iter().filter(|term| term.kind == kind && term.argument == argument).collect();
@@ -41,27 +37,13 @@ pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], rang
                 let unit = of_name.first().map_or("", |term| term.unit.as_str());
                 Panel::of(spoken(name), unit, HEIGHT, curves.collect())
             });
-            let heading = format!("{sensors} over {label}");
-            add(sheet, &heading, "Each term over its fitted range.", argument, panels.collect());
+            let heading = format!("{sensors} over {words}");
+            let axis = Axis::of(label, argument);
+            sheet.chart(&heading, Chart::of("Each term over its fitted range.", axis, panels.collect()));
         }
     }
-    add(
-        sheet,
-        "Input axes",
-        "Turn of each input axis from the middle of the range.",
-        "°C",
-        axes(written, range),
-    );
-}
-
-fn add(sheet: &mut Report, heading: &str, caption: &str, unit: &str, panels: Vec<Panel>) {
-    let label = match unit {
-        "°C" => "temperature",
-        "°C/s" => "rate of temperature",
-        HOURS => "time since turn-on",
-        _ => "acceleration of temperature",
-    };
-    sheet.chart(heading, Chart::of(caption, Axis::of(label, unit), panels));
+    let caption = "Turn of each input axis from the middle of the range.";
+    sheet.chart("Input axes", Chart::of(caption, temperature(), axes(written, range)));
 }
 
 /// Biases in all; those that are constant stand in the table.

@@ -236,7 +236,7 @@ impl Made {
         let mut sigmas = Sigmas::default();
         for (sensor, ratio) in self.each() {
             let ppm = std::iter::once(0.0).chain(ratio.sigmas.iter().map(|sigma| tidy(1e6 * sigma)));
-            sigmas.put("accel", &sensor.name, "board_ratio_error", ppm.collect());
+            sigmas.put(("accel", &sensor.name, "board_ratio_error"), ppm.collect());
         }
         sigmas
     }

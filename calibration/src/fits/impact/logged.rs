@@ -22,7 +22,7 @@ const SHORTEST_H: f64 = 1.0;
 /// The mean over the calibration is taken out: on a bench it holds the Earth's rate, and the calibration finds it.
 ///
 /// # Errors
-/// [`Error::Refused`] where the log is too short, has gaps, or not three gyros, and as [`checks::at_rest`].
+/// [`Error::Refused`] where the log is too short or has gaps, and as [`sound`].
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -33,12 +33,6 @@ pub fn drift(
     voyage: &mut Voyage,
     otherwise: &str,
 ) -> Result<(Drift, Vec<String>), Error> {
-    if columns.values.len() != 3 {
-        return Err(Error::refused(format!(
-            "the log has {} gyros, the platform three: give corrected ticks, which are along three axes",
-            columns.values.len()
-        )));
-    }
     let (Some(first), Some(last)) = (columns.end_ns.first().copied(), columns.end_ns.last().copied()) else {
         return Err(Error::refused("the log has no ticks".to_owned()));
     };
@@ -50,18 +44,7 @@ pub fn drift(
             voyage.calibration_h
         )));
     }
-    let spacing = Spacing::of(&columns.end_ns)?;
-    let mut notes = std::mem::take(&mut columns.notes);
-    notes.extend(checks::at_rest(columns, &spacing)?);
-    notes.extend(checks::missing(&spacing, columns.end_ns.len()));
-    let looked = columns.names.iter().zip(&columns.values);
-    let fault = |(name, column): (&String, &Vec<f64>)| {
-        Some(format!("gyro {name}: {}", Fault::of(column)?.words("sensor", 1)))
-    };
-    let bad: Vec<String> = looked.filter_map(fault).collect();
-    if !bad.is_empty() {
-        return Err(Error::Refused(bad));
-    }
+    let mut notes = sound(columns)?;
     if length_h < voyage.calibration_h + voyage.hours {
         let left = ((length_h - voyage.calibration_h) * 60.0).floor() / 60.0;
         notes.push(format!("The log ends after {left:.1} h of the voyage of {} h.", voyage.hours));
@@ -101,6 +84,29 @@ pub fn drift(
         held.iter_mut().zip(tick).for_each(|(sum, value)| *sum += value / real(hour.len()));
     }
     Ok((Drift { measured: truth.clone(), truth, held }, notes))
+}
+
+/// What is to be said of a log at rest whose gyros are the platform's; readings far beyond the noise are left out of it.
+///
+/// # Errors
+/// [`Error::Refused`] where it has not three gyros, or one of them does not measure, and as [`Spacing::of`] and [`checks::at_rest`].
+pub fn sound(columns: &mut Columns) -> Result<Vec<String>, Error> {
+    if columns.values.len() != 3 {
+        return Err(Error::refused(format!(
+            "the log has {} gyros, the platform three: give corrected ticks, which are along three axes",
+            columns.values.len()
+        )));
+    }
+    let spacing = Spacing::of(&columns.end_ns)?;
+    let mut notes = std::mem::take(&mut columns.notes);
+    notes.extend(checks::at_rest(columns, &spacing)?);
+    notes.extend(checks::missing(&spacing, columns.end_ns.len()));
+    let looked = columns.names.iter().zip(&columns.values);
+    let fault = |(name, column): (&String, &Vec<f64>)| {
+        Some(format!("gyro {name}: {}", Fault::of(column)?.words("sensor", 1)))
+    };
+    let bad: Vec<String> = looked.filter_map(fault).collect();
+    if bad.is_empty() { Ok(notes) } else { Err(Error::Refused(bad)) }
 }
 
 /// Straight lines over what is missing, or where and how long a gap is that is too long.

@@ -14,7 +14,7 @@ use cutter::Cutter;
 
 use crate::document::Written;
 use crate::error::Error;
-use crate::numbers::real;
+use crate::numbers::{mean_if_any, real};
 use crate::runs::{Run, Troubles};
 
 /// Largest power of temperature that is tried.
@@ -160,8 +160,7 @@ pub fn gather(runs: &[Run], bare: &Document, group: [usize; 3], cut: Cut) -> Res
 
 /// Mean of the channels that an orientation follows (°C), each by its name; no number where none has one.
 pub(crate) fn temperature(thermal: &OrientationThermal, of: impl Fn(&str) -> Option<f64>) -> f64 {
-    let known = thermal.channels.iter().filter_map(|name| of(name)).filter(|deg_c| deg_c.is_finite());
-    let (sum, count) = known.fold((0.0, 0.0), |(sum, count), deg_c| (sum + deg_c, count + 1.0));
     let [low, high] = thermal.range_deg_c;
-    if count > 0.0 { (sum / count).clamp(low, high) } else { f64::NAN }
+    let mean = mean_if_any(thermal.channels.iter().filter_map(|name| of(name)));
+    mean.map_or(f64::NAN, |deg_c| deg_c.clamp(low, high))
 }

@@ -1,13 +1,12 @@
 //! The constants on their way into a document.
 
 use isotherm_correction::thermal::Feature;
-use isotherm_correction::units::Angle;
 use isotherm_protocol::document::{Curve, Document, GyroSensor, ModeReversal, Servo, ServoKind, Shape, Unit};
 use serde_json::{Value, json};
 
 use super::fit::{Made, ServoFit};
 use super::model::{FITTED, GyroFit, MEANDER_REFERENCE_DEG_C, key};
-use crate::document::{about, by_name, rows, tidy};
+use crate::document::{about, by_name, rows, tidy, turned};
 use crate::numbers::unit;
 use crate::report::{Sigmas, gyros as gyros_in_words};
 
@@ -143,15 +142,9 @@ pub fn count_arcsec(document: &Document, sensor: usize) -> f64 {
 /// Input axis of a gyro at a temperature; at its reference where that is no number.
 pub fn row(document: &Document, sensor: usize, deg_c: f64) -> [f64; 3] {
     let orientation = &document.gyro.orientation;
-    let mut row = unit(orientation.rows.get(sensor).copied().unwrap_or_default());
-    if let Some(thermal) = orientation.thermal.as_ref().filter(|_| deg_c.is_finite()) {
-        let slopes = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
-        let away = deg_c - thermal.reference_deg_c;
-        for (element, slope) in row.iter_mut().zip(slopes) {
-            *element += Angle::from_arcsec(slope).as_rad() * away;
-        }
-    }
-    row
+    let row = unit(orientation.rows.get(sensor).copied().unwrap_or_default());
+    let turned = turned(orientation.thermal.as_ref(), sensor, deg_c);
+    [0, 1, 2].map(|element| row[element] + turned[element])
 }
 
 /// Standard errors of the terms.
@@ -165,7 +158,7 @@ pub fn sigmas(made: &Made) -> Sigmas {
             let of_term: Vec<f64> =
                 own.map(|one| if is_kept(one.power) { 0.0 } else { tidy(one.sigma) }).collect();
             if !of_term.is_empty() {
-                sigmas.put("gyro", &sensor.name, key(term), of_term);
+                sigmas.put(("gyro", &sensor.name, key(term)), of_term);
             }
         }
     }

@@ -6,8 +6,8 @@ use isotherm_protocol::document::Document;
 
 use crate::error::Error;
 use crate::fits::drift::pieces::checks::frozen;
-use crate::numbers::{ends, median, once_each};
-use crate::report::{grouped, short};
+use crate::numbers::{ends, grouped, median, once_each};
+use crate::report::short;
 use crate::runs::Run;
 use crate::runs::series::Channel;
 
@@ -89,9 +89,9 @@ pub(super) fn freezing(runs: &[Run], document: &Document) -> Result<Vec<String>,
             told.push((&channel.name, words));
         }
     }
-    let sentence = |(words, names): (&str, Vec<&str>)| {
+    let sentence = |(words, names): (String, Vec<&str>)| {
         let [channel, each] = if names.len() == 1 { ["channel", ""] } else { ["channels", "each "] };
         format!("temperature {channel} {}: {each}{words}", names.join(", "))
     };
-    Ok(grouped(&told).into_iter().map(sentence).collect())
+    Ok(grouped(told).into_iter().map(sentence).collect())
 }

@@ -6,17 +6,17 @@ use super::fit::{Analysis, Settings};
 use super::judged::Judgement;
 use super::solve::Fit;
 use crate::axes::{AXES, across};
-use crate::numbers::{ARCSEC_PER_RAD, norm};
+use crate::numbers::{ARCSEC_PER_RAD, norm, places};
 use crate::report::bars;
 
 /// Points of a curve over temperature.
-const POINTS: u32 = 60;
+const POINTS: usize = 61;
 
 /// Largest distance between the quadratic and the linear C over the range (rad).
 pub fn bend(analysis: &Analysis) -> f64 {
     let Some((quadratic, ..)) = &analysis.quadratic else { return 0.0 };
     let mut largest: f64 = 0.0;
-    for deg_c in over(analysis) {
+    for deg_c in places(analysis.range_deg_c, POINTS) {
         let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
         for (bent, straight) in quadratic.sensors.iter().zip(&analysis.fit.sensors) {
             let (a, b) = (at(&bent.axis, x), at(&straight.axis, x));
@@ -24,12 +24,6 @@ pub fn bend(analysis: &Analysis) -> f64 {
         }
     }
     largest
-}
-
-/// Temperatures over the range.
-fn over(analysis: &Analysis) -> Vec<f64> {
-    let [low, high] = analysis.range_deg_c;
-    (0..=POINTS).map(|k| low + (high - low) * f64::from(k) / f64::from(POINTS)).collect()
 }
 
 /// A row of C at a scaled temperature.
@@ -74,7 +68,7 @@ pub(super) fn axes_chart(analysis: &Analysis, names: &[String]) -> Chart {
                 let x = (deg_c - analysis.reference_deg_c) / analysis.half_deg_c;
                 (deg_c, at(&fit.sensors[index].axis, x)[i] * ARCSEC_PER_RAD)
             };
-            over(analysis).into_iter().map(value).collect()
+            places(analysis.range_deg_c, POINTS).into_iter().map(value).collect()
         };
         let known = by_level(analysis, (index, i)).into_iter();
         let known: Vec<(f64, [f64; 2])> = known.filter_map(|(deg_c, found)| Some((deg_c, found?))).collect();

@@ -6,7 +6,7 @@ use isotherm_protocol::document::{AccelSensor, Curve, Document, OrientationTherm
 
 use super::fit::Analysis;
 use super::model::Sensor;
-use crate::document::{accel_name, accelerometers, scale_at, tidy};
+use crate::document::{accel_name, accelerometers, scale_at, tidy, turned};
 use crate::numbers::{ends, hull, mean, unit};
 
 /// Room around the temperatures that were taken (°C), for the stand's chamber does not meet them to the degree.
@@ -135,15 +135,9 @@ fn orient(accel: &mut isotherm_protocol::document::Accel, analysis: &Analysis, s
         });
         return;
     }
-    let old = |sensor: usize| {
-        let Some(thermal) = &orientation.thermal else { return [0.0; 3] };
-        let [low, high] = thermal.range_deg_c;
-        let away = analysis.slopes_deg_c.max(low).min(high) - thermal.reference_deg_c;
-        let slope = thermal.slopes_arcsec_per_deg_c.get(sensor).copied().unwrap_or_default();
-        slope.map(|c| Angle::from_arcsec(c * away).as_rad())
-    };
     let at_reference = |(index, of)| {
-        let (found, turned) = (axis(of, 0), old(index));
+        let found = axis(of, 0);
+        let turned = turned(orientation.thermal.as_ref(), index, analysis.slopes_deg_c);
         let row = [0, 1, 2].map(|i| found[i] - turned[i]);
         unit(row).map(tidy)
     };

@@ -14,8 +14,8 @@ use crate::axes::{AXES, sensor_name, several};
 use crate::document::scale_at;
 use crate::lsq::linear;
 use crate::lsq::nonlinear::NoSolution;
-use crate::numbers::{ARCSEC_PER_RAD, mean, once_each, real};
-use crate::report::{counted, grouped, short};
+use crate::numbers::{ARCSEC_PER_RAD, grouped, mean, once_each, real};
+use crate::report::{counted, short};
 
 /// Fewest positions that tell the stand's errors from the axes.
 pub const GOOD_POSITIONS: usize = 9;
@@ -75,9 +75,8 @@ pub(super) fn reordered(plan: &Plan, poses: &[(Pose, usize)], names: &[String]) 
         let others = if more > 0 { format!(" and {more} more") } else { String::new() };
         (!words.is_empty()).then(|| (log.as_str(), words[..words.len() - more].join(", ") + &others))
     });
-    let told: Vec<(&str, String)> = told.collect();
-    let alike = grouped(&told).into_iter();
-    alike
+    grouped(told)
+        .into_iter()
         .map(|(words, runs)| {
             format!("{}: positions in another order than the plan's: {words}", faults::logs(&runs))
         })

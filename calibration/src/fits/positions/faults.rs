@@ -3,7 +3,8 @@
 use super::pose::Pose;
 use super::track::Track;
 use crate::axes::{each, sensor_name};
-use crate::report::{counted, grouped, six};
+use crate::numbers::grouped;
+use crate::report::{counted, six};
 use crate::runs::faults::{self, Fault};
 
 /// Sensors of runs that read the same in every tick, the same as another one, or too often nothing: what is wrong and what to do.
@@ -18,7 +19,7 @@ pub fn dead(tracks: &[Track]) -> Vec<String> {
             told.extend(faults.into_iter().map(|words| (track.run.as_str(), words)));
         }
     }
-    grouped(&told).into_iter().map(|(words, runs)| format!("{}: {words}", logs(&runs))).collect()
+    grouped(told).into_iter().map(|(words, runs)| format!("{}: {words}", logs(&runs))).collect()
 }
 
 /// Names of logs, of many only the first.

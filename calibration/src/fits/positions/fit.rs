@@ -312,12 +312,7 @@ pub fn positions(tracks: &[Track], settings: &Settings) -> Result<Found, Vec<Str
     let poses: Vec<&Pose> = found.iter().map(|(pose, _)| pose).collect();
     reasons.extend(faults::clipped(tracks, &poses));
     if reasons.is_empty() && found.is_empty() {
-        let runs: Vec<&str> = tracks.iter().map(|track| track.run.as_str()).collect();
-        reasons.push(if settings.times.is_some() {
-            format!("no row of --times is of {}: the column log has the file's name", runs.join(", "))
-        } else {
-            "no position of the plan was found: is it the right --plan?".to_owned()
-        });
+        reasons.push("no position of the plan was found: is it the right --plan?".to_owned());
     }
     if reasons.is_empty() { Ok(Found { poses: found, others, warnings }) } else { Err(reasons) }
 }

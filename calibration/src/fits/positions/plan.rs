@@ -206,6 +206,7 @@ mod tests {
         for (name, text, word) in [
             ("b.csv", "a,b\n", "column \"a\""),
             ("c.csv", "name,axis_1_deg,axis_2_deg\nYa,0\n", "line 2"),
+            ("f.csv", "name,axis_1_deg,name\nYa,0,Za\n", "column \"name\" is given twice"),
             ("d.toml", "[[position]]\nname = \"Ya\"\n", "needs axis_1_deg"),
             ("e.toml", "axis_1 = \"y\"\naxis_2 = \"y\"\nposition = []\n", "two of x, y, z"),
         ] {

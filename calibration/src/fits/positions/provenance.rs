@@ -74,11 +74,11 @@ pub fn sigmas(document: &Document, analysis: &Analysis, settings: &Settings) -> 
             };
             (from..from + own).map(sigma).collect()
         };
-        sigmas.put("accel", &sensor.name, "scale_factor", of(0, 1.0 / settings.gravity));
-        sigmas.put("accel", &sensor.name, "bias", of(own, 1.0));
+        sigmas.put(("accel", &sensor.name, "scale_factor"), of(0, 1.0 / settings.gravity));
+        sigmas.put(("accel", &sensor.name, "bias"), of(own, 1.0));
         let axis = fit.axis_sigma(index, 0);
         let arcsec = axis.map(|sigma| tidy(sigma * ARCSEC_PER_RAD * analysis.widened));
-        sigmas.put("accel", &sensor.name, "axis_arcsec", arcsec.to_vec());
+        sigmas.put(("accel", &sensor.name, "axis_arcsec"), arcsec.to_vec());
     }
     sigmas
 }

@@ -57,6 +57,10 @@ impl Times {
         let mut found = Vec::new();
         let own = |log: &Option<String>| log.as_ref().is_none_or(|log| *log == track.run);
         let rows = || self.rows.iter().filter(|(.., log)| own(log)).enumerate();
+        if rows().next().is_none() {
+            reasons
+                .push(format!("no row of --times is of {}: the column log has the file's name", track.run));
+        }
         for (at, (span, name, _)) in rows() {
             let [start, end] = *span;
             let overlaps = |[from, to]: [f64; 2]| from < end - 1e-9 && start < to - 1e-9;

@@ -7,6 +7,7 @@ use isotherm_protocol::document::{Document, OrientationThermal};
 use crate::document::Written;
 use crate::error::Error;
 use crate::fits::modes::cells::{along_input_axes, groups, temperature};
+use crate::numbers::mean_if_any;
 use crate::runs::table::{Rows, Table, Takes};
 use crate::runs::{Run, Troubles};
 
@@ -92,7 +93,7 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3]) -> Result<Binned,
         let own = |row: usize| {
             temperature(thermal, |name| table.temperature_deg_c.get(name).map(|column| column[row]))
         };
-        mean((0..table.len()).map(own))
+        mean_if_any((0..table.len()).map(own))
     };
     let (mut velocity, mut felt_s) = ([0.0; 3], 0.0);
     for (bin, seconds) in bins.iter().zip(force_s) {
@@ -106,18 +107,10 @@ fn of_group(run: &Run, document: &Document, group: [usize; 3]) -> Result<Binned,
         channels_deg_c: table
             .temperature_deg_c
             .iter()
-            .filter_map(|(name, column)| Some((name.clone(), mean(column.iter().copied())?)))
+            .filter_map(|(name, column)| Some((name.clone(), mean_if_any(column.iter().copied())?)))
             .collect(),
-        temperature_deg_c: mean(table.temperature_deg_c.values().flatten().copied()),
+        temperature_deg_c: mean_if_any(table.temperature_deg_c.values().flatten().copied()),
         troubles: table.troubles,
         bins,
     })
-}
-
-/// Mean of what is a number; `None` without any.
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values
-        .filter(|value| value.is_finite())
-        .fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-    (count > 0.0).then(|| sum / count)
 }

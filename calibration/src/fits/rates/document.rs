@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::fit::Made;
 use super::model::GyroRates;
-use crate::document::{by_name, constant, reweigh, rows, tidy, weight};
+use crate::document::{by_name, constant, reweigh, rows, tidy, turned, weight};
 use crate::finding::Kind;
 use crate::numbers::unit;
 use crate::report::Sigmas;
@@ -40,12 +40,7 @@ pub fn fitted(
             }
         }
         if let (Some(axis), Some(row)) = (found.axis, document.gyro.orientation.rows.get_mut(sensor)) {
-            let turned = thermal.as_ref().and_then(|thermal| {
-                let away = deg_c? - thermal.reference_deg_c;
-                let slopes = thermal.slopes_arcsec_per_deg_c.get(sensor)?;
-                Some(slopes.map(|slope| Angle::from_arcsec(slope).as_rad() * away))
-            });
-            let turned = turned.unwrap_or_default();
+            let turned = turned(thermal.as_ref(), sensor, deg_c.unwrap_or(f64::NAN));
             let at_reference = [0, 1, 2].map(|element| axis[element] - turned[element]);
             *row = unit(at_reference).map(tidy);
         }
@@ -59,13 +54,13 @@ pub fn sigmas(made: &Made) -> Sigmas {
     for (sensor, found) in made.written.document.gyro.sensor.iter().zip(&made.gyros) {
         let Ok(found) = found else { continue };
         let ppm = tidy(1e6 * found.gain[1] / found.gain[0].abs());
-        sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        sigmas.put(("gyro", &sensor.name, "increment_weight_ppm"), vec![ppm]);
         if let Some([_, sigma]) = found.weight_asymmetry_ppm() {
-            sigmas.put("gyro", &sensor.name, "increment_weight_asymmetry", vec![tidy(sigma)]);
+            sigmas.put(("gyro", &sensor.name, "increment_weight_asymmetry"), vec![tidy(sigma)]);
         }
         if found.axis.is_some() {
             let arcsec = found.axis_sigma.map(|sigma| tidy(Angle::from_rad(sigma).as_arcsec()));
-            sigmas.put("gyro", &sensor.name, "axis_arcsec", arcsec.to_vec());
+            sigmas.put(("gyro", &sensor.name, "axis_arcsec"), arcsec.to_vec());
         }
     }
     sigmas

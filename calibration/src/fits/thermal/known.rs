@@ -58,9 +58,12 @@ pub(super) fn histories(
     let mut known = BTreeMap::new();
     let mut refusals = Vec::new();
     for name in names {
-        if samples.iter().any(|run| run.temperatures.get(name).is_none_or(Vec::is_empty)) {
+        let without = samples.iter().filter(|run| run.temperatures.get(name).is_none_or(Vec::is_empty));
+        let without: Vec<&str> = without.map(|run| run.name.as_str()).collect();
+        if !without.is_empty() {
             refusals.push(format!(
-                "a run has no readings of temperature channel {name:?}, which the document's sensors follow"
+                "{}: no readings of temperature channel {name:?}, which the document's sensors follow: check its name in the mapping",
+                without.join(", ")
             ));
             continue;
         }

@@ -61,19 +61,6 @@ pub struct Settings {
     pub smoothing_s: Option<f64>,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            method: Method::Joint,
-            terms: Terms::Auto,
-            stands: Vec::new(),
-            fit_window_s: 10.0,
-            window_s: None,
-            smoothing_s: None,
-        }
-    }
-}
-
 impl Settings {
     /// How the unit stands in a run: those of the fit are counted first, then those that judge.
     pub fn stand(&self, run: usize) -> Stand {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::units::{Angle, AngularRate};
+use isotherm_correction::units::AngularRate;
 use isotherm_protocol::document::{Document, Orientation};
 
 use super::fit::Sensor;
@@ -11,9 +11,10 @@ use super::samples::Samples;
 use super::scale::{Kept, smoothed, told};
 use super::select::{Target, equal_temperature};
 use super::stand::{Site, Stand};
-use crate::document::Written;
+use crate::document::{Written, turned};
 use crate::error::Error;
-use crate::numbers::{Size, dot, real};
+use crate::fits::modes::cells::temperature;
+use crate::numbers::{Size, dot};
 use crate::report::Rest;
 use crate::runs::Run;
 use crate::runs::table::{Table, earth_rate};
@@ -31,9 +32,7 @@ pub(super) fn rest(run: &Run, document: &Document, stand: &Stand) -> Result<Rest
     let mean_force = match force_m_per_s2 {
         Some(force) => Some(*force),
         None if document.accel.is_some() => {
-            let means = Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S))?;
-            let mean = |axis: usize| Size::of(means.force(axis)).mean;
-            Some([mean(0), mean(1), mean(2)])
+            Table::of(run, &Written::compiled(document)?, stand.window_s(LEVELLING_S))?.mean_force()
         }
         None => None,
     };
@@ -149,17 +148,11 @@ pub(super) fn target(
 /// Input axis of a sensor in each window of a run, turned with temperature as the document says.
 pub(crate) fn axes<P>(orientation: &Orientation<P>, sensor: usize, run: &Samples) -> Vec<[f64; 3]> {
     let row = orientation.rows.get(sensor).copied().unwrap_or_default();
-    let thermal = orientation.thermal.as_ref();
-    let slopes = thermal.and_then(|thermal| Some((thermal, thermal.slopes_arcsec_per_deg_c.get(sensor)?)));
-    let Some((thermal, slopes)) = slopes else { return vec![row; run.time_s.len()] };
-    let slopes = slopes.map(|slope| Angle::from_arcsec(slope).as_rad());
-    let channels: Vec<&Vec<f64>> = thermal.channels.iter().filter_map(|name| run.deg_c.get(name)).collect();
     let at = |window: usize| {
-        let count = real(channels.len());
-        let mean = channels.iter().filter_map(|column| column.get(window)).sum::<f64>() / count;
-        let [low, high] = thermal.range_deg_c;
-        let away = if mean.is_finite() { mean.clamp(low, high) - thermal.reference_deg_c } else { 0.0 };
-        [0, 1, 2].map(|axis| row[axis] + slopes[axis] * away)
+        let Some(thermal) = &orientation.thermal else { return row };
+        let deg_c = temperature(thermal, |name| run.deg_c.get(name)?.get(window).copied());
+        let turned = turned(Some(thermal), sensor, deg_c);
+        [0, 1, 2].map(|axis| row[axis] + turned[axis])
     };
     (0..run.time_s.len()).map(at).collect()
 }

@@ -10,7 +10,7 @@ use super::fit::odd::odd;
 use super::fit::{Tumble, faults};
 use super::gyro::GyroFit;
 use crate::axes::AXES;
-use crate::document::{Written, board_ratio_at, constant, tidy};
+use crate::document::{Written, board_ratio_at, constant, reweigh, tidy};
 use crate::error::Error;
 use crate::fits::positions::document::{held_twice, level};
 use crate::fits::positions::track::Track;
@@ -100,7 +100,8 @@ fn gyros(
         let deg_c = temperature(sensor.channel.as_ref());
         let error = sensor.terms.curve(Feature::Reading).and_then(|curve| curve.shape().at(deg_c));
         let weight = found.weight[index];
-        sensor.increment_weight_rad_per_rad = Some(tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
+        // What stays of its terms holds with the old weight: it goes with the new one.
+        reweigh(sensor, tidy(weight / (1.0 + error.unwrap_or(0.0) * 1e-6)));
         let deg_per_h = |of_log: f64| AngularRate::from_rad_per_s(weight * of_log).as_deg_per_h();
         let at_rest = &tumble.at_rest[index];
         let rest = if let Ok(drift) = &at_rest.drift {

@@ -50,7 +50,6 @@ impl GyroFit {
     }
 }
 
-/// The two axes that are not this one.
 /// A transition: ticks between two poses, and the directions of specific force before and after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {

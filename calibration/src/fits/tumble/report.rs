@@ -284,25 +284,25 @@ pub fn sigmas(document: &Document, tumble: &Tumble) -> Sigmas {
     }
     for (axis, sensor) in accelerometers(document).iter().enumerate().take(AXES.len()) {
         let scale = tidy(accel.scale[axis].abs() * accel.sigma[axis]);
-        sigmas.put("accel", &sensor.name, "scale_factor", vec![scale]);
-        sigmas.put("accel", &sensor.name, "bias", vec![tidy(accel.sigma[3 + axis])]);
-        sigmas.put("accel", &sensor.name, "axis_arcsec", rows[axis].to_vec());
+        sigmas.put(("accel", &sensor.name, "scale_factor"), vec![scale]);
+        sigmas.put(("accel", &sensor.name, "bias"), vec![tidy(accel.sigma[3 + axis])]);
+        sigmas.put(("accel", &sensor.name, "axis_arcsec"), rows[axis].to_vec());
     }
     let Ok(gyro) = &tumble.gyro else { return sigmas };
     for (axis, sensor) in document.gyro.sensor.iter().enumerate().take(AXES.len()) {
         let ppm = tidy(1e6 * gyro.sigma[axis] / gyro.weight[axis].abs());
-        sigmas.put("gyro", &sensor.name, "increment_weight_ppm", vec![ppm]);
+        sigmas.put(("gyro", &sensor.name, "increment_weight_ppm"), vec![ppm]);
         for (along, name) in AXES.iter().enumerate() {
             if let Some([_, sigma]) = deg_per_h_per_g(tumble, axis, along) {
                 let key = format!("acceleration_sensitive_drift.{name}");
-                sigmas.put("gyro", &sensor.name, &key, vec![tidy(sigma)]);
+                sigmas.put(("gyro", &sensor.name, &key), vec![tidy(sigma)]);
             }
         }
         let mut row = [0.0; 3];
         for (which, column) in gyro.across(axis).into_iter().enumerate() {
             row[column] = arcsec(gyro.sigma[3 + 2 * axis + which]);
         }
-        sigmas.put("gyro", &sensor.name, "axis_arcsec", row.to_vec());
+        sigmas.put(("gyro", &sensor.name, "axis_arcsec"), row.to_vec());
     }
     sigmas
 }

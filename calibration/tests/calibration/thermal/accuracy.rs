@@ -196,7 +196,7 @@ fn gains(coil: u64, case: Case, method: Method) -> [[f64; 3]; 3] {
     let [fitted, judging] = programmes(case.holds);
     let train = logged(&coil, case, &fitted, seed, WALK);
     let judge = logged(&coil, case, &judging, seed + 1, 0.0);
-    let settings = Settings { method, ..Settings::default() };
+    let settings = Settings { method, ..super::usual() };
     let made = match fit(None, (&[train], &[]), &settings) {
         Ok(made) => made,
         Err(error) => {

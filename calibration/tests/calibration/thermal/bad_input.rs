@@ -91,7 +91,7 @@ fn thermometer_at(kept: impl Fn(u32) -> bool) -> Run {
 }
 
 fn tried(run: Run, method: Method) -> Result<Fitted, Error> {
-    fit(None, (&[run], &[]), &Settings { method, ..Settings::default() })
+    fit(None, (&[run], &[]), &Settings { method, ..super::usual() })
 }
 
 #[track_caller]
@@ -137,14 +137,14 @@ fn what_a_base_document_hides_is_told() {
         gyro.increment_weight_rad_per_rad = Some(4.848e-6);
     }
     base.accel = None;
-    let made = fit(Some(&base), (&[run(0..5400, usual)], &[]), &Settings::default()).unwrap();
+    let made = fit(Some(&base), (&[run(0..5400, usual)], &[]), &super::usual()).unwrap();
     insta::assert_snapshot!(made.report.warnings.join("\n"));
 }
 
 #[test]
 fn terms_of_the_base_document_go_where_they_are_fitted_anew_and_stay_without_a_channel() {
     let again = |base: &Document| {
-        fit(Some(base), (&[run(0..5400, usual)], &[]), &Settings::default()).unwrap().written.document
+        fit(Some(base), (&[run(0..5400, usual)], &[]), &super::usual()).unwrap().written.document
     };
     let base = tried(run(0..5400, usual), Method::Joint).unwrap().written.document;
     let constant = |value: f64| Curve::new(Shape::Constant { value });
@@ -293,7 +293,7 @@ fn terms_that_are_kept_under_another_filter_are_told() {
     base.gyro.sensor[1].put(StatedTerm::with_parameter(Feature::Lag, 300.0, gain));
     let old_s = base.temperature.filter.as_ref().unwrap().smoothing_s;
     let told = |smoothing_s: f64| {
-        let settings = Settings { smoothing_s: Some(smoothing_s), ..Settings::default() };
+        let settings = Settings { smoothing_s: Some(smoothing_s), ..super::usual() };
         let made = fit(Some(&base), (&[zero()], &[]), &settings).unwrap();
         let [new, old] = [&made.written.document, &base].map(|document| &document.gyro.sensor[1].terms);
         assert!(
@@ -443,7 +443,7 @@ fn an_axis_that_temperature_does_nothing_to_is_a_good_one() {
 #[test]
 fn all_terms_are_the_largest_model() {
     let fitted = |terms: Terms| {
-        let settings = Settings { terms, ..Settings::default() };
+        let settings = Settings { terms, ..super::usual() };
         fit(None, (&[run(0..5400, usual)], &[]), &settings).unwrap()
     };
     let made = fitted(Terms::All);
@@ -485,7 +485,7 @@ fn ticks_that_no_corrector_takes_are_refused_by_their_length() {
 
 /// A judging run beside one that is fitted.
 fn judged(judge: Run) -> Result<Fitted, Error> {
-    fit(None, (&[run(0..5400, usual)], &[judge]), &Settings::default())
+    fit(None, (&[run(0..5400, usual)], &[judge]), &super::usual())
 }
 
 /// A second of another run of the same unit.

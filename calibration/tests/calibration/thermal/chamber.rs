@@ -37,7 +37,7 @@ fn part(path: &std::path::Path, from_s: f64, to_s: Option<f64>) -> Run {
 
 fn fitted(path: &std::path::Path, method: Method) -> Fitted {
     let (train, judge) = (part(path, 0.0, Some(TURN_S)), part(path, TURN_S, None));
-    let settings = Settings { method, ..Settings::default() };
+    let settings = Settings { method, ..super::usual() };
     fit(None, (&[train], &[judge]), &settings).unwrap()
 }
 
@@ -103,7 +103,7 @@ fn without_a_judging_run_no_axis_of_the_real_log_gets_worse_needs_data() {
         return;
     };
     for method in [Method::Sequential, Method::Joint] {
-        let settings = Settings { method, ..Settings::default() };
+        let settings = Settings { method, ..super::usual() };
         let train = part(&path, 0.0, Some(TURN_S));
         let made = fit(None, (&[train], &[]), &settings).unwrap();
         println!("{method:?}: {}", made.report.headline());

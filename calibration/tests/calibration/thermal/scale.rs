@@ -66,7 +66,7 @@ fn base() -> Document {
 }
 
 fn fitted(runs: &[Run], stands: Vec<Stand>, method: Method) -> Fitted {
-    let settings = Settings { method, stands, window_s: Some(10.0), ..Settings::default() };
+    let settings = Settings { method, stands, window_s: Some(10.0), ..super::usual() };
     fit(Some(&base()), (runs, &[]), &settings).unwrap()
 }
 
@@ -214,7 +214,7 @@ fn a_table_that_turns_otherwise_is_refused() {
     let turned = run("on the table", &scenario(5, [0.0, 0.0], 20.0));
     let refused = |rate: f64, runs: &[Run]| {
         let stands = vec![stand([0.0, 0.0], rate)];
-        let settings = Settings { stands, ..Settings::default() };
+        let settings = Settings { stands, ..super::usual() };
         fit(Some(&base()), (runs, &[]), &settings).unwrap_err().to_string()
     };
     let otherwise = refused(-20.0, std::slice::from_ref(&turned));
@@ -273,7 +273,7 @@ fn a_known_scale_factor_does_not_get_into_the_bias_where_the_attitude_is_not_kno
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/calibration/MEMS-0001.toml");
     let known = Document::parse(&std::fs::read_to_string(path).unwrap(), None).unwrap().document;
     let runs = [run("level", &scenario(4, [0.0, 0.0], 0.0))];
-    let made = fit(Some(&known), (&runs, &[]), &Settings::default()).unwrap();
+    let made = fit(Some(&known), (&runs, &[]), &super::usual()).unwrap();
     assert!(made.report.accepted(), "{}", made.report.to_text());
     let slope = |document: &Document| {
         let bias = document.accel.as_ref().unwrap().sensor[2].terms.curve(Feature::One).cloned().unwrap();

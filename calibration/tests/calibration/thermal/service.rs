@@ -70,7 +70,7 @@ fn the_residual_of_the_report_is_that_of_the_service() {
     let (log, mapping) = text_log(folder.path());
     for method in [Method::Sequential, Method::Joint] {
         let run = run_of(&log, &mapping);
-        let settings = Settings { method, window_s: Some(10.0), ..Settings::default() };
+        let settings = Settings { method, window_s: Some(10.0), ..super::usual() };
         let made = fit(None, (&[run], &[]), &settings).unwrap();
         let out = folder.path().join(format!("{}.toml", method.name()));
         made.written.save(&out, false).unwrap();
@@ -109,7 +109,7 @@ fn a_level_that_the_run_cannot_tell_stays_what_it_was() {
     const LEVELS_DEG_PER_H: [f64; 3] = [3.0, -2.0, 0.5];
     let folder = tempfile::tempdir().unwrap();
     let (log, mapping) = text_log(folder.path());
-    let settings = Settings { window_s: Some(10.0), ..Settings::default() };
+    let settings = Settings { window_s: Some(10.0), ..super::usual() };
     let fitted = |base: Option<&Document>| {
         fit(base, (&[run_of(&log, &mapping)], &[]), &settings).unwrap().written.document
     };
@@ -133,7 +133,7 @@ fn a_document_that_is_worse_than_the_one_before_it_is_refused() {
     const HALF: Span = Span::from_ns(4_500_000_000_000);
     let folder = tempfile::tempdir().unwrap();
     let (log, mapping) = text_log(folder.path());
-    let settings = Settings { window_s: Some(10.0), ..Settings::default() };
+    let settings = Settings { window_s: Some(10.0), ..super::usual() };
     let whole = fit(None, (&[run_of(&log, &mapping)], &[]), &settings).unwrap().written.document;
     let [fitted, judging] = [(Span::ZERO, Some(HALF)), (HALF, None)]
         .map(|(start, end)| part_of(&log, &mapping, &Part { start, end, ..Part::default() }));

@@ -97,7 +97,7 @@ impl Mixture {
     /// Autocovariance of the phase over a lag of ticks.
     fn phase(&self, lag: f64) -> f64 {
         let of = |law| autocovariance(law, false, lag);
-        // Asked some million times in a fit, and a logarithm costs more than all the rest.
+        // A logarithm costs more than all the rest.
         let flicker = if self.flicker > 0.0 { self.flicker * of(PowerLaw::Flicker) } else { 0.0 };
         self.quantization * of(PowerLaw::Quantization)
             + 0.5 * self.white * of(PowerLaw::White)
@@ -105,19 +105,8 @@ impl Mixture {
             + self.random_walk * of(PowerLaw::RandomWalk) / 12.0
     }
 
-    /// Covariance of a difference over means of a ticks with one over means of b, `lag` ticks further on.
-    fn between(&self, a: f64, b: f64, lag: f64) -> f64 {
-        const WEIGHTS: [(f64, f64); 3] = [(0.0, 1.0), (1.0, -2.0), (2.0, 1.0)];
-        let mut sum = 0.0;
-        for (i, p) in WEIGHTS {
-            for (j, q) in WEIGHTS {
-                sum += p * q * self.phase(lag + i * a - j * b);
-            }
-        }
-        sum
-    }
-
-    /// Covariance of two overlapping variances, over means of so many ticks (first) from so many differences (second).
+    /// Covariance of two overlapping variances, over means of so many ticks (first) from so many differences (second). Of means longer
+    /// than `SAMPLES` ticks every so many lags are taken: both lengths are multiples of that stride, as octaves are.
     pub fn covariance(&self, one: (usize, usize), other: (usize, usize)) -> f64 {
         let (short, long) = (one.0.min(other.0), one.0.max(other.0));
         if long > FARTHEST_RATIO * short {
@@ -126,25 +115,38 @@ impl Mixture {
         let stride = (short / SAMPLES).max(1);
         // Spikes fall between samples that are far apart; quantization is nothing at such times.
         let smooth = Self { quantization: if stride == 1 { self.quantization } else { 0.0 }, ..*self };
-        let (a, b) = (real(one.0), real(other.0));
+        let (a, b) = (one.0 / stride, other.0 / stride);
+        // A pair of differences asks for nine lags, and the pairs for each of them nine times: all are made once.
+        let reach = 3 * (a + b);
+        let phase: Vec<f64> = (0..=reach + a + b).map(|lag| smooth.phase(real(lag * stride))).collect();
         let (differences, others) = (real(one.1), real(other.1));
-        let ramps = self.ramp * self.ramp * a * a * b * b;
+        let (width, of_other) = (real(one.0), real(other.0));
+        let ramps = self.ramp * self.ramp * width * width * of_other * of_other;
         let pairs = |lag: f64| (differences.min(others + lag) - lag.max(0.0)).max(0.0);
-        let middle = b - a;
-        let reach = (3.0 * (a + b) / real(stride)).ceil();
+        let [a, b, reach] = [a, b, reach].map(usize::cast_signed);
         let mut sum = 0.0;
-        let mut k = -reach;
-        while k <= reach {
-            let lag = middle.round() + k * real(stride);
-            let count = pairs(lag);
+        for lag in b - a - reach..=b - a + reach {
+            let count = pairs(real(lag) * real(stride));
             if count > 0.0 {
-                let c = smooth.between(a, b, lag);
+                let c = second_differences(&phase, [a, b], lag);
                 sum += count * (2.0 * c * c + 4.0 * ramps * c);
             }
-            k += 1.0;
         }
-        sum * real(stride) / (4.0 * a * a * b * b * differences * others)
+        sum * real(stride) / (4.0 * width * width * of_other * of_other * differences * others)
     }
+}
+
+/// Covariance of a second difference of the phase over means of a with one over means of b, `lag` further on, from its autocovariance by
+/// lags from 0.
+fn second_differences(phase: &[f64], [a, b]: [isize; 2], lag: isize) -> f64 {
+    const WEIGHTS: [(isize, f64); 3] = [(0, 1.0), (1, -2.0), (2, 1.0)];
+    let mut sum = 0.0;
+    for (i, p) in WEIGHTS {
+        for (j, q) in WEIGHTS {
+            sum += p * q * phase[(lag + i * a - j * b).unsigned_abs()];
+        }
+    }
+    sum
 }
 
 #[expect(clippy::cast_precision_loss, reason = "numbers of ticks of tests")]
@@ -180,9 +182,11 @@ mod tests {
             (PowerLaw::RandomWalk, Mixture { random_walk: 2.0, ..Mixture::default() }),
         ];
         for (law, mixture) in kinds {
-            for (m, count) in [(1, 5000), (16, 5000), (512, 20_000)] {
+            for (m, count) in [(1_usize, 5000), (16, 5000), (512, 20_000)] {
                 let width = m as f64;
-                let variance = mixture.between(width, width, 0.0) / (2.0 * width * width);
+                let phase: Vec<f64> = (0..=2 * m).map(|lag| mixture.phase(lag as f64)).collect();
+                let of_differences = second_differences(&phase, [m.cast_signed(); 2], 0);
+                let variance = of_differences / (2.0 * width * width);
                 let of_itself = mixture.covariance((m, count), (m, count));
                 let nu = 2.0 * variance * variance / of_itself;
                 let known = degrees_of_freedom(Estimator::Overlapping, law, m, count);

@@ -270,7 +270,11 @@ impl<'a> Problem<'a> {
             ramp: ramp.sqrt() * self.tick_s,
         };
         let place = |row: usize| self.variances.get(row).map_or((1, 1), |v| (v.ticks, v.differences));
-        let mut covariance = DMatrix::from_fn(count, count, |a, b| mixture.covariance(place(a), place(b)));
+        let mut covariance = DMatrix::zeros(count, count);
+        for (a, b) in (0..count).flat_map(|a| (0..=a).map(move |b| (a, b))) {
+            covariance[(a, b)] = mixture.covariance(place(a), place(b));
+            covariance[(b, a)] = covariance[(a, b)];
+        }
         // What the model has no noise for still has some: no row counts for more than its own size allows.
         let model = &self.design * DVector::from_row_slice(squares);
         let floor = |row: usize| {

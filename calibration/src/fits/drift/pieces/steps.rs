@@ -1,6 +1,6 @@
 //! A step in readings that are otherwise steady: no drift, but a log of two states.
 
-use crate::numbers::{SIGMA_PER_MAD, median, real};
+use crate::numbers::{SIGMA_PER_MAD, mean_if_any, median};
 use crate::report::short;
 
 /// Parts of a log whose means are compared, and the fewest ticks of one.
@@ -72,6 +72,5 @@ pub(crate) fn words((called, measure): (&str, &str), Step { before, behind, .. }
 
 /// Of the good readings; no number without any.
 fn mean(readings: &[f64]) -> f64 {
-    let good = || readings.iter().copied().filter(|reading| reading.is_finite());
-    good().sum::<f64>() / real(good().count())
+    mean_if_any(readings.iter().copied()).unwrap_or(f64::NAN)
 }
