@@ -101,7 +101,7 @@ pub struct UnitSummary {
 }
 
 /// What is on the page.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PlotSummary {
     /// Names of the logs.
     pub logs: Vec<String>,

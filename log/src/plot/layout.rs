@@ -206,7 +206,7 @@ impl Drawing {
         for (name, flag) in TickFlags::all().iter_names() {
             bits.push(named(flag.bits().trailing_zeros(), name.to_owned(), Ink::Alert));
         }
-        for (first, kind) in [(GYRO_FLAGS, "gyro"), (ACCEL_FLAGS, "accelerometer")] {
+        for (first, kind) in [(GYRO_FLAGS, "gyro"), (ACCEL_FLAGS, "accel")] {
             for (name, flag) in
                 SensorFlags::all().iter_names().filter(|(_, flag)| *flag != SensorFlags::VALID)
             {
