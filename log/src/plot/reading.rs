@@ -13,7 +13,8 @@ use super::unit::UnitPlot;
 use super::{MAX_UNITS, PlotLog, PlotOptions, PlotSummary, UnitSummary, layout, track};
 use crate::error::Error;
 use crate::message::{Message, Topic};
-use crate::offline::Loaded;
+use crate::offline::{Loaded, troubles};
+use crate::streams::decoded::{Decoded, decode};
 use isotherm_pages::Page;
 
 /// Logs that begin further apart than this are laid side by side by their beginnings (ns).
@@ -67,16 +68,23 @@ impl Source {
         Ok(!self.over)
     }
 
-    /// The producer's time of the first message that has one (ns).
+    /// The end of the first gyro, accelerometer or corrected tick, else the time of the first message that has one (ns on the producer's
+    /// clock).
     fn first_ns(&mut self) -> Result<Option<i64>, Error> {
+        let mut other = None;
         while self.ahead.len() < LOOK_AHEAD && !self.over {
             let read = self.ahead.len();
             self.read()?;
-            if let Some(time) = self.ahead.iter().skip(read).find_map(Message::time) {
-                return Ok(Some(time.as_ns()));
+            for message in self.ahead.iter().skip(read) {
+                let Ok(Some((_, decoded))) = decode(message) else { continue };
+                let Some([first, _]) = decoded.times() else { continue };
+                if matches!(decoded, Decoded::Gyro(_) | Decoded::Accel(_) | Decoded::Corrected(_)) {
+                    return Ok(Some(first.as_ns()));
+                }
+                other.get_or_insert(first.as_ns());
             }
         }
-        Ok(None)
+        Ok(other)
     }
 }
 

@@ -105,6 +105,18 @@ fn units_of_different_serials_keep_them() {
     }
 }
 
+#[test]
+fn logs_of_different_days_begin_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+    // Their first batches are not equally long.
+    recording(&a, "ZLG-0001", 0..50, 9999, |_| 1e-6);
+    recording(&b, "ZLG-0001", 20_000_000..20_000_003, 9999, |_| 1e-6);
+    let (_, summary) = plot(vec![log(&a), log(&b)], &PlotOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(summary.second_moved_ns, Some(-100_000_000_000_000));
+    assert_eq!(summary.differences["ZLG-0001"].common_ticks, 3);
+}
+
 /// A tick with flags of its own, of a gyro and of an accelerometer.
 fn flagged(flags: core::TickFlags, gyro: core::SensorFlags, accel: core::SensorFlags) -> core::CorrectedTick {
     core::CorrectedTick {
