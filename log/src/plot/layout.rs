@@ -289,7 +289,7 @@ impl Drawing {
         list.iter().zip(ends).map(stretch).collect()
     }
 
-    /// A curve of the values of one quantity, scaled, and its row in the table.
+    /// A curve of the values of one quantity, scaled, and its row in the table; `None` where there is none.
     fn curve(
         &mut self,
         finished: &Finished,
@@ -298,9 +298,11 @@ impl Drawing {
         name: String,
         ink: Ink,
     ) -> Option<Series> {
-        let overall = finished.overall(index, scale).filter(|overall| overall.mean.is_finite());
+        let overall = finished.overall(index, scale)?;
         self.rows.extend(
-            overall.map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
+            Some(overall)
+                .filter(|overall| overall.mean.is_finite())
+                .map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
         );
         Some(Series { name, ink, form: Form::Line, samples: finished.samples(index, scale)? })
     }

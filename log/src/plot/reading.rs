@@ -270,5 +270,6 @@ impl Plot {
             units_left_out: self.left_out.len() as u64,
             second_moved_ns: self.second_moved_ns,
         }
+            uncalibrated_ticks: shown.uncalibrated,
     }
 }

@@ -152,6 +152,24 @@ fn each_flag_has_a_row_of_its_own() {
 }
 
 #[test]
+fn ticks_without_a_calibration_are_counted_and_not_drawn() {
+    let unit = UnitId::new("ZLG-0001").unwrap();
+    let sensor = core::SensorFlags::VALID;
+    let good =
+        core::CorrectedTick { delta_angle: [0.0; 3], ..flagged(core::TickFlags::empty(), sensor, sensor) };
+    let raw = flagged(core::TickFlags::UNCALIBRATED, sensor, sensor);
+    let mut shown = UnitPlot::new(2, None, 0);
+    let mut handed_on = 0;
+    let revision = Revision { counter: 1, digest: [0; 8] };
+    for tick in [good, raw] {
+        shown.take(&batch(&unit, revision, vec![tick]), &mut |_, _| handed_on += 1);
+    }
+    assert_eq!((handed_on, shown.uncalibrated), (1, 1));
+    let drawn = shown.corrected.unwrap();
+    assert_eq!((drawn.ticks(), drawn.finish(0).overall(0, 1.0).unwrap().max), (2, 0.0));
+}
+
+#[test]
 fn a_log_without_ticks_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.mcap");

@@ -85,6 +85,8 @@ pub(super) struct UnitPlot {
     pub(super) unlisted: u64,
     pub(super) nominal: Option<Nominal>,
     pub(super) missed: u64,
+    /// Corrected ticks that are not drawn: raw readings pass through them unscaled.
+    pub(super) uncalibrated: u64,
     pub(super) unreadable: u64,
     revision: Option<Revision>,
     joiner: Joiner,
@@ -96,7 +98,7 @@ impl UnitPlot {
         Self { detail, clock: Clock::moved(moved_ns), nominal, ..Self::default() }
     }
 
-    /// Takes a message of the unit; corrected ticks are handed on with their time on the axis (ns).
+    /// Takes a message of the unit; corrected ticks with a calibration are handed on with their time on the axis (ns).
     pub(super) fn take(&mut self, message: &Message, corrected: &mut dyn FnMut(i64, &CorrectedTick)) {
         if self.read(message, corrected).is_none() {
             self.unreadable += 1;
@@ -184,8 +186,13 @@ impl UnitPlot {
                 let until = at_ns.saturating_sub(tick.duration.as_ns());
                 track.gap(until);
             }
-            track.push(at_ns, &increments(tick), flags(tick));
-            corrected(at_ns, tick);
+            if tick.flags.contains(TickFlags::UNCALIBRATED) {
+                self.uncalibrated += 1;
+                track.push(at_ns, &[], flags(tick));
+            } else {
+                track.push(at_ns, &increments(tick), flags(tick));
+                corrected(at_ns, tick);
+            }
             last_ns = Some(at_ns);
         }
         if let Some(at_ns) = last_ns {
@@ -340,6 +347,7 @@ fn mode_bit(mode: Option<LasingMode>) -> u32 {
 
 /// All flags of a tick in one word.
 fn flags(tick: &CorrectedTick) -> u32 {
+    // A flag that is not known would fall on another's bit.
     let any = |flags: &[SensorFlags]| {
         let any = flags.iter().fold(SensorFlags::empty(), |any, flags| any | *flags);
         u32::from((any & SensorFlags::all()).bits() >> 1)
@@ -348,7 +356,6 @@ fn flags(tick: &CorrectedTick) -> u32 {
     let tick_flags = u32::from((tick.flags & TickFlags::all()).bits());
     tick_flags | any(&tick.gyro_flags) << GYRO_FLAGS | any(&tick.accel_flags) << ACCEL_FLAGS | mode
 }
-    // A flag that is not known would fall on another's bit.
 
 /// A revision's counter and the first digits of its digest.
 fn named(revision: Revision) -> String {

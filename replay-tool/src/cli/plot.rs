@@ -182,8 +182,12 @@ fn human(report: &Report<'_>) -> String {
             let unit = summary.serial_in(index, unit);
             let _ = writeln!(
                 text,
-                "unit {unit} in {log}: {} raw ticks, {} corrected, {} announced as missing, {} marks",
-                shown.raw_ticks, shown.corrected_ticks, shown.missed_ticks, shown.marks
+                "unit {unit} in {log}: {} raw ticks, {} corrected{}, {} announced as missing, {} marks",
+                shown.raw_ticks,
+                shown.corrected_ticks,
+                shown.undrawn(),
+                shown.missed_ticks,
+                shown.marks
             );
             if shown.marks_left_out + shown.unreadable_messages > 0 {
                 let _ = writeln!(

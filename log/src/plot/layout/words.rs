@@ -19,7 +19,7 @@ pub(super) fn results(summary: &PlotSummary) -> Vec<(String, String)> {
             if log.marks > 0 {
                 more.push(format!("{} changes and commands", log.marks));
             }
-            let sentence = format!("Unit {unit}{of}: {corrected} corrected ticks.");
+            let sentence = format!("Unit {unit}{of}: {corrected} corrected ticks{}.", log.undrawn());
             results.push((sentence, more.join(", ")));
         }
     }
