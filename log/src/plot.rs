@@ -131,6 +131,10 @@ pub struct PlotSummary {
     pub units_left_out: u64,
     /// By how much the second log was moved on the time axis (ns), where the two do not overlap.
     pub second_moved_ns: Option<i64>,
+    /// What correcting the logs refused or passed over, in words.
+    pub troubles: Vec<String>,
+    /// Raw ticks that correcting the logs refused.
+    pub refused_ticks: u64,
 }
 
 fn none_has_its_own(serials: &[Option<String>]) -> bool {

@@ -159,15 +159,14 @@ impl Drawing {
         let mut modes_told = false;
         if let Some(gyro) = shown.gyro {
             modes_told = true;
-            let scale = match (nominal, gyro.kind) {
-                (Some(nominal), _) => Some(nominal.gyro.clone()),
-                (None, OutputKind::Mean) => Some(Scale::of_means(gyro.sensors, DEG_PER_H)),
-                (None, OutputKind::Counts) => None,
-            };
+            // A document for other sensors says nothing of these.
+            let scale = nominal.map(|nominal| nominal.gyro.clone()).filter(|scale| scale.is_of(&gyro));
+            let means = || (gyro.kind == OutputKind::Mean).then(|| Scale::of_means(gyro.sensors, DEG_PER_H));
+            let scale = scale.or_else(means);
             self.raw(log, gyro, scale, true, parts);
         }
         if let Some(accel) = shown.accel {
-            let scale = nominal.and_then(|nominal| nominal.accel.clone());
+            let scale = nominal.and_then(|nominal| nominal.accel.clone()).filter(|scale| scale.is_of(&accel));
             self.raw(log, accel, scale, false, parts);
         }
         if let Some(track) = shown.corrected {
@@ -230,7 +229,7 @@ impl Drawing {
         };
         let RawTrack { kind, sensors, track, .. } = raw;
         let unit = if scale.is_some() { unit } else { unscaled(kind) };
-        let scale = scale.unwrap_or(Scale { factors: vec![1.0; sensors], axes: Vec::new() });
+        let scale = scale.unwrap_or(Scale { kind, factors: vec![1.0; sensors], axes: Vec::new() });
         let finished = track.finish(self.begin_ns);
         let mut own = Vec::new();
         for index in 0..sensors {

@@ -225,7 +225,14 @@ impl Plot {
                 }
             }
         }
-        let summary = self.summary();
+        let (mut words, mut refused_ticks) = (Vec::new(), 0);
+        for source in &self.logs {
+            let Some((stream, _)) = &source.corrects else { continue };
+            let counters = stream.unit().counters();
+            refused_ticks += counters.gyro_ticks_in.saturating_sub(counters.ticks_out);
+            words.extend(troubles(stream, 0).iter().map(|trouble| format!("{}: {trouble}", source.log.name)));
+        }
+        let summary = PlotSummary { troubles: words, refused_ticks, ..self.summary() };
         // The page's size is bounded by that of two units.
         let units = self.units.len();
         if units > 2 {
@@ -263,6 +270,7 @@ impl Plot {
         });
         PlotSummary {
             logs: self.logs.iter().map(|source| source.log.name.clone()).collect(),
+            uncalibrated_ticks: shown.uncalibrated,
             own_serials: self.logs.iter().map(|source| source.own.as_ref().map(UnitId::to_string)).collect(),
             reading: self.logs.iter().map(|source| source.log.messages.report()).collect(),
             units: units.collect(),
@@ -270,6 +278,7 @@ impl Plot {
             units_left_out: self.left_out.len() as u64,
             second_moved_ns: self.second_moved_ns,
         }
-            uncalibrated_ticks: shown.uncalibrated,
     }
 }
+            troubles: Vec::new(),
+            refused_ticks: 0,

@@ -91,11 +91,12 @@ pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
     print(if args.json { show::json(&report) } else { human(&report) }.as_bytes())?;
     let lost = summary.reading.iter().any(LogReport::lost_data);
-    Ok(Exit::of_loss(lost))
+    Ok(Exit::of_loss(lost || summary.refused_ticks > 0))
 }
 
 /// Draws a text log that a mapping reads.
 pub(super) fn first_plot(log: &LogArgs, out: &Path) -> Result<(), Error> {
+    summary.troubles.iter().for_each(|trouble| show::warn(trouble));
     let args = PlotArgs {
         log: log.clone(),
         beside: Vec::new(),

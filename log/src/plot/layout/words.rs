@@ -47,6 +47,7 @@ pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
             seconds(moved_ns)
         ));
     }
+    words.extend(summary.troubles.iter().map(|trouble| format!("{trouble}.")));
     if summary.units_left_out > 0 {
         words.push(format!("{} further units are left out: choose with --unit.", summary.units_left_out));
     }
