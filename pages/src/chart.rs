@@ -63,7 +63,11 @@ pub enum Ink {
 impl Ink {
     /// Colours for several of a kind, over and over again.
     pub fn several() -> impl Iterator<Item = Self> {
-        [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth, Self::Sixth].into_iter().cycle()
+    /// Colours for several of a kind.
+    pub const SEVERAL: [Self; 6] =
+        [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth, Self::Sixth];
+
+        Self::SEVERAL.into_iter().cycle()
     }
 }
 
@@ -123,13 +127,15 @@ pub struct Series {
     pub form: Form,
     /// Its values.
     pub samples: Samples,
+    /// Which dashes its line has: 0 for none, 1, 2 and 3 tell it from others of its colour; 4 is as 0, and so on.
+    pub dashes: usize,
 }
 
 impl Series {
     /// Points that are joined by lines.
     #[must_use]
     pub fn line(name: impl Into<String>, ink: Ink, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Self { name: name.into(), ink, form: Form::Line, samples: Samples::points(points) }
+        Self { name: name.into(), ink, form: Form::Line, dashes: 0, samples: Samples::points(points) }
     }
 
     /// Points one by one.

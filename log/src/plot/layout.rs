@@ -176,11 +176,11 @@ impl Drawing {
             (shown.applied, &mut parts.applied, "temperature applied", "°C"),
             (shown.readings, &mut parts.readings, "temperature reading", "as sent"),
         ] {
-            for (index, (channel, track)) in tracks.into_iter().enumerate() {
-                let ink = Ink::several().nth(index + 2 * log).unwrap_or(Ink::First);
+            for ((ink, dashes), (channel, track)) in several(curves.len()).zip(tracks) {
                 let row = format!("{prefix}{what} {channel} ({unit})");
                 let name = format!("{prefix}{channel}");
-                curves.extend(self.curve(&track.finish(self.begin_ns), (0, 1.0), row, name, ink));
+                let curve = self.curve(&track.finish(self.begin_ns), (0, 1.0), row, name, ink);
+                curves.extend(curve.map(|curve| Series { dashes, ..curve }));
             }
         }
     }
@@ -231,26 +231,27 @@ impl Drawing {
         let unit = if scale.is_some() { unit } else { unscaled(kind) };
         let scale = scale.unwrap_or(Scale { kind, factors: vec![1.0; sensors], axes: Vec::new() });
         let finished = track.finish(self.begin_ns);
-        let mut own = Vec::new();
-        for index in 0..sensors {
+        let title = format!("raw {sensor}s");
+        let at = parts.unplaced.iter().position(|(known, other, _)| *known == title && *other == unit);
+        let at = at.unwrap_or_else(|| {
+            parts.unplaced.push((title, unit, Vec::new()));
+            parts.unplaced.len() - 1
+        });
+        let Some((_, _, own)) = parts.unplaced.get_mut(at) else { return };
+        for (index, several) in (0..sensors).zip(several(own.len())) {
             let factor = scale.factors.get(index).copied().unwrap_or(f64::NAN);
             let axis = scale.axes.get(index).copied();
             let place = axis.and_then(|axis| AXES.get(axis).zip(placed.get_mut(axis)));
-            let (what, name, ink, curves) = if let Some((axis, curves)) = place {
+            let (what, name, (ink, dashes), curves) = if let Some((axis, curves)) = place {
                 let ink = if log == 0 { Ink::Raw } else { Ink::Fourth };
-                (format!("{along} {axis}"), format!("{prefix}raw"), ink, curves)
+                (format!("{along} {axis}"), format!("{prefix}raw"), (ink, 0), curves)
             } else {
-                let ink = Ink::several().nth(index + 3 * log).unwrap_or(Ink::First);
                 let what = format!("{sensor} {}", index + 1);
-                (what.clone(), format!("{prefix}{what}"), ink, &mut own)
+                (what.clone(), format!("{prefix}{what}"), several, &mut *own)
             };
             let row = format!("{prefix}raw {what} ({unit})");
-            curves.extend(self.curve(&finished, (index, factor), row, name, ink));
-        }
-        let title = format!("raw {sensor}s");
-        match parts.unplaced.iter_mut().find(|(known, other, _)| *known == title && *other == unit) {
-            Some((_, _, curves)) => curves.extend(own),
-            None => parts.unplaced.push((title, unit, own)),
+            let curve = self.curve(&finished, (index, factor), row, name, ink);
+            curves.extend(curve.map(|curve| Series { dashes, ..curve }));
         }
         let bits = [
             (MODE_PLUS, "mode +1", Ink::Second),
@@ -303,8 +304,16 @@ impl Drawing {
                 .filter(|overall| overall.mean.is_finite())
                 .map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
         );
-        Some(Series { name, ink, form: Form::Line, samples: finished.samples(index, scale)? })
+        Some(Series { name, ink, form: Form::Line, dashes: 0, samples: finished.samples(index, scale)? })
     }
+}
+
+/// Colours and dashes of curves in a panel that has so many: behind each six, and for another log, the colours begin anew with other
+/// dashes.
+pub(super) fn several(before: usize) -> impl Iterator<Item = (Ink, usize)> {
+    let colours = Ink::SEVERAL.len();
+    let first = before.next_multiple_of(colours);
+    Ink::several().zip(first..).map(move |(ink, number)| (ink, number / colours))
 }
 
 /// Lanes of the bits that occurred.

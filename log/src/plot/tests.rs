@@ -170,6 +170,15 @@ fn ticks_without_a_calibration_are_counted_and_not_drawn() {
 }
 
 #[test]
+fn channels_of_two_logs_are_told_apart() {
+    let [first, second] = [0, 8].map(|before| layout::several(before).take(8).collect::<Vec<_>>());
+    assert!(first.iter().zip(&second).all(|(a, b)| a.0 == b.0 && a.1 != b.1), "a channel keeps its colour");
+    let all: std::collections::BTreeSet<_> =
+        first.iter().chain(&second).map(|(ink, dashes)| (format!("{ink:?}"), dashes)).collect();
+    assert_eq!(all.len(), 16, "{all:?}");
+}
+
+#[test]
 fn a_log_without_ticks_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.mcap");

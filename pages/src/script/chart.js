@@ -43,18 +43,18 @@ class Chart {
   toolbar() {
     const bar = element("div", "bar");
     this.figure.prepend(bar);
-    const kinds = new Map(this.shape.marks.map(mark => [mark.kind, mark.ink]));
+    const kinds = new Map(this.shape.marks.map(mark => [mark.kind, mark]));
     for (const [all, form] of [[this.legends.shared, "line"], [kinds, "dash"]]) {
-      for (const [name, ink] of all) this.toggle(bar, name, ink, form);
+      for (const [name, { ink, dashes }] of all) this.toggle(bar, name, ink, form, dashes);
     }
     return bar;
   }
 
-  toggle(bar, name, ink, form) {
+  toggle(bar, name, ink, form, dashes) {
     const made = element("button", "key", bar);
     made.type = "button";
     made.setAttribute("aria-pressed", "true");
-    element("i", form + " " + ink, made);
+    element("i", form + " " + ink, made).style.background = dashed(dashes);
     made.append(name);
     this.keys.set(name, [...(this.keys.get(name) ?? []), made]);
     made.addEventListener("click", () => {
@@ -160,9 +160,9 @@ class Chart {
     const tip = this.tip;
     tip.replaceChildren();
     element("b", "", tip, this.place(x, perPixel));
-    for (const { name, words, ink } of panel.said(x, 6 * perPixel)) {
+    for (const { name, words, ink, dashes } of panel.said(x, 6 * perPixel)) {
       const row = element("div", "", tip);
-      element("i", "line " + ink, row);
+      element("i", "line " + ink, row).style.background = dashed(dashes);
       row.append(name + (words ? ": " + words : ""));
     }
     const near = this.visibleMarks().filter(mark => Math.abs(mark.x - x) < 4 * perPixel);

@@ -17,7 +17,7 @@ class Panel {
     this.element = element("section", "panel", parent);
     this.head = element("div", "head", this.element);
     element("h3", "", this.head, [shape.title, shape.unit].filter(Boolean).join(", "));
-    for (const [name, ink] of own) chart.toggle(this.head, name, ink, "line");
+    for (const [name, { ink, dashes }] of own) chart.toggle(this.head, name, ink, "line", dashes);
     const box = element("div", "plot", this.element);
     this.canvas = element("canvas", "", box);
     this.over = element("canvas", "over", box);
@@ -161,7 +161,7 @@ class Panel {
       let words = plain(value, 7) + (this.shape.unit ? " " + this.shape.unit : "");
       const [low, high] = [s.min.list[i] + s.min.middle, s.max.list[i] + s.max.middle];
       if (!s.single && high > low) words += " (" + plain(low, 6) + " \u2026 " + plain(high, 6) + ")";
-      if (isFinite(value)) lines.push({ name: one.name, words, ink: one.ink });
+      if (isFinite(value)) lines.push({ name: one.name, words, ink: one.ink, dashes: one.dashes });
     }
     const noted = [];
     for (const lane of this.lanes) {

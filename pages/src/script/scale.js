@@ -119,25 +119,25 @@ function mapping([low, high], pixels, logarithmic) {
 }
 
 /**
- * What stands for one colour in several panels, or is in the only one, is named above all of them; what is in one panel by
+ * What has one colour and the same dashes in several panels, or is in the only one, is named above all of them; what is in one panel by
  * itself, or has other colours elsewhere, beside each panel that it is in, where there is more than one curve to tell apart.
  */
 function legends(panels) {
   const found = new Map();
   panels.forEach((panel, index) => {
-    for (const { name, ink } of panel.series ?? []) {
-      if (!found.has(name)) found.set(name, { inks: new Set(), panels: new Set() });
-      found.get(name).inks.add(ink);
+    for (const { name, ink, dashes } of panel.series ?? []) {
+      if (!found.has(name)) found.set(name, { key: { ink, dashes }, inks: new Set(), panels: new Set() });
+      found.get(name).inks.add(ink + " " + dashes);
       found.get(name).panels.add(index);
     }
   });
   const drawn = panels.filter(panel => panel.series?.length).length;
   const shared = new Map();
-  for (const [name, { inks, panels: all }] of found) {
-    if (inks.size === 1 && (all.size > 1 || drawn === 1)) shared.set(name, [...inks][0]);
+  for (const [name, { key, inks, panels: all }] of found) {
+    if (inks.size === 1 && (all.size > 1 || drawn === 1)) shared.set(name, key);
   }
   const own = panels.map(panel => {
-    const names = new Map((panel.series ?? []).map(one => [one.name, one.ink]));
+    const names = new Map((panel.series ?? []).map(({ name, ink, dashes }) => [name, { ink, dashes }]));
     return names.size < 2 ? new Map() : new Map([...names].filter(([name]) => !shared.has(name)));
   });
   return { shared, own };

@@ -37,16 +37,20 @@ equal(clock(-90, 1), "\u22121:30");
 equal(clock(59.9999, 0.1), "1:00.0");
 
 // Legends: a colour is said where it is right.
-const curves = (...all) => ({ series: all.map(([name, ink]) => ({ name, ink })) });
+const curves = (...all) => ({ series: all.map(([name, ink, dashes = 0]) => ({ name, ink, dashes })) });
+const keys = all => [...all].map(([name, { ink }]) => [name, ink]);
 const both = curves(["before", "raw"], ["after", "corrected"]);
 const said = legends([both, both, curves(["of x", "first"], ["of y", "second"]), { lanes: [] }]);
-equal([...said.shared], [["before", "raw"], ["after", "corrected"]]);
-equal(said.own.map(own => [...own]), [[], [], [["of x", "first"], ["of y", "second"]], []]);
+equal(keys(said.shared), [["before", "raw"], ["after", "corrected"]]);
+equal(said.own.map(keys), [[], [], [["of x", "first"], ["of y", "second"]], []]);
 const mixed = legends([curves(["x", "first"], ["z", "third"]), curves(["z", "first"], ["x", "first"])]);
-equal([[...mixed.shared], mixed.own.map(own => [...own])], [[["x", "first"]], [[["z", "third"]], [["z", "first"]]]]);
+equal([keys(mixed.shared), mixed.own.map(keys)], [[["x", "first"]], [[["z", "third"]], [["z", "first"]]]]);
 equal([...legends([both]).shared].length, 2);
 
 // Mapping, zooming, moving.
+// Lines of one colour differ by their dashes, which are in the key.
+const dashes = legends([curves(["x", "first"], ["y", "first", 1]), curves(["z", "first"], ["y", "first", 2])]);
+equal([keys(dashes.shared), dashes.own.map(own => own.get("y").dashes)], [[], [1, 2]]);
 for (const logarithmic of [false, true]) {
   const map = mapping([2, 50], 960, logarithmic);
   assert(Math.abs(map.to(2)) < 1e-9 && Math.abs(map.to(50) - 960) < 1e-9);
