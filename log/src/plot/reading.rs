@@ -98,6 +98,8 @@ pub(super) struct UnitLogs {
 pub(super) struct Plot {
     logs: Vec<Source>,
     units: BTreeMap<UnitId, UnitLogs>,
+    /// Those of the units that have raw or corrected messages.
+    drawn: BTreeSet<UnitId>,
     left_out: BTreeSet<UnitId>,
     detail: usize,
     nominal: Option<Nominal>,
@@ -123,6 +125,7 @@ impl Plot {
             moved_ns: vec![0; sources.len()],
             logs: sources,
             units: BTreeMap::new(),
+            drawn: BTreeSet::new(),
             left_out: BTreeSet::new(),
             detail: options.detail.clamp(2, 1 << 20),
             nominal: options.calibration.as_ref().map(|parsed| Nominal::of(&parsed.document)),
@@ -176,11 +179,23 @@ impl Plot {
         if serial != own && source.own.is_none() {
             source.own = Some(own.clone());
         }
-        if !self.units.contains_key(serial) {
-            if self.units.len() == MAX_UNITS {
+        if self.left_out.contains(serial) {
+            return;
+        }
+        // A unit of which only the status was recorded takes no place from one that has something to draw.
+        let draws = matches!(message.topic, Topic::Raw(..) | Topic::Corrected(_));
+        if draws && !self.drawn.contains(serial) {
+            if self.drawn.len() == MAX_UNITS {
+                self.units.remove(serial);
                 if self.left_out.len() < LOOK_AHEAD {
                     self.left_out.insert(serial.clone());
                 }
+                return;
+            }
+            self.drawn.insert(serial.clone());
+        }
+        if !self.units.contains_key(serial) {
+            if !draws && self.units.len() >= LOOK_AHEAD {
                 return;
             }
             let logs = self.moved_ns.iter().map(|_| None).collect();
@@ -205,6 +220,7 @@ impl Plot {
 
     /// Draws what was read.
     pub(super) fn finish(mut self) -> Result<(Page, PlotSummary), Error> {
+        self.units.retain(|serial, _| self.drawn.contains(serial));
         for unit in self.units.values_mut() {
             if let Some(difference) = &mut unit.difference {
                 difference.end();
@@ -254,6 +270,7 @@ impl Plot {
         let of = |shown: &UnitPlot| UnitSummary {
             raw_ticks: shown.gyro.as_ref().map_or(0, |raw| raw.track.ticks()),
             corrected_ticks: shown.corrected.as_ref().map_or(0, track::Track::ticks),
+            uncalibrated_ticks: shown.uncalibrated,
             missed_ticks: shown.missed,
             marks: shown.happenings.len() as u64,
             marks_left_out: shown.unlisted,
@@ -270,15 +287,14 @@ impl Plot {
         });
         PlotSummary {
             logs: self.logs.iter().map(|source| source.log.name.clone()).collect(),
-            uncalibrated_ticks: shown.uncalibrated,
             own_serials: self.logs.iter().map(|source| source.own.as_ref().map(UnitId::to_string)).collect(),
             reading: self.logs.iter().map(|source| source.log.messages.report()).collect(),
             units: units.collect(),
             differences: differences.collect(),
             units_left_out: self.left_out.len() as u64,
             second_moved_ns: self.second_moved_ns,
+            troubles: Vec::new(),
+            refused_ticks: 0,
         }
     }
 }
-            troubles: Vec::new(),
-            refused_ticks: 0,

@@ -117,6 +117,24 @@ fn logs_of_different_days_begin_together() {
     assert_eq!(summary.differences["ZLG-0001"].common_ticks, 3);
 }
 
+#[test]
+fn units_without_ticks_take_no_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let [idle, ticks] = ["idle.mcap", "ticks.mcap"].map(|name| folder.path().join(name));
+    let mut writer = RecordingWriter::create(&idle, RecordingOptions::default()).unwrap();
+    for number in 0..=MAX_UNITS {
+        let topic = Topic::Status(UnitId::new(&format!("IDLE-{number}")).unwrap());
+        writer.write(&Message { topic, received_ns: 0, frame: Vec::new() }).unwrap();
+    }
+    writer.finish().unwrap();
+    recording(&ticks, "ZLG-0001", 0..50, 9999, |_| 1e-6);
+    let messages = LogFiles::Recordings(vec![idle, ticks.clone()]).open(&Part::default()).unwrap();
+    let logs = vec![PlotLog { messages, ..log(&ticks) }];
+    let (_, summary) = plot(logs, &PlotOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(summary.units.keys().collect::<Vec<_>>(), ["ZLG-0001"]);
+    assert_eq!(summary.units_left_out, 0);
+}
+
 /// A tick with flags of its own, of a gyro and of an accelerometer.
 fn flagged(flags: core::TickFlags, gyro: core::SensorFlags, accel: core::SensorFlags) -> core::CorrectedTick {
     core::CorrectedTick {
