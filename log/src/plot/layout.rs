@@ -105,7 +105,7 @@ impl Drawing {
         Chart {
             caption: format!(
                 "Unit {unit} in {of}. Bands reach from the smallest to the largest value in a column, the line is \
-                 the mean. Raw: readings with nominal scale factors, along the input axes."
+                 the mean. Raw: readings along the input axes, with nominal scale factors where a calibration for them is known."
             ),
             x: Axis::of("time", "s"),
             panels: panels.into_iter().flatten().filter(has_content).collect(),

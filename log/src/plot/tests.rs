@@ -79,7 +79,8 @@ fn two_logs_are_compared_tick_by_tick() {
         "calibration change",
         "ANGLE_RESTORED",
         "mode +1",
-           ] {
+        "changes and commands: 1",
+    ] {
         assert!(html.contains(words), "{words}");
     }
     insta::assert_snapshot!(
@@ -178,11 +179,13 @@ fn ticks_without_a_calibration_are_counted_and_not_drawn() {
     let raw = flagged(core::TickFlags::UNCALIBRATED, sensor, sensor);
     let mut shown = UnitPlot::new(2, None, 0);
     let mut handed_on = 0;
+    // A CSV of corrected ticks says no digest.
     let revision = Revision { counter: 1, digest: [0; 8] };
     for tick in [good, raw] {
         shown.take(&batch(&unit, revision, vec![tick]), &mut |_, _| handed_on += 1);
     }
     assert_eq!((handed_on, shown.uncalibrated), (1, 1));
+    assert_eq!(shown.revisions[0].label, "1");
     let drawn = shown.corrected.unwrap();
     assert_eq!((drawn.ticks(), drawn.finish(0).overall(0, 1.0).unwrap().max), (2, 0.0));
 }

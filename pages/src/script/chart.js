@@ -121,7 +121,10 @@ class Chart {
   listen() {
     const { stack } = this;
     stack.addEventListener("pointermove", event => this.moved(event));
-    stack.addEventListener("pointerleave", () => this.hide());
+    // What a tap shows stays: the finger that leaves has not gone elsewhere.
+    stack.addEventListener("pointerdown", event => this.moved(event));
+    stack.addEventListener("pointerleave", event => { if (event.pointerType !== "touch") this.hide(); });
+    stack.addEventListener("pointercancel", () => this.hide());
     new ResizeObserver(() => { if (!this.paper) this.resize(); }).observe(stack);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
   }

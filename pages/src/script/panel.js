@@ -63,12 +63,14 @@ class Panel {
     this.least = this.chart.margin ?? (width > 800 ? 168 : this.chart.paper ? 132 : 72);
   }
 
-  /** Makes the vertical axis; the room that its labels need. */
+  /** Makes the vertical axis; the room that its labels and the names of rows need. */
   measured() {
     this.axis = this.shape.lanes ? null : this.verticalAxis(this.shown());
     const g = this.canvas.getContext("2d");
     g.font = FONT;
-    const widest = Math.max(0, ...(this.axis?.ticks ?? []).map(tick => g.measureText(tick.label).width));
+    // On a phone names of rows are cut.
+    const labels = [...(this.axis?.ticks ?? []).map(tick => tick.label), ...(this.width > 640 ? this.lanes.map(lane => lane.name) : [])];
+    const widest = Math.max(0, ...labels.map(label => g.measureText(label).width));
     return Math.max(this.least, Math.min(Math.ceil(widest) + 10, 0.5 * this.width));
   }
 

@@ -72,6 +72,7 @@ class ZoomChart extends Chart {
     stack.addEventListener("pointercancel", () => { this.drag = this.selection = null; this.drawOver(); });
     stack.addEventListener("dblclick", () => this.show(this.whole));
     figure.addEventListener("keydown", event => this.key(event));
+    figure.addEventListener("focusout", () => this.hide());
     addEventListener("beforeprint", () => this.forPaper(true));
     addEventListener("afterprint", () => this.forPaper(false));
   }

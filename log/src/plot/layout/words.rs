@@ -17,7 +17,7 @@ pub(super) fn results(summary: &PlotSummary) -> Vec<(String, String)> {
                 more.push(format!("{} announced as missing", log.missed_ticks));
             }
             if log.marks > 0 {
-                more.push(format!("{} changes and commands", log.marks));
+                more.push(format!("changes and commands: {}", log.marks));
             }
             let sentence = format!("Unit {unit}{of}: {corrected} corrected ticks{}.", log.undrawn());
             results.push((sentence, more.join(", ")));
