@@ -107,7 +107,7 @@ impl Drawing {
                 "Unit {unit} in {of}. Bands reach from the smallest to the largest value in a column, the line is \
                  the mean. Raw: readings along the input axes, with nominal scale factors where a calibration for them is known."
             ),
-            x: Axis::of("time", "s"),
+            x: Axis { within: Some([0.0, self.seconds(self.end_ns)]), ..Axis::of("time", "s") },
             panels: panels.into_iter().flatten().filter(has_content).collect(),
             marks,
         }

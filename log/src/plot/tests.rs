@@ -224,6 +224,13 @@ fn the_page_of_many_ticks_is_no_larger_than_that_of_few() {
         let (page, summary) = plot(vec![log(&path)], &options, &mut |_| {}).unwrap();
         assert_eq!(summary.units["ZLG-0001"][0].as_ref().unwrap().corrected_ticks, ticks);
         let html = page.to_html();
+        // Bins reach further than the ticks, the axis does not.
+        let end = html
+            .split("\"within\":[0.0,")
+            .nth(1)
+            .and_then(|rest| rest.split(']').next()?.parse::<f64>().ok());
+        let expected = f64::from(u32::try_from(ticks - 1).unwrap()) * 0.005;
+        assert!(end.is_some_and(|end| (end - expected).abs() < 1e-6), "{end:?} {expected}");
         // The peak is in the table whatever was joined: 1 rad in 5 ms.
         assert!(
             html.contains(&format!("{:.0}", 200.0 * nominal::DEG_PER_H).chars().take(5).collect::<String>())

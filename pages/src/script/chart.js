@@ -31,7 +31,8 @@ class Chart {
       const [l, h] = panel.extent();
       [low, high] = [Math.min(low, l), Math.max(high, h)];
     }
-    this.data = [low, high];
+    const [first, last] = this.shape.x.within ?? [low, high];
+    [low, high] = this.data = [Math.max(low, first), Math.min(high, last)];
     if (!(low <= high)) return [0, 1];
     if (!(high > low)) return [low - 0.5, high + 0.5];
     // Dots at either end are not to be cut in two by the frame.
