@@ -73,7 +73,7 @@ impl Default for PlotOptions {
 /// How two logs of a unit differ.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct DifferenceSummary {
-    /// Corrected ticks that both logs have.
+    /// Corrected ticks that both logs have; those without a calibration are not compared.
     pub common_ticks: u64,
     /// Of these, ticks whose increments differ at all.
     pub differing_ticks: u64,
@@ -90,6 +90,8 @@ pub struct UnitSummary {
     pub raw_ticks: u64,
     /// Corrected ticks.
     pub corrected_ticks: u64,
+    /// Of these, ticks without a calibration: their values are not drawn, for raw readings pass through them unscaled.
+    pub uncalibrated_ticks: u64,
     /// Raw ticks that corrected ones announce as missing.
     pub missed_ticks: u64,
     /// Calibration changes, commands and the like.
@@ -100,8 +102,19 @@ pub struct UnitSummary {
     pub unreadable_messages: u64,
 }
 
+impl UnitSummary {
+    /// How many of the corrected ticks are not drawn, as the end of a clause; empty where all are.
+    #[must_use]
+    pub fn undrawn(&self) -> String {
+        match self.uncalibrated_ticks {
+            0 => String::new(),
+            ticks => format!(" ({ticks} of them uncalibrated: not drawn)"),
+        }
+    }
+}
+
 /// What is on the page.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PlotSummary {
     /// Names of the logs.
     pub logs: Vec<String>,
@@ -118,6 +131,10 @@ pub struct PlotSummary {
     pub units_left_out: u64,
     /// By how much the second log was moved on the time axis (ns), where the two do not overlap.
     pub second_moved_ns: Option<i64>,
+    /// What correcting the logs refused or passed over, in words.
+    pub troubles: Vec<String>,
+    /// Raw ticks that correcting the logs refused.
+    pub refused_ticks: u64,
 }
 
 fn none_has_its_own(serials: &[Option<String>]) -> bool {

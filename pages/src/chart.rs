@@ -14,13 +14,15 @@ pub struct Axis {
     pub unit: String,
     /// Whether it is logarithmic.
     pub logarithmic: bool,
+    /// Between which places the data lie, where bins at its ends reach further.
+    pub within: Option<[f64; 2]>,
 }
 
 impl Axis {
     /// A linear axis.
     #[must_use]
     pub fn of(label: &str, unit: &str) -> Self {
-        Self { label: label.to_owned(), unit: unit.to_owned(), logarithmic: false }
+        Self { label: label.to_owned(), unit: unit.to_owned(), logarithmic: false, within: None }
     }
 
     /// The same, logarithmic.
@@ -61,9 +63,13 @@ pub enum Ink {
 }
 
 impl Ink {
+    /// Colours for several of a kind.
+    pub const SEVERAL: [Self; 6] =
+        [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth, Self::Sixth];
+
     /// Colours for several of a kind, over and over again.
     pub fn several() -> impl Iterator<Item = Self> {
-        [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth, Self::Sixth].into_iter().cycle()
+        Self::SEVERAL.into_iter().cycle()
     }
 }
 
@@ -121,6 +127,8 @@ pub struct Series {
     pub ink: Ink,
     /// How it is drawn.
     pub form: Form,
+    /// Which dashes its line has: 0 for none, 1, 2 and 3 tell it from others of its colour; 4 is as 0, and so on.
+    pub dashes: usize,
     /// Its values.
     pub samples: Samples,
 }
@@ -129,7 +137,7 @@ impl Series {
     /// Points that are joined by lines.
     #[must_use]
     pub fn line(name: impl Into<String>, ink: Ink, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Self { name: name.into(), ink, form: Form::Line, samples: Samples::points(points) }
+        Self { name: name.into(), ink, form: Form::Line, dashes: 0, samples: Samples::points(points) }
     }
 
     /// Points one by one.

@@ -57,7 +57,7 @@ impl Store {
                 "min": self.values(min), "max": self.values(max), "mean": self.values(mean),
             }),
         };
-        json!({ "name": series.name, "ink": series.ink, "form": series.form, "samples": samples })
+        json!({ "name": series.name, "ink": series.ink, "form": series.form, "dashes": series.dashes, "samples": samples })
     }
 
     fn lane(&mut self, lane: &Lane) -> Value {

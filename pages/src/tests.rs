@@ -17,7 +17,13 @@ fn page() -> Page {
     });
     let x: Arc<[f64]> = vec![0.0, 1.0, 2.0, 3.0].into();
     let points = |y: [f64; 4]| Samples::Points { x: Arc::clone(&x), y: y.to_vec() };
-    let series = |name: &str, samples| Series { name: name.into(), ink: Ink::Raw, form: Form::Line, samples };
+    let series = |name: &str, samples| Series {
+        name: name.into(),
+        ink: Ink::Raw,
+        form: Form::Line,
+        dashes: 0,
+        samples,
+    };
     let bins = Samples::Bins {
         first: 0.0,
         width: 1.5,

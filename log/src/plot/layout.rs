@@ -105,9 +105,9 @@ impl Drawing {
         Chart {
             caption: format!(
                 "Unit {unit} in {of}. Bands reach from the smallest to the largest value in a column, the line is \
-                 the mean. Raw: readings with nominal scale factors, along the input axes."
+                 the mean. Raw: readings along the input axes, with nominal scale factors where a calibration for them is known."
             ),
-            x: Axis::of("time", "s"),
+            x: Axis { within: Some([0.0, self.seconds(self.end_ns)]), ..Axis::of("time", "s") },
             panels: panels.into_iter().flatten().filter(has_content).collect(),
             marks,
         }
@@ -159,15 +159,14 @@ impl Drawing {
         let mut modes_told = false;
         if let Some(gyro) = shown.gyro {
             modes_told = true;
-            let scale = match (nominal, gyro.kind) {
-                (Some(nominal), _) => Some(nominal.gyro.clone()),
-                (None, OutputKind::Mean) => Some(Scale::of_means(gyro.sensors, DEG_PER_H)),
-                (None, OutputKind::Counts) => None,
-            };
+            // A document for other sensors says nothing of these.
+            let scale = nominal.map(|nominal| nominal.gyro.clone()).filter(|scale| scale.is_of(&gyro));
+            let means = || (gyro.kind == OutputKind::Mean).then(|| Scale::of_means(gyro.sensors, DEG_PER_H));
+            let scale = scale.or_else(means);
             self.raw(log, gyro, scale, true, parts);
         }
         if let Some(accel) = shown.accel {
-            let scale = nominal.and_then(|nominal| nominal.accel.clone());
+            let scale = nominal.and_then(|nominal| nominal.accel.clone()).filter(|scale| scale.is_of(&accel));
             self.raw(log, accel, scale, false, parts);
         }
         if let Some(track) = shown.corrected {
@@ -177,11 +176,11 @@ impl Drawing {
             (shown.applied, &mut parts.applied, "temperature applied", "°C"),
             (shown.readings, &mut parts.readings, "temperature reading", "as sent"),
         ] {
-            for (index, (channel, track)) in tracks.into_iter().enumerate() {
-                let ink = Ink::several().nth(index + 2 * log).unwrap_or(Ink::First);
+            for ((ink, dashes), (channel, track)) in several(curves.len()).zip(tracks) {
                 let row = format!("{prefix}{what} {channel} ({unit})");
                 let name = format!("{prefix}{channel}");
-                curves.extend(self.curve(&track.finish(self.begin_ns), (0, 1.0), row, name, ink));
+                let curve = self.curve(&track.finish(self.begin_ns), (0, 1.0), row, name, ink);
+                curves.extend(curve.map(|curve| Series { dashes, ..curve }));
             }
         }
     }
@@ -206,7 +205,7 @@ impl Drawing {
         for (name, flag) in TickFlags::all().iter_names() {
             bits.push(named(flag.bits().trailing_zeros(), name.to_owned(), Ink::Alert));
         }
-        for (first, kind) in [(GYRO_FLAGS, "gyro"), (ACCEL_FLAGS, "accelerometer")] {
+        for (first, kind) in [(GYRO_FLAGS, "gyro"), (ACCEL_FLAGS, "accel")] {
             for (name, flag) in
                 SensorFlags::all().iter_names().filter(|(_, flag)| *flag != SensorFlags::VALID)
             {
@@ -230,28 +229,29 @@ impl Drawing {
         };
         let RawTrack { kind, sensors, track, .. } = raw;
         let unit = if scale.is_some() { unit } else { unscaled(kind) };
-        let scale = scale.unwrap_or(Scale { factors: vec![1.0; sensors], axes: Vec::new() });
+        let scale = scale.unwrap_or(Scale { kind, factors: vec![1.0; sensors], axes: Vec::new() });
         let finished = track.finish(self.begin_ns);
-        let mut own = Vec::new();
-        for index in 0..sensors {
+        let title = format!("raw {sensor}s");
+        let at = parts.unplaced.iter().position(|(known, other, _)| *known == title && *other == unit);
+        let at = at.unwrap_or_else(|| {
+            parts.unplaced.push((title, unit, Vec::new()));
+            parts.unplaced.len() - 1
+        });
+        let Some((_, _, own)) = parts.unplaced.get_mut(at) else { return };
+        for (index, several) in (0..sensors).zip(several(own.len())) {
             let factor = scale.factors.get(index).copied().unwrap_or(f64::NAN);
             let axis = scale.axes.get(index).copied();
             let place = axis.and_then(|axis| AXES.get(axis).zip(placed.get_mut(axis)));
-            let (what, name, ink, curves) = if let Some((axis, curves)) = place {
+            let (what, name, (ink, dashes), curves) = if let Some((axis, curves)) = place {
                 let ink = if log == 0 { Ink::Raw } else { Ink::Fourth };
-                (format!("{along} {axis}"), format!("{prefix}raw"), ink, curves)
+                (format!("{along} {axis}"), format!("{prefix}raw"), (ink, 0), curves)
             } else {
-                let ink = Ink::several().nth(index + 3 * log).unwrap_or(Ink::First);
                 let what = format!("{sensor} {}", index + 1);
-                (what.clone(), format!("{prefix}{what}"), ink, &mut own)
+                (what.clone(), format!("{prefix}{what}"), several, &mut *own)
             };
             let row = format!("{prefix}raw {what} ({unit})");
-            curves.extend(self.curve(&finished, (index, factor), row, name, ink));
-        }
-        let title = format!("raw {sensor}s");
-        match parts.unplaced.iter_mut().find(|(known, other, _)| *known == title && *other == unit) {
-            Some((_, _, curves)) => curves.extend(own),
-            None => parts.unplaced.push((title, unit, own)),
+            let curve = self.curve(&finished, (index, factor), row, name, ink);
+            curves.extend(curve.map(|curve| Series { dashes, ..curve }));
         }
         let bits = [
             (MODE_PLUS, "mode +1", Ink::Second),
@@ -289,7 +289,7 @@ impl Drawing {
         list.iter().zip(ends).map(stretch).collect()
     }
 
-    /// A curve of the values of one quantity, scaled, and its row in the table.
+    /// A curve of the values of one quantity, scaled, and its row in the table; `None` where there is none.
     fn curve(
         &mut self,
         finished: &Finished,
@@ -298,12 +298,22 @@ impl Drawing {
         name: String,
         ink: Ink,
     ) -> Option<Series> {
-        let overall = finished.overall(index, scale).filter(|overall| overall.mean.is_finite());
+        let overall = finished.overall(index, scale)?;
         self.rows.extend(
-            overall.map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
+            Some(overall)
+                .filter(|overall| overall.mean.is_finite())
+                .map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
         );
-        Some(Series { name, ink, form: Form::Line, samples: finished.samples(index, scale)? })
+        Some(Series { name, ink, form: Form::Line, dashes: 0, samples: finished.samples(index, scale)? })
     }
+}
+
+/// Colours and dashes of curves in a panel that has so many: behind each six, and for another log, the colours begin anew with other
+/// dashes.
+pub(super) fn several(before: usize) -> impl Iterator<Item = (Ink, usize)> {
+    let colours = Ink::SEVERAL.len();
+    let first = before.next_multiple_of(colours);
+    Ink::several().zip(first..).map(move |(ink, number)| (ink, number / colours))
 }
 
 /// Lanes of the bits that occurred.

@@ -13,7 +13,8 @@ use super::unit::UnitPlot;
 use super::{MAX_UNITS, PlotLog, PlotOptions, PlotSummary, UnitSummary, layout, track};
 use crate::error::Error;
 use crate::message::{Message, Topic};
-use crate::offline::Loaded;
+use crate::offline::{Loaded, troubles};
+use crate::streams::decoded::{Decoded, decode};
 use isotherm_pages::Page;
 
 /// Logs that begin further apart than this are laid side by side by their beginnings (ns).
@@ -67,16 +68,23 @@ impl Source {
         Ok(!self.over)
     }
 
-    /// The producer's time of the first message that has one (ns).
+    /// The end of the first gyro, accelerometer or corrected tick, else the time of the first message that has one (ns on the producer's
+    /// clock).
     fn first_ns(&mut self) -> Result<Option<i64>, Error> {
+        let mut other = None;
         while self.ahead.len() < LOOK_AHEAD && !self.over {
             let read = self.ahead.len();
             self.read()?;
-            if let Some(time) = self.ahead.iter().skip(read).find_map(Message::time) {
-                return Ok(Some(time.as_ns()));
+            for message in self.ahead.iter().skip(read) {
+                let Ok(Some((_, decoded))) = decode(message) else { continue };
+                let Some([first, _]) = decoded.times() else { continue };
+                if matches!(decoded, Decoded::Gyro(_) | Decoded::Accel(_) | Decoded::Corrected(_)) {
+                    return Ok(Some(first.as_ns()));
+                }
+                other.get_or_insert(first.as_ns());
             }
         }
-        Ok(None)
+        Ok(other)
     }
 }
 
@@ -90,6 +98,8 @@ pub(super) struct UnitLogs {
 pub(super) struct Plot {
     logs: Vec<Source>,
     units: BTreeMap<UnitId, UnitLogs>,
+    /// Those of the units that have raw or corrected messages.
+    drawn: BTreeSet<UnitId>,
     left_out: BTreeSet<UnitId>,
     detail: usize,
     nominal: Option<Nominal>,
@@ -115,6 +125,7 @@ impl Plot {
             moved_ns: vec![0; sources.len()],
             logs: sources,
             units: BTreeMap::new(),
+            drawn: BTreeSet::new(),
             left_out: BTreeSet::new(),
             detail: options.detail.clamp(2, 1 << 20),
             nominal: options.calibration.as_ref().map(|parsed| Nominal::of(&parsed.document)),
@@ -168,11 +179,23 @@ impl Plot {
         if serial != own && source.own.is_none() {
             source.own = Some(own.clone());
         }
-        if !self.units.contains_key(serial) {
-            if self.units.len() == MAX_UNITS {
+        if self.left_out.contains(serial) {
+            return;
+        }
+        // A unit of which only the status was recorded takes no place from one that has something to draw.
+        let draws = matches!(message.topic, Topic::Raw(..) | Topic::Corrected(_));
+        if draws && !self.drawn.contains(serial) {
+            if self.drawn.len() == MAX_UNITS {
+                self.units.remove(serial);
                 if self.left_out.len() < LOOK_AHEAD {
                     self.left_out.insert(serial.clone());
                 }
+                return;
+            }
+            self.drawn.insert(serial.clone());
+        }
+        if !self.units.contains_key(serial) {
+            if !draws && self.units.len() >= LOOK_AHEAD {
                 return;
             }
             let logs = self.moved_ns.iter().map(|_| None).collect();
@@ -197,6 +220,7 @@ impl Plot {
 
     /// Draws what was read.
     pub(super) fn finish(mut self) -> Result<(Page, PlotSummary), Error> {
+        self.units.retain(|serial, _| self.drawn.contains(serial));
         for unit in self.units.values_mut() {
             if let Some(difference) = &mut unit.difference {
                 difference.end();
@@ -217,7 +241,14 @@ impl Plot {
                 }
             }
         }
-        let summary = self.summary();
+        let (mut words, mut refused_ticks) = (Vec::new(), 0);
+        for source in &self.logs {
+            let Some((stream, _)) = &source.corrects else { continue };
+            let counters = stream.unit().counters();
+            refused_ticks += counters.gyro_ticks_in.saturating_sub(counters.ticks_out);
+            words.extend(troubles(stream, 0).iter().map(|trouble| format!("{}: {trouble}", source.log.name)));
+        }
+        let summary = PlotSummary { troubles: words, refused_ticks, ..self.summary() };
         // The page's size is bounded by that of two units.
         let units = self.units.len();
         if units > 2 {
@@ -239,6 +270,7 @@ impl Plot {
         let of = |shown: &UnitPlot| UnitSummary {
             raw_ticks: shown.gyro.as_ref().map_or(0, |raw| raw.track.ticks()),
             corrected_ticks: shown.corrected.as_ref().map_or(0, track::Track::ticks),
+            uncalibrated_ticks: shown.uncalibrated,
             missed_ticks: shown.missed,
             marks: shown.happenings.len() as u64,
             marks_left_out: shown.unlisted,
@@ -261,6 +293,8 @@ impl Plot {
             differences: differences.collect(),
             units_left_out: self.left_out.len() as u64,
             second_moved_ns: self.second_moved_ns,
+            troubles: Vec::new(),
+            refused_ticks: 0,
         }
     }
 }

@@ -12,6 +12,19 @@ use crate::message::{Message, Topic};
 use crate::part::{LogFiles, Part};
 use crate::recording::{RecordingOptions, RecordingWriter};
 
+/// A batch of corrected ticks.
+fn batch(unit: &UnitId, revision: Revision, ticks: Vec<core::CorrectedTick>) -> Message {
+    let batch = CorrectedBatch {
+        unit: unit.to_string(),
+        series: 0,
+        revision,
+        temperatures: std::iter::empty().collect(),
+        sigmas: Vec::new(),
+        ticks,
+    };
+    Message { topic: Topic::Corrected(unit.clone()), received_ns: 0, frame: codec::encode(&batch).unwrap() }
+}
+
 /// A recording of corrected ticks of 5 ms: the rate about x is `rate(n)`; ten ticks to a batch, another revision at `change`.
 fn recording(
     path: &std::path::Path,
@@ -34,16 +47,9 @@ fn recording(
             flags: if sequence == 15 { core::TickFlags::ANGLE_RESTORED } else { core::TickFlags::empty() },
             ..core::CorrectedTick::default()
         };
-        let batch = CorrectedBatch {
-            unit: unit.to_string(),
-            series: 0,
-            revision: Revision { counter: 1 + u64::from(first >= change), digest: [0xab; 8] },
-            temperatures: std::iter::empty().collect(),
-            sigmas: Vec::new(),
-            ticks: (first..(first + 10).min(ticks.end)).map(tick).collect(),
-        };
-        let frame = codec::encode(&batch).unwrap();
-        writer.write(&Message { topic: Topic::Corrected(unit.clone()), received_ns: first, frame }).unwrap();
+        let revision = Revision { counter: 1 + u64::from(first >= change), digest: [0xab; 8] };
+        let ticks = (first..(first + 10).min(ticks.end)).map(tick).collect();
+        writer.write(&Message { received_ns: first, ..batch(&unit, revision, ticks) }).unwrap();
     }
     writer.finish().unwrap();
 }
@@ -66,8 +72,15 @@ fn two_logs_are_compared_tick_by_tick() {
         DifferenceSummary { common_ticks: 400, differing_ticks: 200, only_first: 100, only_second: 100 };
     assert_eq!(difference, expected);
     let html = page.to_html();
-    for words in ["A corrected", "B corrected", "B − A x", "calibration change", "ANGLE_RESTORED", "mode +1"]
-    {
+    for words in [
+        "A corrected",
+        "B corrected",
+        "B − A x",
+        "calibration change",
+        "ANGLE_RESTORED",
+        "mode +1",
+        "changes and commands: 1",
+    ] {
         assert!(html.contains(words), "{words}");
     }
     insta::assert_snapshot!(
@@ -91,6 +104,99 @@ fn units_of_different_serials_keep_them() {
     for words in ["Unit ZLG-0001 in a.mcap:", "Unit MEMS-0001 in b.mcap:", "Unit ZLG-0001 and MEMS-0001"] {
         assert!(html.contains(words), "{words}");
     }
+}
+
+#[test]
+fn logs_of_different_days_begin_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+    // Their first batches are not equally long.
+    recording(&a, "ZLG-0001", 0..50, 9999, |_| 1e-6);
+    recording(&b, "ZLG-0001", 20_000_000..20_000_003, 9999, |_| 1e-6);
+    let (_, summary) = plot(vec![log(&a), log(&b)], &PlotOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(summary.second_moved_ns, Some(-100_000_000_000_000));
+    assert_eq!(summary.differences["ZLG-0001"].common_ticks, 3);
+}
+
+#[test]
+fn units_without_ticks_take_no_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let [idle, ticks] = ["idle.mcap", "ticks.mcap"].map(|name| folder.path().join(name));
+    let mut writer = RecordingWriter::create(&idle, RecordingOptions::default()).unwrap();
+    for number in 0..=MAX_UNITS {
+        let topic = Topic::Status(UnitId::new(&format!("IDLE-{number}")).unwrap());
+        writer.write(&Message { topic, received_ns: 0, frame: Vec::new() }).unwrap();
+    }
+    writer.finish().unwrap();
+    recording(&ticks, "ZLG-0001", 0..50, 9999, |_| 1e-6);
+    let messages = LogFiles::Recordings(vec![idle, ticks.clone()]).open(&Part::default()).unwrap();
+    let logs = vec![PlotLog { messages, ..log(&ticks) }];
+    let (_, summary) = plot(logs, &PlotOptions::default(), &mut |_| {}).unwrap();
+    assert_eq!(summary.units.keys().collect::<Vec<_>>(), ["ZLG-0001"]);
+    assert_eq!(summary.units_left_out, 0);
+}
+
+/// A tick with flags of its own, of a gyro and of an accelerometer.
+fn flagged(flags: core::TickFlags, gyro: core::SensorFlags, accel: core::SensorFlags) -> core::CorrectedTick {
+    core::CorrectedTick {
+        duration: Span::from_ms(5),
+        ticks: 1,
+        delta_angle: [1.0, 0.0, 0.0],
+        flags,
+        gyro_flags: std::iter::once(gyro).collect(),
+        accel_flags: std::iter::once(accel).collect(),
+        ..core::CorrectedTick::default()
+    }
+}
+
+#[test]
+fn each_flag_has_a_row_of_its_own() {
+    let (tick, sensor) = (core::TickFlags::empty(), core::SensorFlags::VALID);
+    let of_tick = core::TickFlags::all().iter_names();
+    let of_tick = of_tick.map(|(name, flag)| (name.to_owned(), flagged(flag, sensor, sensor)));
+    let of_sensor = core::SensorFlags::all().iter_names().filter(|(_, flag)| *flag != sensor);
+    let of_sensor = of_sensor.flat_map(|(name, flag)| {
+        let gyro = (format!("gyro {name}"), flagged(tick, flag, sensor));
+        [gyro, (format!("accel {name}"), flagged(tick, sensor, flag))]
+    });
+    let unit = UnitId::new("ZLG-0001").unwrap();
+    for (name, tick) in of_tick.chain(of_sensor) {
+        let mut shown = UnitPlot::new(2, None, 0);
+        shown.take(&batch(&unit, Revision::default(), vec![tick]), &mut |_, _| {});
+        let logs = UnitLogs { logs: vec![Some(shown)], difference: None };
+        let page = layout::page(vec![(unit.clone(), logs)], &PlotSummary::default()).unwrap().to_html();
+        assert_eq!(page.matches("\"bit\":").count(), 1, "{name}");
+        assert!(page.contains(&format!("\"name\":\"{name}\"")), "{name}");
+    }
+}
+
+#[test]
+fn ticks_without_a_calibration_are_counted_and_not_drawn() {
+    let unit = UnitId::new("ZLG-0001").unwrap();
+    let sensor = core::SensorFlags::VALID;
+    let good =
+        core::CorrectedTick { delta_angle: [0.0; 3], ..flagged(core::TickFlags::empty(), sensor, sensor) };
+    let raw = flagged(core::TickFlags::UNCALIBRATED, sensor, sensor);
+    let mut shown = UnitPlot::new(2, None, 0);
+    let mut handed_on = 0;
+    // A CSV of corrected ticks says no digest.
+    let revision = Revision { counter: 1, digest: [0; 8] };
+    for tick in [good, raw] {
+        shown.take(&batch(&unit, revision, vec![tick]), &mut |_, _| handed_on += 1);
+    }
+    assert_eq!((handed_on, shown.uncalibrated), (1, 1));
+    assert_eq!(shown.revisions[0].label, "1");
+    let drawn = shown.corrected.unwrap();
+    assert_eq!((drawn.ticks(), drawn.finish(0).overall(0, 1.0).unwrap().max), (2, 0.0));
+}
+
+#[test]
+fn channels_of_two_logs_are_told_apart() {
+    let [first, second] = [0, 8].map(|before| layout::several(before).take(8).collect::<Vec<_>>());
+    assert!(first.iter().zip(&second).all(|(a, b)| a.0 == b.0 && a.1 != b.1), "a channel keeps its colour");
+    let all: std::collections::BTreeSet<_> =
+        first.iter().chain(&second).map(|(ink, dashes)| (format!("{ink:?}"), dashes)).collect();
+    assert_eq!(all.len(), 16, "{all:?}");
 }
 
 #[test]
@@ -118,6 +224,13 @@ fn the_page_of_many_ticks_is_no_larger_than_that_of_few() {
         let (page, summary) = plot(vec![log(&path)], &options, &mut |_| {}).unwrap();
         assert_eq!(summary.units["ZLG-0001"][0].as_ref().unwrap().corrected_ticks, ticks);
         let html = page.to_html();
+        // Bins reach further than the ticks, the axis does not.
+        let end = html
+            .split("\"within\":[0.0,")
+            .nth(1)
+            .and_then(|rest| rest.split(']').next()?.parse::<f64>().ok());
+        let expected = f64::from(u32::try_from(ticks - 1).unwrap()) * 0.005;
+        assert!(end.is_some_and(|end| (end - expected).abs() < 1e-6), "{end:?} {expected}");
         // The peak is in the table whatever was joined: 1 rad in 5 ms.
         assert!(
             html.contains(&format!("{:.0}", 200.0 * nominal::DEG_PER_H).chars().take(5).collect::<String>())
@@ -133,7 +246,6 @@ fn ten_million_ticks_make_a_bounded_page() {
     let begun = std::time::Instant::now();
     let mut shown = UnitPlot::new(PlotOptions::default().detail, None, 0);
     let unit = UnitId::new("ZLG-0001").unwrap();
-    let mut frame = Vec::new();
     let ticks = 10_000_000_u64;
     for first in (0..ticks).step_by(256) {
         let tick = |sequence: u64| {
@@ -148,28 +260,11 @@ fn ten_million_ticks_make_a_bounded_page() {
                 ..core::CorrectedTick::default()
             }
         };
-        let batch = CorrectedBatch {
-            unit: unit.to_string(),
-            series: 0,
-            revision: Revision::default(),
-            temperatures: std::iter::empty().collect(),
-            sigmas: Vec::new(),
-            ticks: (first..(first + 256).min(ticks)).map(tick).collect(),
-        };
-        codec::encode_into(&batch, &mut frame).unwrap();
-        let message = Message { topic: Topic::Corrected(unit.clone()), received_ns: 0, frame: frame.clone() };
-        shown.take(&message, &mut |_, _| {});
+        let ticks = (first..(first + 256).min(ticks)).map(tick).collect();
+        shown.take(&batch(&unit, Revision::default(), ticks), &mut |_, _| {});
     }
     let taken = begun.elapsed();
-    let summary = PlotSummary {
-        logs: vec!["ten million".into()],
-        own_serials: Vec::new(),
-        reading: Vec::new(),
-        units: BTreeMap::new(),
-        differences: BTreeMap::new(),
-        units_left_out: 0,
-        second_moved_ns: None,
-    };
+    let summary = PlotSummary { logs: vec!["ten million".into()], ..PlotSummary::default() };
     let logs = UnitLogs { logs: vec![Some(shown)], difference: None };
     let html = layout::page(vec![(unit, logs)], &summary).unwrap().to_html();
     println!(

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags};
+use isotherm_correction::sample::{LasingMode, OutputKind, SensorFlags, TickFlags};
 use isotherm_correction::units::{Span, Timestamp};
 use isotherm_protocol::codec;
 use isotherm_protocol::corrected::{CorrectedBatch, CorrectedTick, Revision};
@@ -25,15 +25,18 @@ const MAX_LISTED: usize = 2000;
 /// Most sensors of one kind.
 const SENSORS: usize = isotherm_correction::sample::MAX_SENSORS;
 /// First bit of the flags of any gyro, behind those of the tick.
-pub(super) const GYRO_FLAGS: u32 = 14;
+pub(super) const GYRO_FLAGS: u32 = u16::BITS - TickFlags::all().bits().leading_zeros();
+/// Flags of a sensor; its first, `VALID`, is not shown.
+const SENSOR_FLAGS: u32 = u8::BITS - SensorFlags::all().bits().leading_zeros() - 1;
 /// First bit of the flags of any accelerometer.
-pub(super) const ACCEL_FLAGS: u32 = 19;
+pub(super) const ACCEL_FLAGS: u32 = GYRO_FLAGS + SENSOR_FLAGS;
 /// Bit of the lasing mode +1.
-pub(super) const MODE_PLUS: u32 = 24;
+pub(super) const MODE_PLUS: u32 = ACCEL_FLAGS + SENSOR_FLAGS;
 /// Bit of the lasing mode −1.
-pub(super) const MODE_MINUS: u32 = 25;
+pub(super) const MODE_MINUS: u32 = MODE_PLUS + 1;
 /// Bit of a switch that is commanded.
-pub(super) const SWITCH: u32 = 26;
+pub(super) const SWITCH: u32 = MODE_MINUS + 1;
+const _: () = assert!(SWITCH < u32::BITS, "all flags of a tick have a bit of their own");
 
 /// What is the case from some time on.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +85,8 @@ pub(super) struct UnitPlot {
     pub(super) unlisted: u64,
     pub(super) nominal: Option<Nominal>,
     pub(super) missed: u64,
+    /// Corrected ticks that are not drawn: raw readings pass through them unscaled.
+    pub(super) uncalibrated: u64,
     pub(super) unreadable: u64,
     revision: Option<Revision>,
     joiner: Joiner,
@@ -93,7 +98,7 @@ impl UnitPlot {
         Self { detail, clock: Clock::moved(moved_ns), nominal, ..Self::default() }
     }
 
-    /// Takes a message of the unit; corrected ticks are handed on with their time on the axis (ns).
+    /// Takes a message of the unit; corrected ticks with a calibration are handed on with their time on the axis (ns).
     pub(super) fn take(&mut self, message: &Message, corrected: &mut dyn FnMut(i64, &CorrectedTick)) {
         if self.read(message, corrected).is_none() {
             self.unreadable += 1;
@@ -181,8 +186,13 @@ impl UnitPlot {
                 let until = at_ns.saturating_sub(tick.duration.as_ns());
                 track.gap(until);
             }
-            track.push(at_ns, &increments(tick), flags(tick));
-            corrected(at_ns, tick);
+            if tick.flags.contains(TickFlags::UNCALIBRATED) {
+                self.uncalibrated += 1;
+                track.push(at_ns, &[], flags(tick));
+            } else {
+                track.push(at_ns, &increments(tick), flags(tick));
+                corrected(at_ns, tick);
+            }
             last_ns = Some(at_ns);
         }
         if let Some(at_ns) = last_ns {
@@ -333,15 +343,21 @@ fn mode_bit(mode: Option<LasingMode>) -> u32 {
 
 /// All flags of a tick in one word.
 fn flags(tick: &CorrectedTick) -> u32 {
+    // A flag that is not known would fall on another's bit.
     let any = |flags: &[SensorFlags]| {
-        u32::from(flags.iter().fold(0, |bits, flags| bits | flags.bits()) >> 1 & 0b1_1111)
+        let any = flags.iter().fold(SensorFlags::empty(), |any, flags| any | *flags);
+        u32::from((any & SensorFlags::all()).bits() >> 1)
     };
     let mode = mode_bit(tick.mode);
-    let tick_flags = u32::from(tick.flags.bits()) & ((1 << GYRO_FLAGS) - 1);
+    let tick_flags = u32::from((tick.flags & TickFlags::all()).bits());
     tick_flags | any(&tick.gyro_flags) << GYRO_FLAGS | any(&tick.accel_flags) << ACCEL_FLAGS | mode
 }
 
 /// A revision's counter and the first digits of its digest.
 fn named(revision: Revision) -> String {
-    format!("{} ({})", revision.counter, Digits(revision.digest.split_at(4).0))
+    match (revision.counter, revision.digest) {
+        // A CSV of corrected ticks has no digest.
+        (counter, [0, 0, 0, 0, 0, 0, 0, 0]) => counter.to_string(),
+        (counter, digest) => format!("{counter} ({})", Digits(digest.split_at(4).0)),
+    }
 }

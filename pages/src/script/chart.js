@@ -31,7 +31,8 @@ class Chart {
       const [l, h] = panel.extent();
       [low, high] = [Math.min(low, l), Math.max(high, h)];
     }
-    this.data = [low, high];
+    const [first, last] = this.shape.x.within ?? [low, high];
+    [low, high] = this.data = [Math.max(low, first), Math.min(high, last)];
     if (!(low <= high)) return [0, 1];
     if (!(high > low)) return [low - 0.5, high + 0.5];
     // Dots at either end are not to be cut in two by the frame.
@@ -43,18 +44,18 @@ class Chart {
   toolbar() {
     const bar = element("div", "bar");
     this.figure.prepend(bar);
-    const kinds = new Map(this.shape.marks.map(mark => [mark.kind, mark.ink]));
+    const kinds = new Map(this.shape.marks.map(mark => [mark.kind, mark]));
     for (const [all, form] of [[this.legends.shared, "line"], [kinds, "dash"]]) {
-      for (const [name, ink] of all) this.toggle(bar, name, ink, form);
+      for (const [name, { ink, dashes }] of all) this.toggle(bar, name, ink, form, dashes);
     }
     return bar;
   }
 
-  toggle(bar, name, ink, form) {
+  toggle(bar, name, ink, form, dashes) {
     const made = element("button", "key", bar);
     made.type = "button";
     made.setAttribute("aria-pressed", "true");
-    element("i", form + " " + ink, made);
+    element("i", form + " " + ink, made).style.background = dashed(dashes);
     made.append(name);
     this.keys.set(name, [...(this.keys.get(name) ?? []), made]);
     made.addEventListener("click", () => {
@@ -121,7 +122,10 @@ class Chart {
   listen() {
     const { stack } = this;
     stack.addEventListener("pointermove", event => this.moved(event));
-    stack.addEventListener("pointerleave", () => this.hide());
+    // What a tap shows stays: the finger that leaves has not gone elsewhere.
+    stack.addEventListener("pointerdown", event => this.moved(event));
+    stack.addEventListener("pointerleave", event => { if (event.pointerType !== "touch") this.hide(); });
+    stack.addEventListener("pointercancel", () => this.hide());
     new ResizeObserver(() => { if (!this.paper) this.resize(); }).observe(stack);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
   }
@@ -160,9 +164,9 @@ class Chart {
     const tip = this.tip;
     tip.replaceChildren();
     element("b", "", tip, this.place(x, perPixel));
-    for (const { name, words, ink } of panel.said(x, 6 * perPixel)) {
+    for (const { name, words, ink, dashes } of panel.said(x, 6 * perPixel)) {
       const row = element("div", "", tip);
-      element("i", "line " + ink, row);
+      element("i", "line " + ink, row).style.background = dashed(dashes);
       row.append(name + (words ? ": " + words : ""));
     }
     const near = this.visibleMarks().filter(mark => Math.abs(mark.x - x) < 4 * perPixel);

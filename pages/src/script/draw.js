@@ -2,6 +2,17 @@
 
 const FONT = "12px system-ui, sans-serif";
 
+/** Dashes of lines, by number: what is drawn and what is left out in turn. */
+const DASHES = [[], [7, 5], [2, 4], [9, 3, 2, 3]];
+
+/** The same as the background of a key. */
+function dashed(number = 0) {
+  let end = 0;
+  const stops = DASHES[number % DASHES.length].map((length, i) =>
+    (i % 2 ? "transparent " : "currentColor ") + end + "px " + (end += length) + "px");
+  return stops.length ? "repeating-linear-gradient(to right, " + stops.join(", ") + ")" : "";
+}
+
 /** The frame, grid and labels of a panel. `y` is null for lanes. */
 function drawAxes(g, view, xTicks, y, colours) {
   g.font = FONT;
@@ -50,7 +61,7 @@ function clipped(g, view, draw) {
  * One curve. Where many samples fall into a column, its smallest to largest is filled here; what is returned draws the line of
  * means, once all curves are filled.
  */
-function drawSeries(g, view, y, s, form, { colour, paper, density, dashes }) {
+function drawSeries(g, view, y, s, form, { colour, paper, density, dashes = 0 }) {
   const bottom = view.top + view.height;
   const level = value => bottom - y.to(value);
   g.strokeStyle = g.fillStyle = colour;
@@ -69,7 +80,7 @@ function drawSeries(g, view, y, s, form, { colour, paper, density, dashes }) {
     g.strokeStyle = paper;
     if (rim) strokeRuns(g, count, point, 3.5);
     g.strokeStyle = g.fillStyle = colour;
-    g.setLineDash(dashes ?? []);
+    g.setLineDash(DASHES[dashes % DASHES.length]);
     strokeRuns(g, count, point, 1.3);
     g.setLineDash([]);
   };

@@ -17,7 +17,7 @@ class Panel {
     this.element = element("section", "panel", parent);
     this.head = element("div", "head", this.element);
     element("h3", "", this.head, [shape.title, shape.unit].filter(Boolean).join(", "));
-    for (const [name, ink] of own) chart.toggle(this.head, name, ink, "line");
+    for (const [name, { ink, dashes }] of own) chart.toggle(this.head, name, ink, "line", dashes);
     const box = element("div", "plot", this.element);
     this.canvas = element("canvas", "", box);
     this.over = element("canvas", "over", box);
@@ -63,12 +63,14 @@ class Panel {
     this.least = this.chart.margin ?? (width > 800 ? 168 : this.chart.paper ? 132 : 72);
   }
 
-  /** Makes the vertical axis; the room that its labels need. */
+  /** Makes the vertical axis; the room that its labels and the names of rows need. */
   measured() {
     this.axis = this.shape.lanes ? null : this.verticalAxis(this.shown());
     const g = this.canvas.getContext("2d");
     g.font = FONT;
-    const widest = Math.max(0, ...(this.axis?.ticks ?? []).map(tick => g.measureText(tick.label).width));
+    // On a phone names of rows are cut.
+    const labels = [...(this.axis?.ticks ?? []).map(tick => tick.label), ...(this.width > 640 ? this.lanes.map(lane => lane.name) : [])];
+    const widest = Math.max(0, ...labels.map(label => g.measureText(label).width));
     return Math.max(this.least, Math.min(Math.ceil(widest) + 10, 0.5 * this.width));
   }
 
@@ -161,7 +163,7 @@ class Panel {
       let words = plain(value, 7) + (this.shape.unit ? " " + this.shape.unit : "");
       const [low, high] = [s.min.list[i] + s.min.middle, s.max.list[i] + s.max.middle];
       if (!s.single && high > low) words += " (" + plain(low, 6) + " \u2026 " + plain(high, 6) + ")";
-      if (isFinite(value)) lines.push({ name: one.name, words, ink: one.ink });
+      if (isFinite(value)) lines.push({ name: one.name, words, ink: one.ink, dashes: one.dashes });
     }
     const noted = [];
     for (const lane of this.lanes) {

@@ -35,12 +35,14 @@ function logTicks(low, high, most) {
 
 /** Steps of a time axis, in seconds; below the first decimal ones. */
 const TIME_STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400];
+const DAY = 86400;
 
-/** Tick marks of a time axis in seconds. */
+/** Tick marks of a time axis in seconds: of days where they are many. */
 function timeTicks(low, high, most) {
   const coarse = (high - low) / Math.max(most, 2);
-  if (!(coarse > 0.5) || coarse > 86400) return linearTicks(low, high, most);
-  const step = TIME_STEPS.find(s => s >= coarse) ?? 86400;
+  if (!(coarse > 0.5)) return linearTicks(low, high, most);
+  if (coarse > DAY) return { values: linearTicks(low / DAY, high / DAY, most).values.map(days => days * DAY), decimals: 0 };
+  const step = TIME_STEPS.find(s => s >= coarse);
   const values = [];
   for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) values.push(i * step);
   return { values, decimals: 0 };
@@ -88,8 +90,9 @@ function placed(x, step) {
   return grouped(decimals ? fixed.replace(/\.?0+$/, "") : fixed);
 }
 
-/** Seconds as 1:02:03.4, or 12.345 s below a minute; `step` says how fine. */
+/** Seconds as 1:02:03.4, 12.345 s below a minute, or whole days; `step` says how fine. */
 function clock(seconds, step) {
+  if (step >= DAY) return grouped((seconds / DAY).toFixed(0)) + " d";
   const decimals = step >= 1 ? 0 : Math.min(Math.ceil(-Math.log10(step) - 1e-9), 9);
   const rounded = Number(Math.abs(seconds).toFixed(decimals));
   const sign = seconds < 0 && rounded > 0 ? "\u2212" : "";
@@ -119,25 +122,25 @@ function mapping([low, high], pixels, logarithmic) {
 }
 
 /**
- * What stands for one colour in several panels, or is in the only one, is named above all of them; what is in one panel by
+ * What has one colour and the same dashes in several panels, or is in the only one, is named above all of them; what is in one panel by
  * itself, or has other colours elsewhere, beside each panel that it is in, where there is more than one curve to tell apart.
  */
 function legends(panels) {
   const found = new Map();
   panels.forEach((panel, index) => {
-    for (const { name, ink } of panel.series ?? []) {
-      if (!found.has(name)) found.set(name, { inks: new Set(), panels: new Set() });
-      found.get(name).inks.add(ink);
+    for (const { name, ink, dashes } of panel.series ?? []) {
+      if (!found.has(name)) found.set(name, { key: { ink, dashes }, inks: new Set(), panels: new Set() });
+      found.get(name).inks.add(ink + " " + dashes);
       found.get(name).panels.add(index);
     }
   });
   const drawn = panels.filter(panel => panel.series?.length).length;
   const shared = new Map();
-  for (const [name, { inks, panels: all }] of found) {
-    if (inks.size === 1 && (all.size > 1 || drawn === 1)) shared.set(name, [...inks][0]);
+  for (const [name, { key, inks, panels: all }] of found) {
+    if (inks.size === 1 && (all.size > 1 || drawn === 1)) shared.set(name, key);
   }
   const own = panels.map(panel => {
-    const names = new Map((panel.series ?? []).map(one => [one.name, one.ink]));
+    const names = new Map((panel.series ?? []).map(({ name, ink, dashes }) => [name, { ink, dashes }]));
     return names.size < 2 ? new Map() : new Map([...names].filter(([name]) => !shared.has(name)));
   });
   return { shared, own };

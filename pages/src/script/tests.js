@@ -9,6 +9,8 @@ equal(values(linearTicks(-1.3, 1.1, 5)), [-1, -0.5, 0, 0.5, 1]);
 equal(linearTicks(3, 3, 4).values, [3]);
 equal(linearTicks(9.80665, 9.80667, 4).values.length, 5);
 equal(values(timeTicks(0, 3600, 8)), [0, 600, 1200, 1800, 2400, 3000, 3600]);
+equal(values(timeTicks(0, 40 * DAY, 8)), [0, 5, 10, 15, 20, 25, 30, 35, 40].map(days => days * DAY));
+equal([clock(5 * DAY, 5 * DAY), clock(-2 * DAY, DAY), clock(5 * DAY, DAY / 2)], ["5 d", "\u22122 d", "120:00:00"]);
 equal(values(timeTicks(0, 0.01, 5)), [0, 0.002, 0.004, 0.006, 0.008, 0.01]);
 equal(values(logTicks(0.9, 1200, 8)), [1, 10, 100, 1000]);
 equal(values(logTicks(1, 50, 9)), [1, 2, 5, 10, 20, 50]);
@@ -37,14 +39,18 @@ equal(clock(-90, 1), "\u22121:30");
 equal(clock(59.9999, 0.1), "1:00.0");
 
 // Legends: a colour is said where it is right.
-const curves = (...all) => ({ series: all.map(([name, ink]) => ({ name, ink })) });
+const curves = (...all) => ({ series: all.map(([name, ink, dashes = 0]) => ({ name, ink, dashes })) });
+const keys = all => [...all].map(([name, { ink }]) => [name, ink]);
 const both = curves(["before", "raw"], ["after", "corrected"]);
 const said = legends([both, both, curves(["of x", "first"], ["of y", "second"]), { lanes: [] }]);
-equal([...said.shared], [["before", "raw"], ["after", "corrected"]]);
-equal(said.own.map(own => [...own]), [[], [], [["of x", "first"], ["of y", "second"]], []]);
+equal(keys(said.shared), [["before", "raw"], ["after", "corrected"]]);
+equal(said.own.map(keys), [[], [], [["of x", "first"], ["of y", "second"]], []]);
 const mixed = legends([curves(["x", "first"], ["z", "third"]), curves(["z", "first"], ["x", "first"])]);
-equal([[...mixed.shared], mixed.own.map(own => [...own])], [[["x", "first"]], [[["z", "third"]], [["z", "first"]]]]);
+equal([keys(mixed.shared), mixed.own.map(keys)], [[["x", "first"]], [[["z", "third"]], [["z", "first"]]]]);
 equal([...legends([both]).shared].length, 2);
+// Lines of one colour differ by their dashes, which are in the key.
+const dashes = legends([curves(["x", "first"], ["y", "first", 1]), curves(["z", "first"], ["y", "first", 2])]);
+equal([keys(dashes.shared), dashes.own.map(own => own.get("y").dashes)], [[], [1, 2]]);
 
 // Mapping, zooming, moving.
 for (const logarithmic of [false, true]) {

@@ -72,6 +72,7 @@ class ZoomChart extends Chart {
     stack.addEventListener("pointercancel", () => { this.drag = this.selection = null; this.drawOver(); });
     stack.addEventListener("dblclick", () => this.show(this.whole));
     figure.addEventListener("keydown", event => this.key(event));
+    figure.addEventListener("focusout", () => this.hide());
     addEventListener("beforeprint", () => this.forPaper(true));
     addEventListener("afterprint", () => this.forPaper(false));
   }
@@ -131,10 +132,22 @@ class ZoomChart extends Chart {
 }
 
 async function begin() {
-  for (const holder of document.querySelectorAll("script[data-type]")) {
-    lists.set(holder.id, await unpacked(holder.textContent, holder.dataset.type));
-    holder.remove();
+  const figures = [...document.querySelectorAll("figure.chart")];
+  const notes = figures.map(figure => {
+    const note = element("p", "help", null, "Unpacking the curves\u2026");
+    figure.prepend(note);
+    return note;
+  });
+  try {
+    for (const holder of document.querySelectorAll("script[data-type]")) {
+      lists.set(holder.id, await unpacked(holder.textContent, holder.dataset.type));
+      holder.remove();
+    }
+  } catch (error) {
+    for (const note of notes) note.textContent = "The curves cannot be unpacked: " + error;
+    throw error;
   }
-  document.querySelectorAll("figure.chart").forEach(figure => new ZoomChart(figure));
+  for (const note of notes) note.remove();
+  for (const figure of figures) new ZoomChart(figure);
 }
 begin();

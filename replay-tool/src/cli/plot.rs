@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use isotherm_cli::{Bar, Exit, print};
+use isotherm_correction::units::Span;
 use isotherm_log::diff::is_csv;
 use isotherm_log::file::write_whole;
 use isotherm_log::offline::read_document;
 use isotherm_log::part::Messages;
 use isotherm_log::plot::{PlotLog, PlotOptions, PlotSummary, plot};
 use isotherm_log::source::LogReport;
+use isotherm_log::text::LogEvent;
 use isotherm_protocol::key::UnitId;
 use serde::Serialize;
 
@@ -18,8 +20,12 @@ use super::log_args::{LogArgs, unnamed};
 use super::{check_outputs, show};
 use crate::error::Error;
 
-/// Ticks in one batch of a text log.
-const BATCH: usize = 256;
+/// Most ticks in one batch of a text log.
+const BATCH: u64 = 256;
+/// Longest batch of a text log (ns): a batch of corrected ticks has one temperature of each channel.
+const LONGEST_NS: u64 = 1_000_000_000;
+/// Events of a text log that its first gyro tick is looked for among.
+const LOOK_AHEAD: usize = 4096;
 /// Most bins of a quantity where nobody says.
 const DETAIL: u32 = 32_768;
 
@@ -89,8 +95,9 @@ impl PlotArgs {
 pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
-    let exit = Exit::of_loss(summary.reading.iter().any(LogReport::lost_data));
-    Ok(print(&if args.json { show::json(&report) } else { human(&report) }, exit))
+    summary.troubles.iter().for_each(|trouble| show::warn(trouble));
+    let lost = summary.reading.iter().any(LogReport::lost_data) || summary.refused_ticks > 0;
+    Ok(print(&if args.json { show::json(&report) } else { human(&report) }, Exit::of_loss(lost)))
 }
 
 /// Draws a text log that a mapping reads.
@@ -119,6 +126,20 @@ fn corrected(log: &LogArgs, unnamed: Option<&UnitId>) -> Result<Option<Messages>
     unit.map(|unit| Ok(Messages::of_corrected(path, &unit, &log.part()?)?)).transpose()
 }
 
+/// Ticks in one batch of a text log, of which the first gyro tick lasts so long.
+fn batch_ticks(first: Option<Span>) -> u64 {
+    let first_ns = first.and_then(|first| u64::try_from(first.as_ns()).ok()).unwrap_or(0);
+    (LONGEST_NS / first_ns.max(1)).clamp(1, BATCH)
+}
+
+/// How long the first gyro tick of a text log lasts.
+fn first_tick(log: &LogArgs) -> Result<Option<Span>, Error> {
+    Ok(log.events(&log.part()?)?.take(LOOK_AHEAD).find_map(|event| match event {
+        Ok(LogEvent::Gyro { tick, .. }) => Some(tick.duration),
+        _ => None,
+    }))
+}
+
 /// Writes the page; its length, and what it shows.
 fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
     let other = args.other();
@@ -140,8 +161,11 @@ fn draw(args: &PlotArgs) -> Result<(usize, PlotSummary), Error> {
         } else {
             let document = calibration.as_ref().map(|parsed| parsed.document.unit.as_str());
             document.map_or(Ok(()), |unit| log.refuse_document_of_another(unit))?;
-            let (mut files, mut part) = (log.files(BATCH, unnamed.as_ref())?, log.part()?);
-            if calibration.is_some() && !log.is_recording()? {
+            let recording = log.is_recording()?;
+            let batch_ticks = batch_ticks(if recording { None } else { first_tick(log)? });
+            let batch_ticks = usize::try_from(batch_ticks).unwrap_or(1);
+            let (mut files, mut part) = (log.files(batch_ticks, unnamed.as_ref())?, log.part()?);
+            if calibration.is_some() && !recording {
                 correct_from = Some(files.from_beginning(&mut part)?);
             }
             files.open(&part)?
@@ -180,8 +204,12 @@ fn human(report: &Report<'_>) -> String {
             let unit = summary.serial_in(index, unit);
             let _ = writeln!(
                 text,
-                "unit {unit} in {log}: {} raw ticks, {} corrected, {} announced as missing, {} marks",
-                shown.raw_ticks, shown.corrected_ticks, shown.missed_ticks, shown.marks
+                "unit {unit} in {log}: {} raw ticks, {} corrected{}, {} announced as missing, {} marks",
+                shown.raw_ticks,
+                shown.corrected_ticks,
+                shown.undrawn(),
+                shown.missed_ticks,
+                shown.marks
             );
             if shown.marks_left_out + shown.unreadable_messages > 0 {
                 let _ = writeln!(
@@ -208,4 +236,16 @@ fn human(report: &Report<'_>) -> String {
     }
     summary.reading.iter().for_each(|report| text += &show::reading(report));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_batch_lasts_a_second_at_most() {
+        let ticks = [1, 5, 10, 1000, 4000].map(|ms| batch_ticks(Some(Span::from_ms(ms))));
+        assert_eq!(ticks, [256, 200, 100, 1, 1]);
+        assert_eq!(batch_ticks(None), 256);
+    }
 }

@@ -119,6 +119,17 @@ fn a_simulated_log_with_modes_is_told_and_drawn() {
 }
 
 #[test]
+fn a_document_for_other_sensors_scales_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let full = root().join("config/calibration/example-full.toml");
+    std::fs::copy(full, path.join("full.toml")).unwrap();
+    check(&replay(path, &["simulate", "--preset", "skewed-six", "--duration", "2", "--out", "six.csv"]), 0);
+    let said = told(path, &["plot", "six.csv", "--calibration", "full.toml", "--out", "six.html"]);
+    insta::assert_snapshot!(said + &rows(path, "six.html"));
+}
+
+#[test]
 fn a_page_is_not_written_over_its_log() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("log.csv"), "1\n").unwrap();

@@ -17,9 +17,9 @@ pub(super) fn results(summary: &PlotSummary) -> Vec<(String, String)> {
                 more.push(format!("{} announced as missing", log.missed_ticks));
             }
             if log.marks > 0 {
-                more.push(format!("{} changes and commands", log.marks));
+                more.push(format!("changes and commands: {}", log.marks));
             }
-            let sentence = format!("Unit {unit}{of}: {corrected} corrected ticks.");
+            let sentence = format!("Unit {unit}{of}: {corrected} corrected ticks{}.", log.undrawn());
             results.push((sentence, more.join(", ")));
         }
     }
@@ -47,6 +47,7 @@ pub(super) fn remarks(summary: &PlotSummary) -> Vec<String> {
             seconds(moved_ns)
         ));
     }
+    words.extend(summary.troubles.iter().map(|trouble| format!("{trouble}.")));
     if summary.units_left_out > 0 {
         words.push(format!("{} further units are left out: choose with --unit.", summary.units_left_out));
     }

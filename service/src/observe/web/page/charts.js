@@ -126,8 +126,6 @@ function put(curve, x, min, mean, max, scale = 1) {
 }
 
 const INKS_OF_CHANNELS = ["first", "second", "third", "fourth", "fifth", "sixth"];
-/** After as many channels as there are colours, the lines are broken ones. */
-const DASHES_OF_CHANNELS = [null, [7, 5], [2, 4]];
 
 /** Temperatures of all channels over the last minutes. */
 class Temperatures {
@@ -166,14 +164,12 @@ class Temperatures {
     this.curves = names.map(() => new Curve());
     const series = names.map((name, index) => ({
       name, ink: INKS_OF_CHANNELS[index % INKS_OF_CHANNELS.length], form: "line", samples: this.curves[index],
-      dashes: DASHES_OF_CHANNELS[Math.floor(index / INKS_OF_CHANNELS.length) % DASHES_OF_CHANNELS.length],
+      // After as many channels as there are colours, the lines are broken ones.
+      dashes: Math.floor(index / INKS_OF_CHANNELS.length),
     }));
     const figure = make("figure", { className: "chart", "aria-label": "Temperatures of the last minutes" });
     this.place.replaceChildren(figure);
     const panels = [{ title: "", unit: "°C", height: 130, series }];
     this.chart = new RunningChart(figure, { x: { label: "", unit: "s", logarithmic: false }, panels, marks: [] });
-    for (const { name } of series.filter(one => one.dashes)) {
-      for (const key of this.chart.keys.get(name)) key.firstChild.classList.add("dash");
-    }
   }
 }
