@@ -121,7 +121,15 @@ impl LogArgs {
         if self.is_recording()? {
             return Ok(self.log.clone());
         }
-        Ok(LogReader::open(&self.text_mapping()?, &self.log)?.paths().to_vec())
+        Ok(self.text_log()?.paths().to_vec())
+    }
+
+    /// Opens a text log.
+    ///
+    /// # Errors
+    /// As [`LogArgs::files`].
+    pub(crate) fn text_log(&self) -> Result<LogReader, Error> {
+        Ok(LogReader::open(&self.text_mapping()?, &self.log)?)
     }
 
     /// The file of a text log's mapping: the one given, else the one beside the log.

@@ -95,7 +95,7 @@ impl PlotArgs {
 pub(super) fn run(args: &PlotArgs) -> Result<Exit, Error> {
     let (bytes, summary) = draw(args)?;
     let report = Report { page: args.out.display().to_string(), bytes, summary: &summary };
-    summary.troubles.iter().for_each(|trouble| show::warn(trouble));
+    summary.troubles.iter().for_each(show::warn);
     let lost = summary.reading.iter().any(LogReport::lost_data) || summary.refused_ticks > 0;
     Ok(print(&if args.json { show::json(&report) } else { human(&report) }, Exit::of_loss(lost)))
 }
@@ -134,7 +134,7 @@ fn batch_ticks(first: Option<Span>) -> u64 {
 
 /// How long the first gyro tick of a text log lasts.
 fn first_tick(log: &LogArgs) -> Result<Option<Span>, Error> {
-    Ok(log.events(&log.part()?)?.take(LOOK_AHEAD).find_map(|event| match event {
+    Ok(log.text_log()?.within(&log.part()?).take(LOOK_AHEAD).find_map(|event| match event {
         Ok(LogEvent::Gyro { tick, .. }) => Some(tick.duration),
         _ => None,
     }))
