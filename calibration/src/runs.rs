@@ -201,7 +201,7 @@ impl Run {
     /// # Errors
     /// [`Error::Log`]; [`Error::Refused`] where it has no ticks, ticks too long to be corrected, or ticks of two instruments.
     pub fn series(&self) -> Result<Series, Error> {
-        let mut series = Series::empty(self.unit.clone());
+        let mut series = self.no_series();
         self.walk(|fed| series.take(&fed).map_err(|error| error.of(&self.name)))?;
         for (kind, ticks) in [("gyro", &series.gyros), ("accelerometer", &series.accels)] {
             let (usual_s, longest_s) = (median(&ticks.duration_s), MAX_TICK_DURATION.as_s());
@@ -219,6 +219,15 @@ impl Run {
             return Err(Error::Refused(reasons));
         }
         Ok(series)
+    }
+
+    /// Columns that it has put nothing into yet.
+    fn no_series(&self) -> Series {
+        let start_s = match &self.source {
+            Source::Files { part, .. } => part.start.as_s(),
+            Source::Events(_) => 0.0,
+        };
+        Series::empty(self.unit.clone(), start_s)
     }
 
     /// That its recording was cut short, and where, once that was found by reading it.

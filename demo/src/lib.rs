@@ -164,12 +164,18 @@ mod tests {
         let switch = watched[0].scored.switch.as_ref().unwrap();
         assert!(switch.ticks.iter().any(|tick| tick.interpolated));
 
-        let summary = Summary { units, report: None, seconds: begin.elapsed().as_secs_f64(), seed: 7 };
+        let mut summary = Summary { units, report: None, seconds: begin.elapsed().as_secs_f64(), seed: 7 };
         let html = plots::page(&summary, &fleet, &watched);
         assert_eq!(html.matches("<figure class=\"chart\"").count(), 4);
         let json = serde_json::to_value(&summary).unwrap();
         assert_eq!(json["units"][2]["unit"], "MEMS-0001");
         assert_eq!(json["units"][1]["gaps"], 0);
         assert!(json["units"][0]["raw_peak_to_peak_deg_per_h"].is_f64());
+        // On a busy machine.
+        for unit in &mut summary.units {
+            (unit.end_to_end_p50_us, unit.end_to_end_p99_us) = (25_166.0, 134_218.0);
+        }
+        let table = summary.table();
+        assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
     }
 }

@@ -135,7 +135,7 @@ impl Summary {
             row("  peak to peak, °/h", &|unit| {
                 arrow(unit.raw_peak_to_peak_deg_per_h, unit.corrected_peak_to_peak_deg_per_h)
             }),
-            row("added by the service, p50 / p99, µs", &|unit| {
+            row("added latency, p50 / p99, µs", &|unit| {
                 slash(unit.added_latency_p50_us, unit.added_latency_p99_us)
             }),
             row("end to end, p50 / p99, µs", &|unit| slash(unit.end_to_end_p50_us, unit.end_to_end_p99_us)),
@@ -147,6 +147,10 @@ impl Summary {
     pub(crate) fn table(&self) -> Table {
         let (head, rows) = self.rows();
         let mut table = isotherm_cli::table(head, rows, 1..);
+        // Two blanks between columns: all of them fit 80.
+        table.column_iter_mut().skip(1).for_each(|column| {
+            column.set_padding((0, 1));
+        });
         table.set_style(TableComponent::HeaderLines, '─');
         table.set_style(TableComponent::MiddleHeaderIntersections, '─');
         table

@@ -68,7 +68,7 @@ struct Tally<'a> {
 impl<'a> Tally<'a> {
     fn all(fleet: &'a [Member]) -> Vec<Self> {
         let bars = MultiProgress::new();
-        let style = ProgressStyle::with_template("{prefix:24} {bar:24} {percent:>3} % {msg}");
+        let style = ProgressStyle::with_template("{prefix:21} {bar:8} {percent:>3} % {wide_msg}");
         let style = style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─");
         let tally = |member: &'a Member| {
             let bar = bars.add(ProgressBar::new(member.ticks).with_style(style.clone()));
@@ -85,7 +85,7 @@ impl<'a> Tally<'a> {
         let out = consumer.continuity(&self.member.id).ticks;
         let error = self.score.windows.means.last().map_or_else(String::new, |mean| {
             let [raw, corrected] = [mean.raw, mean.corrected].map(|error| deg_per_h(over_axes(error)));
-            format!("  raw {raw:.2} → {corrected:.2} °/h")
+            format!(", raw {raw:.2} → {corrected:.2} °/h")
         });
         self.bar.set_position(out);
         self.bar.set_message(format!("in {} out {out}{error}", self.score.sent));

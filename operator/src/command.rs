@@ -61,12 +61,12 @@ pub enum Action {
     },
     /// Test the instrument (10 s, from standby) and print the report
     SelfTest,
-    /// Determine C0 and B0 of each gyro at rest (10 min, from standby)
+    /// Determine C0 and B0 of each gyro at rest (from standby)
     PreLaunch {
         /// Place and attitude of the unit
         #[command(flatten)]
         place: PlaceArgs,
-        /// Time to accumulate (s, 60…7200; default: 600)
+        /// Time to accumulate (s, 60…7200; default: as configured)
         #[arg(long, value_name = "SECONDS", value_parser = number(" of seconds", 60.0..=7200.0))]
         duration: Option<f64>,
         /// Store and print the result, but do not put it in force

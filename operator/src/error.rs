@@ -111,7 +111,9 @@ pub enum ConsoleError {
     #[error("nothing was changed")]
     Declined,
     /// A terminal is needed.
-    #[error("standard output is not a terminal: use `isotherm status`, for programs with --json")]
+    #[error(
+        "standard output is not a terminal, or TERM is dumb: use `isotherm status`, for programs with --json"
+    )]
     NoTerminal,
     /// The terminal does not do what it is told.
     #[error("the terminal cannot be used: {0}")]

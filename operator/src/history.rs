@@ -6,21 +6,22 @@ use clap::Args;
 use isotherm_cli::{Exit, print};
 use isotherm_protocol::control::Schedule;
 use isotherm_protocol::digest::Digest;
-use isotherm_protocol::history::{AuditEntry, AuditEvent, Source};
+use isotherm_protocol::history::{Acceptance, AuditEntry, AuditEvent, Source};
 use isotherm_protocol::key::{self, UnitId};
 
 use super::client::{Client, ClientArgs};
 use super::page::{self, of, short};
-use super::status::or_none;
+use super::status::{or_none, terminal_columns};
 use super::{ConsoleError, show};
 
 /// Most entries that are asked for.
 const MOST_ENTRIES: u32 = 10_000;
 
-/// Columns of the terminal that a table fits.
+/// Width of the table where no terminal limits it.
 const WIDTH: usize = 100;
-/// Longest name of who and of what it came from.
-const LONGEST_NAME: usize = 15;
+/// Columns that the table needs beside the names of who and of what it came from, and the fewest that such a name gets.
+const WITHOUT_NAMES: usize = 70;
+const SHORTEST_NAME: usize = 5;
 /// What stands before a line of what changed.
 const INDENT: &str = "        ";
 
@@ -79,7 +80,7 @@ pub(super) async fn run(args: &HistoryArgs) -> Result<Exit, ConsoleError> {
     } else if entries.is_empty() {
         format!("{unit}: nothing has been done to it\n")
     } else {
-        table(&entries)
+        table(&entries, terminal_columns().unwrap_or(WIDTH))
     };
     Ok(print(&text, Exit::Ok))
 }
@@ -89,10 +90,10 @@ fn is_of_calibrations(event: &AuditEvent) -> bool {
     matches!(event, AuditEvent::Accepted(_) | AuditEvent::Withdrawn(_))
 }
 
-/// The entries, each with a line of its own for what changed; the JSON has them whole.
-fn table(entries: &[AuditEntry]) -> String {
+/// The entries, each with a line of its own for what changed, in so many columns; the JSON has them whole.
+fn table(entries: &[AuditEntry], columns: usize) -> String {
     let header = ["no.", "time (UTC)", "what", "rev", "digest", "by", "from"];
-    let (rows, changes): (Vec<_>, Vec<_>) = entries.iter().map(row).unzip();
+    let (rows, changes): (Vec<_>, Vec<_>) = entries.iter().map(|entry| row(entry, columns)).unzip();
     let table = show::table(header, rows, header.len()).to_string();
     // The header and the line under it change nothing.
     let changes = [const { String::new() }; 2].into_iter().chain(changes);
@@ -100,21 +101,19 @@ fn table(entries: &[AuditEntry]) -> String {
     for (line, changes) in table.lines().zip(changes) {
         text.extend([line.trim_end(), "\n"]);
         if !changes.is_empty() {
-            text.extend([INDENT, &page::fit(&changes, WIDTH - INDENT.len()), "\n"]);
+            text.extend([INDENT, &page::fit(&changes, columns.saturating_sub(INDENT.len())), "\n"]);
         }
     }
     text
 }
 
-/// One line of the table, and what changed.
-fn row(entry: &AuditEntry) -> (Vec<String>, String) {
+/// One line of the table in so many columns, and what changed.
+fn row(entry: &AuditEntry, columns: usize) -> (Vec<String>, String) {
     let AuditEntry { number, time, by, event, .. } = entry;
     let (revision, document, changes) = match event {
-        AuditEvent::Accepted(accepted) => (
-            Some(accepted.revision),
-            Some((&accepted.digest, &accepted.source)),
-            effect(accepted.schedule, accepted.slew_ms, &accepted.changed),
-        ),
+        AuditEvent::Accepted(accepted) => {
+            (Some(accepted.revision), Some((&accepted.digest, &accepted.source)), effect(accepted))
+        }
         AuditEvent::InForce(first) => {
             (Some(first.revision), None, format!("from tick {} on", first.first_sequence))
         }
@@ -126,7 +125,8 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
         }
         AuditEvent::Command(command) => {
             let became = command.reason.as_deref().unwrap_or(&command.state_after);
-            (None, None, format!("{} → {became}", command.command))
+            let verdict = if command.accepted { " →" } else { " refused:" };
+            (None, None, format!("{}{verdict} {became}", command.command))
         }
         _ => (None, None, event.to_string()),
     };
@@ -134,23 +134,25 @@ fn row(entry: &AuditEntry) -> (Vec<String>, String) {
     let (digest, from) = document.map(|(digest, from)| (short(digest), source(from))).unwrap_or_default();
     // To the second; the JSON has the rest.
     let time: String = time.to_string().replace('T', " ").chars().take(19).collect();
-    let cut = |text: &str| page::fit(text, LONGEST_NAME);
+    let longest = (columns.saturating_sub(WITHOUT_NAMES) / 2).max(SHORTEST_NAME);
+    let cut = |text: &str| page::fit(text, longest);
     let cells =
         vec![number.to_string(), time, event.name().to_owned(), revision, digest, cut(by), cut(&from)];
     (cells, changes)
 }
 
 /// When it took effect and what changed, short.
-fn effect(schedule: Schedule, slew_ms: u64, changed: &[String]) -> String {
-    let mut words = match changed {
-        [] => "no entry changed, or the first document".to_owned(),
+fn effect(Acceptance { base, changed, schedule, slew_ms, .. }: &Acceptance) -> String {
+    let mut words = match changed.as_slice() {
+        [] if base.is_none() => "first document".to_owned(),
+        [] => "no entry changed".to_owned(),
         [one] => one.clone(),
         [first, rest @ ..] => format!("{first}, and {} more", rest.len()),
     };
     #[expect(clippy::cast_precision_loss, reason = "at most an hour")]
-    let seconds = slew_ms as f64 / 1000.0;
-    if schedule != Schedule::NextTick || slew_ms > 0 {
-        words = format!("{words} ({})", page::schedule(schedule, seconds));
+    let seconds = *slew_ms as f64 / 1000.0;
+    if *schedule != Schedule::NextTick || *slew_ms > 0 {
+        words = format!("{words} ({})", page::schedule(*schedule, seconds));
     }
     words
 }
@@ -172,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_fits_a_hundred_columns() {
+    fn the_table_fits_its_columns() {
         let accepted = |number: u64, path: &str, changed: &str| -> AuditEntry {
             let json = serde_json::json!({
                 "number": number, "time": "2026-11-21T13:40:26.082Z", "unit": "ZLG-0001", "by": "operator-of-the-night-shift",
@@ -186,14 +188,30 @@ mod tests {
             "number": 12_346, "time": "2026-11-21T13:41:00Z", "unit": "ZLG-0001", "event": "withdrawn",
             "revision": 12_345, "why": "superseded", "by_revision": 12_347,
         });
-        let entries = [
+        let mut entries = vec![
             serde_json::from_value(withdrawn).unwrap(),
             accepted(12_345, "/home/ann/bench/units/ZLG-0001.toml", change),
             accepted(1, "/u.toml", "x"),
         ];
         assert!(entries.iter().all(|entry| is_of_calibrations(&entry.event)));
-        let text = table(&entries);
-        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
-        insta::assert_snapshot!(text);
+        let refused = serde_json::json!({
+            "number": 7, "time": "2026-11-21T13:41:00Z", "unit": "ZLG-0001", "event": "command", "command": "self-test",
+            "accepted": false, "reason": "self-test is not possible in running: standby first", "state_before": "running",
+            "state_after": "running",
+        });
+        entries.push(serde_json::from_value(refused).unwrap());
+        for base in [Some(Digest([7; 32])), None] {
+            let mut same = accepted(1, "/u.toml", "x");
+            let AuditEvent::Accepted(acceptance) = &mut same.event else { unreachable!() };
+            (acceptance.base, acceptance.changed) = (base, Vec::new());
+            entries.push(same);
+        }
+        let texts = [80, WIDTH, 160].map(|columns| {
+            let text = table(&entries, columns);
+            assert!(text.lines().all(|line| line.chars().count() <= columns), "{text}");
+            text
+        });
+        assert!(texts[2].contains("operator-of-the-night-shift"), "{}", texts[2]);
+        insta::assert_snapshot!(texts[1]);
     }
 }

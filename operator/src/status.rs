@@ -160,7 +160,7 @@ fn pages(report: &Report, columns: usize) -> Vec<Line<'static>> {
 }
 
 /// Columns of the terminal; `None` where stdout is none.
-fn terminal_columns() -> Option<usize> {
+pub(super) fn terminal_columns() -> Option<usize> {
     let size = std::io::stdout().is_terminal().then(ratatui::crossterm::terminal::size)?;
     size.ok().map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
 }
@@ -168,8 +168,12 @@ fn terminal_columns() -> Option<usize> {
 /// Whether colours are seen and wanted: <https://no-color.org>.
 fn has_colours() -> bool {
     let unwanted = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-    std::io::stdout().is_terminal() && !unwanted && !dumb
+    is_terminal() && !unwanted
+}
+
+/// Whether standard output is a terminal that understands more than text.
+pub(super) fn is_terminal() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@ mod screen;
 mod tests;
 mod view;
 
-use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -21,7 +20,7 @@ use isotherm_cli::{Exit, duration};
 
 use super::ConsoleError;
 use super::client::{Client, ClientArgs};
-use super::status::unix_ms;
+use super::status::{is_terminal, unix_ms};
 pub use feed::Feed;
 pub use fleet::Fleet;
 pub use order::worst_first;
@@ -48,7 +47,7 @@ pub struct TopArgs {
 
 /// Shows units and services until the operator has seen enough.
 pub(super) async fn run(args: &TopArgs) -> Result<Exit, ConsoleError> {
-    if !std::io::stdout().is_terminal() {
+    if !is_terminal() {
         return Err(ConsoleError::NoTerminal);
     }
     let client = Client::open(&args.client).await?;

@@ -21,7 +21,7 @@ use crate::limits::within;
 pub(super) struct BoardArgs {
     #[command(flatten)]
     common: FitArgs,
-    /// Temperature of the board at which the ratio is 1 (°C) (default: the middle of its range)
+    /// Temperature of the board at which the ratio is 1 (°C) (default: the document's, else the middle of its range)
     #[arg(long, hide_short_help = true, value_name = "DEG_C", allow_negative_numbers = true, value_parser = within(-100.0, 200.0))]
     reference: Option<f64>,
     /// Length of the windows of the fit (s)

@@ -28,7 +28,7 @@ pub(super) struct Files<'a> {
 /// What a command prints that writes nothing but a page.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PageArgs {
-    /// HTML report to write, one file; several units: FILE-UNIT.html each, and a table in FILE
+    /// HTML report to write, one file
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     /// Replace an existing page

@@ -48,6 +48,8 @@ impl Channel {
 pub struct Series {
     /// The unit.
     pub unit: UnitId,
+    /// Where in the log the part begins that was read (s).
+    pub start_s: f64,
     /// Gyro ticks.
     pub gyros: Ticks,
     /// Accelerometer ticks.
@@ -59,10 +61,11 @@ pub struct Series {
 }
 
 impl Series {
-    /// Nothing of a unit yet.
-    pub fn empty(unit: UnitId) -> Self {
+    /// Nothing of a unit yet, in the part of a log that begins there (s).
+    pub fn empty(unit: UnitId, start_s: f64) -> Self {
         Self {
             unit,
+            start_s,
             gyros: Ticks::default(),
             accels: Ticks::default(),
             temperatures: BTreeMap::new(),

@@ -51,7 +51,7 @@ impl Run {
         loaded: &Loaded,
         mut each: impl FnMut(&CorrectedTick),
     ) -> (Series, Result<Troubles, Error>) {
-        let (mut series, mut takes) = (Series::empty(self.unit.clone()), true);
+        let (mut series, mut takes) = (self.no_series(), true);
         let beside = |fed: &Fed<'_>| takes = takes && series.take(fed).is_ok();
         let ticks = |_: &GyroTick, ticks: &[CorrectedTick], _: &Unit| ticks.iter().for_each(&mut each);
         let troubles = self.correct_beside(slice::from_ref(loaded), beside, ticks);

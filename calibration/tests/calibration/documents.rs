@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use isotherm_calibration::document::Written;
+use isotherm_calibration::document::show::show;
 use isotherm_correction::thermal::Feature;
+use isotherm_pages::{Content, Ink};
 use isotherm_protocol::document::{Curve, Document, Measure, Origin, Residual, Sample, Shape};
 use serde_json::Value;
 
@@ -58,6 +60,22 @@ fn shown_values_are_those_of_the_document() {
     assert_eq!(of("s", "thermal_rate run-up")["argument"], "°C/s");
     let rows = shown["tables"]["Terms"]["rows"].as_array().unwrap();
     insta::assert_snapshot!(rows.iter().map(|row| row.to_string() + "\n").collect::<String>());
+}
+
+#[test]
+fn a_sensor_has_one_colour_whichever_terms_it_has() {
+    let shown = show(&Written::read(&shipped("example-full.toml")).unwrap()).unwrap();
+    let of_gyros = shown.charts.iter().filter(|(heading, _)| heading.starts_with("Gyros over"));
+    let curves = of_gyros.flat_map(|(_, chart)| &chart.panels).filter_map(|panel| match &panel.content {
+        Content::Series(curves) => Some(curves),
+        Content::Lanes(_) => None,
+    });
+    let lone: Vec<_> = curves.clone().filter(|curves| curves.len() == 1).flatten().collect();
+    assert!(lone.iter().any(|curve| curve.name == "s"), "{lone:?}");
+    for (name, ink) in [("x", Ink::First), ("y", Ink::Second), ("z", Ink::Third), ("s", Ink::Fourth)] {
+        let mut own = curves.clone().flatten().filter(|curve| curve.name == name);
+        assert!(own.all(|curve| curve.ink == ink), "{name}");
+    }
 }
 
 #[test]

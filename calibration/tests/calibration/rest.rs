@@ -121,7 +121,16 @@ fn drift_tells_of_a_step() {
         let middle = columns[1].len() / 2;
         columns[1][middle..].iter_mut().for_each(|rate| *rate += 20.0);
     };
-    let told = succeeds(&["drift", &log(folder.path(), step, |_| true)]);
+    let stepped = log(folder.path(), step, |_| true);
+    let told = succeeds(&["drift", &stepped]);
+    // Times are those that --start takes, of the readings and of the corrected ones.
+    let fog = shipped("FOG-0001.toml").display().to_string();
+    for more in [&[][..], &["--calibration", &fog]] {
+        let part = succeeds(&[&["drift", &stepped, "--start", "3000"], more].concat());
+        let (_, words) = part.split_once("at about ").unwrap();
+        let at_s: f64 = words.split_once(' ').unwrap().0.parse().unwrap();
+        assert!((at_s - 3600.0).abs() < 100.0, "{part}");
+    }
     insta::assert_snapshot!((good + &told).replace(folder.path().to_str().unwrap(), "FOLDER"));
 }
 
@@ -156,7 +165,7 @@ fn times(count: usize) -> Vec<i64> {
 }
 
 fn frozen_in(column: &[f64]) -> Option<String> {
-    frozen("gyro y", &times(column.len()), column)
+    frozen("gyro y", (0.0, &times(column.len())), column)
 }
 
 #[test]
@@ -184,6 +193,7 @@ fn columns(readings: Vec<f64>) -> Columns {
         kind: Kind::Rate,
         names: vec!["x".to_owned()],
         corrected: true,
+        start_s: 0.0,
         end_ns: times(readings.len()),
         duration_s: vec![0.02; readings.len()],
         values: vec![readings],

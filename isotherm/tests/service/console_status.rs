@@ -250,6 +250,17 @@ impl Drop for Typed {
 const ALTERNATE: [&str; 2] = ["\x1b[?1049h", "\x1b[?1049l"];
 
 #[cfg(target_os = "linux")]
+#[test]
+fn top_writes_no_sequences_to_a_dumb_terminal() {
+    let command = format!("TERM=dumb '{}' top; echo \"ended with $?\"", env!("CARGO_BIN_EXE_isotherm"));
+    let script = Command::new("script").args(["-qfc", &command, "/dev/null"]).stdin(Stdio::null()).output();
+    let Ok(output) = script else { return eprintln!("skipped: no script(1)") };
+    let told = words(&output.stdout);
+    assert!(told.contains("isotherm status") && told.contains("ended with 2"), "{told}");
+    assert!(!told.contains('\x1b'), "{told}");
+}
+
+#[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread")]
 async fn top_shows_units_and_pages_and_gives_the_terminal_back() {
     let served = Served::with_units(&["TOP-1", "TOP-2"]).await;

@@ -17,7 +17,7 @@ use crate::message::{Message, Topic};
 use crate::part::{LogFiles, Part, are_recordings};
 use crate::source::LogReport;
 
-fn message(serial: &str, time_ns: i64, received_ns: u64) -> Message {
+pub(super) fn message(serial: &str, time_ns: i64, received_ns: u64) -> Message {
     let (channel, time) = (ChannelName::from("board").unwrap(), Timestamp::from_ns(time_ns));
     let batch = TemperatureBatch { readings: vec![TemperatureReading { channel, time, raw: 25.0 }] };
     let topic = Topic::Raw(UnitId::new(serial).unwrap(), RawStream::Temperature);

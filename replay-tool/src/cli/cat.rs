@@ -26,8 +26,8 @@ use crate::play::wanted;
 #[command(after_help = "Example, in two steps:\n  \
     isotherm-replay simulate --preset mems-chamber --duration 60 --out mems.csv\n  \
     isotherm-replay cat mems.csv --topic 'imu/*/raw/temp' --limit 2\n\n\
-    Each line has `topic`, `received_ns` and `message`, with the fields of docs/wire.md; or `error`, if a frame cannot\n\
-    be read (exit code 3).")]
+    Each line has `topic`, `received_ns` and `message`: the fields of docs/wire.md, most without the unit in their\n\
+    names (`end_time` for `end_time_ns`); or `error`, if a frame cannot be read (exit code 3).")]
 pub(super) struct CatArgs {
     #[command(flatten)]
     log: LogArgs,

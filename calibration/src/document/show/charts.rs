@@ -22,6 +22,8 @@ pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], rang
     sheet.chart("Bias in all", Chart::of(caption, temperature(), sums));
     for [argument, label, words, _] in ARGUMENTS {
         for (kind, sensors) in [("gyro", "Gyros"), ("accel", "Accelerometers")] {
+            // A sensor has its colour wherever it has a curve: a term need not be in all of them.
+            let all = once_each(terms.iter().filter(|term| term.kind == kind).map(|term| &*term.sensor));
             let mine: Vec<&Term> =
                 terms.iter().filter(|term| term.kind == kind && term.argument == argument).collect();
             // A constant is in the tables; curves of one kind of term that are all constant show nothing.
@@ -29,7 +31,10 @@ pub(super) fn charts(sheet: &mut Report, written: &Written, terms: &[Term], rang
             let names = once_each(mine.iter().map(|term| term.name.as_str()).filter(|name| varying(name)));
             let panels = names.into_iter().map(|name| {
                 let of_name: Vec<&&Term> = mine.iter().filter(|term| term.name == name).collect();
-                let curves = of_name.iter().zip(Ink::several()).map(|(term, ink)| {
+                let coloured = all.iter().zip(Ink::several()).filter_map(|(sensor, ink)| {
+                    Some((of_name.iter().find(|term| term.sensor == **sensor)?, ink))
+                });
+                let curves = coloured.map(|(term, ink)| {
                     let over = term.range.unwrap_or(range);
                     let points = places(over, POINTS).into_iter().map(|x| (x, term.at(x).0));
                     Series::line(&term.sensor, ink, points)

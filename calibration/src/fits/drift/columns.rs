@@ -56,6 +56,8 @@ pub struct Columns {
     pub names: Vec<String>,
     /// Whether they are along the case axes, after a correction.
     pub corrected: bool,
+    /// Where in the log the part begins that was read (s).
+    pub start_s: f64,
     /// Ends of the ticks (ns on the producer's clock).
     pub end_ns: Vec<i64>,
     /// How long the ticks last (s), as the mapping or the producer states it.
@@ -83,7 +85,7 @@ impl Columns {
     /// [`Error::Refused`] where there are none, or counts without a weight.
     pub fn raw(series: Series, kind: Kind, increment_weight_arcsec: Option<f64>) -> Result<Self, Error> {
         let moving = moving(&series, |_, raw| raw);
-        let Series { unit, gyros, accels, .. } = series;
+        let Series { unit, start_s, gyros, accels, .. } = series;
         let (ticks, instead, scale, weight) = match kind {
             Kind::Rate => (
                 gyros,
@@ -110,7 +112,9 @@ impl Columns {
             (0..readings.len()).map(|index| sensor_name(index, readings.len())).collect();
         let looked = names.iter().zip(&readings);
         let frozen = looked
-            .filter_map(|(name, column)| checks::frozen(&format!("{sensor} {name}"), &end_ns, column))
+            .filter_map(|(name, column)| {
+                checks::frozen(&format!("{sensor} {name}"), (start_s, &end_ns), column)
+            })
             .collect();
         let mut values = readings;
         for (reading, duration) in values.iter_mut().flat_map(|column| column.iter_mut().zip(&duration_s)) {
@@ -120,7 +124,7 @@ impl Columns {
                             for m/s²; --calibration converts them to specific force.";
         let notes =
             (kind == Kind::Force).then(|| mean_outputs.to_owned()).into_iter().chain(moving).collect();
-        Ok(Self { unit, kind, names, corrected: false, end_ns, duration_s, values, frozen, notes })
+        Ok(Self { unit, kind, names, corrected: false, start_s, end_ns, duration_s, values, frozen, notes })
     }
 
     /// From the run of a unit, corrected with a document by the same stream as the service's.
@@ -130,9 +134,10 @@ impl Columns {
     /// # Errors
     /// As [`Run::correct_together`] and [`checks::raw`].
     pub fn corrected_by(run: &Run, loaded: &Loaded, kind: Kind) -> Result<Self, Error> {
-        let mut columns = Self::empty(loaded.unit.clone(), kind);
+        let mut columns = Self::empty(loaded.unit.clone(), kind, 0.0);
         let (series, troubles) = run.correct_with_series(loaded, |tick| columns.push(tick));
-        columns.frozen = checks::raw(kind, if kind == Kind::Rate { &series.gyros } else { &series.accels })?;
+        columns.start_s = series.start_s;
+        columns.frozen = checks::raw(kind, &series)?;
         let converted = |name: &str, raw: f64| {
             let channel =
                 loaded.calibration.channels().iter().find(|channel| channel.name().as_str() == name);
@@ -153,7 +158,8 @@ impl Columns {
         for path in paths {
             let mut log = CorrectedLog::open(path, part, &unnamed)?;
             while let Some(ticks) = log.next_ticks()? {
-                let columns = columns.get_or_insert_with(|| Self::empty(ticks.unit.clone(), kind));
+                let columns =
+                    columns.get_or_insert_with(|| Self::empty(ticks.unit.clone(), kind, part.start.as_s()));
                 if columns.unit != ticks.unit {
                     let (first, second) = (&columns.unit, &ticks.unit);
                     return Err(Error::refused(format!(
@@ -176,12 +182,13 @@ impl Columns {
         )
     }
 
-    fn empty(unit: UnitId, kind: Kind) -> Self {
+    fn empty(unit: UnitId, kind: Kind, start_s: f64) -> Self {
         Self {
             unit,
             kind,
             names: AXES.map(str::to_owned).to_vec(),
             corrected: true,
+            start_s,
             end_ns: Vec::new(),
             duration_s: Vec::new(),
             values: vec![Vec::new(); AXES.len()],
@@ -215,10 +222,10 @@ impl Columns {
         Ok(self)
     }
 
-    /// Time of a tick since the first (s).
+    /// Time of a tick in the log (s), as `--start` counts it but for the tick that the part begins in.
     pub fn since_s(&self, tick: usize) -> f64 {
         let time = self.end_ns.get(tick).zip(self.end_ns.first());
-        time.map_or(0.0, |(end, first)| seconds(end.saturating_sub(*first)))
+        self.start_s + time.map_or(0.0, |(end, first)| seconds(end.saturating_sub(*first)))
     }
 }
 

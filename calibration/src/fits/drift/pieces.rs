@@ -249,6 +249,7 @@ mod tests {
             kind: Kind::Rate,
             names,
             corrected: false,
+            start_s: 0.0,
             duration_s: Vec::new(),
             frozen: Vec::new(),
             end_ns,

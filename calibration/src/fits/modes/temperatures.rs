@@ -83,7 +83,7 @@ pub(super) fn freezing(runs: &[Run], document: &Document) -> Result<Vec<String>,
         let series = run.series()?;
         for channel in &document.temperature.channel {
             let Some(Channel { time_ns, raw }) = series.temperatures.get(&channel.name) else { continue };
-            let Some(words) = frozen("", time_ns, raw) else { continue };
+            let Some(words) = frozen("", (series.start_s, time_ns), raw) else { continue };
             let log = if runs.len() > 1 { format!("{}: ", run.name) } else { String::new() };
             let words = format!("{log}{}", words.trim_start_matches("warning:").trim_start());
             told.push((&channel.name, words));

@@ -63,8 +63,8 @@ pub(super) struct Rescue<'a> {
     /// Documents of the journal that are not attached yet.
     documents: BTreeMap<String, Attachment>,
     attached: BTreeSet<String>,
-    /// Messages that there were, as the old file's summary says.
-    stated: Option<u64>,
+    /// Messages that there were by channel, as the old file's summary says.
+    stated: Option<BTreeMap<u16, u64>>,
 }
 
 impl<'a> Rescue<'a> {
@@ -122,7 +122,7 @@ impl<'a> Rescue<'a> {
                 report.metadata += 1;
                 self.writer.write_metadata(&metadata)?;
             }
-            Record::Statistics(statistics) => self.stated = Some(statistics.message_count),
+            Record::Statistics(statistics) => self.stated = Some(statistics.channel_message_counts),
             _ => {}
         }
         Ok(())
@@ -145,9 +145,15 @@ impl<'a> Rescue<'a> {
             report.documents_rebuilt += 1;
             self.attach(&document)?;
         }
-        let written = report.messages + report.nameless;
-        report.missing = match self.stated {
-            Some(stated) => stated.saturating_sub(written),
+        report.missing = match &self.stated {
+            // What is there once more for viewers is not lost twice.
+            Some(stated) => {
+                let copied = |number| self.key(number).is_some_and(|key| view::topic(key).is_some());
+                let messages = report.topics.iter().filter(|(key, _)| view::topic(key).is_none());
+                let written = messages.map(|(_, topic)| topic.messages).sum::<u64>() + report.nameless;
+                let stated = stated.iter().filter(|(number, _)| !copied(**number)).map(|(_, count)| count);
+                stated.sum::<u64>().saturating_sub(written)
+            }
             None => report.topics.values().map(|topic| topic.missing).sum(),
         };
         self.writer.write_metadata(&account(report))?;
@@ -155,6 +161,12 @@ impl<'a> Rescue<'a> {
         let Self { writer, file, .. } = self;
         writer.into_inner().flush()?;
         Ok(file.sync_all()?)
+    }
+
+    /// Key of a channel of the old file.
+    fn key(&self, number: u16) -> Option<&str> {
+        let Definitions { channels, keys, .. } = &*self.definitions;
+        channels.get(&number).map(|channel| &*channel.topic).or(keys.get(&number).map(String::as_str))
     }
 
     fn message(

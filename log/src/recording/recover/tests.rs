@@ -173,6 +173,29 @@ fn behind_a_damaged_chunk_reading_goes_on() {
 }
 
 #[test]
+fn what_is_there_once_more_for_viewers_is_not_lost_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let options = RecordingOptions { chunk_bytes: 300, json: true, ..RecordingOptions::default() };
+    let mut writer = RecordingWriter::create(&path, options).unwrap();
+    for number in 1..40 {
+        writer.write(&crate::recording::tests::message("A-1", number, 5)).unwrap();
+    }
+    writer.finish().unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    let chunks = chunks(&whole);
+    let (damaged, end) = (chunks[1].0 + chunks[1].1 / 2, chunks.last().map(|(at, length)| at + length));
+    let missing = [whole.len(), end.unwrap()].map(|length| {
+        let mut bytes = whole[..length].to_vec();
+        bytes[damaged] ^= 0x55;
+        std::fs::write(&path, &bytes).unwrap();
+        let options = RecordingOptions { overwrite: true, ..RecordingOptions::default() };
+        recover(&path, &folder.path().join("b.mcap"), options).unwrap().missing
+    });
+    assert!(missing[0] > 0 && missing[0] == missing[1], "{missing:?}");
+}
+
+#[test]
 fn documents_that_are_lost_are_attached_anew() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");

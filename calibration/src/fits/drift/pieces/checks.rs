@@ -8,7 +8,7 @@ use crate::fits::drift::columns::{Columns, Kind};
 use crate::numbers::{median, middle_and_scatter, real, scatter_of_steps, seconds};
 use crate::report::{fixed, short, six};
 use crate::runs::faults::{self, Fault};
-use crate::runs::series::Ticks;
+use crate::runs::series::Series;
 use crate::runs::table::is_one_g;
 
 /// Rate beyond which a unit does not rest, or its unit of measure is wrong (°/s): Earth's rate and the bias of a poor micromechanical
@@ -35,7 +35,9 @@ const LARGEST_MISSING: f64 = 0.01;
 ///
 /// # Errors
 /// [`Error::Refused`] with every sensor whose readings never change.
-pub fn raw(kind: Kind, ticks: &Ticks) -> Result<Vec<String>, Error> {
+pub fn raw(kind: Kind, series: &Series) -> Result<Vec<String>, Error> {
+    let ticks = if kind == Kind::Rate { &series.gyros } else { &series.accels };
+    let times = (series.start_s, &*ticks.end_ns);
     let called = |index| format!("{} {}", kind.sensor(), sensor_name(index, ticks.readings.len()));
     let columns = || ticks.readings.iter().enumerate();
     let words = |(index, column): (usize, &Vec<f64>)| {
@@ -46,16 +48,17 @@ pub fn raw(kind: Kind, ticks: &Ticks) -> Result<Vec<String>, Error> {
     if !dead.is_empty() {
         return Err(Error::Refused(dead));
     }
-    Ok(columns().filter_map(|(index, column)| frozen(&called(index), &ticks.end_ns, column)).collect())
+    Ok(columns().filter_map(|(index, column)| frozen(&called(index), times, column)).collect())
 }
 
-/// Where a reading stays exactly the same for long, though elsewhere it changes from tick to tick.
+/// Where a reading stays exactly the same for long, though elsewhere it changes from tick to tick; the times are of a part that begins
+/// there in its log (s).
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "counts of ticks are far below 2⁵³"
 )]
-pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
+pub fn frozen(called: &str, (start_s, end_ns): (f64, &[i64]), column: &[f64]) -> Option<String> {
     let (first, last) = (*end_ns.first()?, *end_ns.last()?);
     let length_s = seconds(last.saturating_sub(first));
     let tick_s = length_s / real(column.len().max(2) - 1);
@@ -76,7 +79,7 @@ pub fn frozen(called: &str, end_ns: &[i64], column: &[f64]) -> Option<String> {
     if real(repeated) > LARGEST_REPEATED * real(repeated + changed) {
         return None;
     }
-    let since = |at: usize| end_ns.get(at).map_or(0.0, |end| seconds(end.saturating_sub(first)));
+    let since = |at: usize| start_s + end_ns.get(at).map_or(0.0, |end| seconds(end.saturating_sub(first)));
     let further = match long.len() {
         1 => String::new(),
         count => format!(", and {} times more, until {:.2} s at last", count - 1, since(long[count - 1].1)),

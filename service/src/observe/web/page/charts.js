@@ -51,10 +51,10 @@ class LiveTicks {
   build() {
     this.curves = AXES.map(() => ({ raw: new Curve(), corrected: new Curve() }));
     const panels = this.curves.map((curves, axis) => ({
-      title: "About case " + AXES[axis], unit: "", height: 92,
+      title: "About case " + AXES[axis], unit: "°/h", height: 92,
       series: ["raw", "corrected"].map(name => ({ name, ink: name, form: "line", samples: curves[name] })),
     }));
-    if (this.quantity === "m_per_s2") panels.forEach((panel, axis) => { panel.title = "Along case " + AXES[axis]; });
+    if (this.quantity === "m_per_s2") panels.forEach((panel, axis) => Object.assign(panel, { title: "Along case " + AXES[axis], unit: "mg" }));
     const figure = make("figure", { className: "chart", "aria-label": "Raw and corrected, the last minute" });
     this.place.replaceChildren(figure);
     this.chart = new RunningChart(figure, { x: { label: "", unit: "s", logarithmic: false }, panels, marks: [] });
@@ -105,12 +105,14 @@ class LiveTicks {
     }));
   }
 
-  /** Mean of one axis since then, each tick with the same weight. */
+  /** Mean of one axis since then, each tick with the same weight; null where ticks began, or went on, later. */
   mean(name, axis, since) {
     let [sum, ticks] = [0, 0];
-    for (const bin of this.bins) {
+    const bins = this.bins.filter(bin => bin.at >= since);
+    if (!(bins[0]?.at < since + 1)) return null;
+    for (const bin of bins) {
       const value = bin[name + "_" + this.quantity]?.[axis][1];
-      if (bin.at < since || !isNumber(value)) continue;
+      if (!isNumber(value)) continue;
       sum += value * bin.ticks;
       ticks += bin.ticks;
     }

@@ -22,8 +22,8 @@ class App {
     this.stop = new AbortController();
     document.querySelectorAll("dialog").forEach(open => open.close());
     if (!sessionStorage.getItem(TOKEN)) return this.askToken("");
-    const serial = location.hash.match(/^#\/unit\/(.+)$/)?.[1];
-    this.page = serial ? new UnitPage(this, decodeURIComponent(serial)) : new UnitsPage(this);
+    const serial = unitOf(location.hash);
+    this.page = serial ? new UnitPage(this, serial) : new UnitsPage(this);
     document.title = this.page.title + " – isotherm";
     this.main.replaceChildren(this.page.element);
     if (this.overview) this.page instanceof UnitsPage ? this.page.draw(this.overview) : null;
@@ -148,6 +148,15 @@ class App {
       ["▲ warning", "outside the calibrated range, stale, without calibration"], ["● running", "±: with reversal of the lasing mode"],
       ["○ not running", "standby, self-test, pre-launch calibration"]]);
     dialog("Keys and marks", list, make("h3", {}, "Marks"), marks);
+  }
+}
+
+/** Serial of the unit that an address names; "" where it names none, or cannot be read. */
+function unitOf(hash) {
+  try {
+    return decodeURIComponent(hash.match(/^#\/unit\/(.+)$/)?.[1] ?? "");
+  } catch {
+    return "";
   }
 }
 
