@@ -20,8 +20,8 @@ const MOST_ENTRIES: u32 = 10_000;
 /// Width of the table where no terminal limits it.
 const WIDTH: usize = 100;
 /// Columns that the table needs beside the names of who and of what it came from, and the fewest that such a name gets.
-const WITHOUT_NAMES: usize = 70;
-const SHORTEST_NAME: usize = 5;
+const WITHOUT_NAMES: usize = 72;
+const SHORTEST_NAME: usize = 4;
 /// What stands before a line of what changed.
 const INDENT: &str = "        ";
 
