@@ -97,7 +97,7 @@ pub(super) async fn run(args: &StatusArgs) -> Result<Exit, ConsoleError> {
     Ok(print(&tone::text(&lines, has_colours()), Exit::Ok))
 }
 
-/// Services before 0.2 tell nothing of themselves.
+/// Services before 0.1.0 tell nothing of themselves.
 pub(super) fn or_none<T>(answers: Result<Vec<T>, ConsoleError>) -> Result<Vec<T>, ConsoleError> {
     match answers {
         Err(ConsoleError::NoAnswer { .. } | ConsoleError::NotAllowed { .. }) => Ok(Vec::new()),

@@ -203,7 +203,7 @@ fn result(reply: &SwapReply, json: bool) -> Exit {
     if json {
         return print(&isotherm_cli::json(reply), exit);
     }
-    // A service before 0.2 says the proposed digest in the place of the one in force.
+    // A service before 0.1.0 says the proposed digest in the place of the one in force.
     let digest = short(reply.proposed.as_ref().unwrap_or(&reply.digest));
     let line = match reply.outcome {
         SwapOutcome::Refused => {

@@ -79,7 +79,7 @@ pub fn state_word(state: State) -> &'static str {
     }
 }
 
-/// Rates are not measured by services before 0.2, which do not name themselves either.
+/// Rates are not measured by services before 0.1.0, which do not name themselves either.
 #[must_use]
 pub fn knows_rates(status: &Status) -> bool {
     !status.instance.is_empty()
@@ -128,7 +128,7 @@ fn faults(unit: &Unit<'_>, add: &mut impl FnMut(Level, String)) {
         let kind = fault.kind.replace('_', " ");
         add(level, format!("{kind} {count}×, last {ago} ago: {}", fault.first));
     }
-    // A service before 0.2 tells no more than this.
+    // A service before 0.1.0 tells no more than this.
     if unit.status.faults.is_empty()
         && let Some(words) = &unit.status.last_fault
     {

@@ -21,7 +21,7 @@ pub(super) fn section(added: &Latency, columns: usize) -> Section {
         return section;
     }
     let mut figures = vec![("p50", added.p50_ns), ("p99", added.p99_ns)];
-    // A service before 0.2 knows no more.
+    // A service before 0.1.0 knows no more.
     if added.max_ns > 0 {
         figures.extend([("p99.9", added.p999_ns), ("largest", added.max_ns)]);
     }
