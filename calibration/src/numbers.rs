@@ -1,6 +1,7 @@
 //! Numbers and lists as every fit needs them: counts and times, ends and means, products and lengths of vectors, how large a set of
 //! numbers is; middle and scatter of numbers among which some may be wrong.
 
+pub use isotherm_correction::vector::dot;
 use rustfft::num_traits::AsPrimitive;
 
 /// A count as a number: those of a log are far below 2⁵³.
@@ -43,11 +44,6 @@ pub fn ends(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
 /// The smallest range that holds all of some; `None` without any.
 pub fn hull(ranges: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
     ranges.into_iter().reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
-}
-
-/// Product of two vectors.
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Root of the sum of the squares: the length of a vector.

@@ -147,6 +147,7 @@ fn level_to_case(heading_rad: f64, pitch_rad: f64, roll_rad: f64) -> [[f64; 3]; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vector::{cross, dot};
 
     fn rate_deg_per_h(place: &Place, force: Option<[f64; 3]>) -> [f64; 3] {
         let rate = place.earth_rate_in_case(force).unwrap();
@@ -194,18 +195,16 @@ mod tests {
         for (heading, pitch, roll) in [(0.0, 0.0, 0.0), (0.5, 0.2, -0.1), (-3.0, -1.0, 2.9), (0.2, 1.4, 1.7)]
         {
             let [x, y, z] = level_to_case(heading, pitch, roll);
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
             // Of length one, perpendicular, right-handed.
             for (got, expected) in
-                [(dot(x, x), 1.0), (dot(y, y), 1.0), (dot(x, y), 0.0), (dot(cross, z), 1.0)]
+                [(dot(x, x), 1.0), (dot(y, y), 1.0), (dot(x, y), 0.0), (dot(cross(x, y), z), 1.0)]
             {
                 assert!(
                     (got - expected).abs() < 1e-15 * 4.0,
                     "{heading} {pitch} {roll}: {got} is not {expected}"
                 );
             }
-            close(z, cross);
+            close(z, cross(x, y));
         }
     }
 

@@ -2,6 +2,7 @@
 
 use isotherm_correction::calibration::Steady;
 use isotherm_correction::units::{Angle, AngularRate, SpecificForce};
+use isotherm_correction::vector::{cross, dot};
 
 use super::measure::ARCSEC;
 use super::types::{Document, GyroOutput};
@@ -102,9 +103,6 @@ fn milli_g(force: f64) -> f64 {
 /// Angle between two axes (rad).
 #[must_use]
 pub fn turn_rad(old: [f64; 3], new: [f64; 3]) -> f64 {
-    let [old_x, old_y, old_z] = old;
-    let [new_x, new_y, new_z] = new;
-    let cross = [old_y * new_z - old_z * new_y, old_z * new_x - old_x * new_z, old_x * new_y - old_y * new_x];
-    let sine = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
-    libm::atan2(sine, old_x * new_x + old_y * new_y + old_z * new_z)
+    let across = cross(old, new);
+    libm::atan2(dot(across, across).sqrt(), dot(old, new))
 }
