@@ -279,6 +279,7 @@ fn outside(orientation: &Orientation, temperature: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use alloc::vec;
+    use alloc::vec::Vec;
 
     use super::*;
     use crate::orientation::{AxesPlay, OrientationParts};
@@ -289,19 +290,38 @@ mod tests {
         Timestamp::from_ns(1_000_000_000 * s)
     }
 
-    #[test]
-    fn readings_of_one_moment_act_together_in_whatever_order_they_come() {
+    /// Along the case axes at 20 °C, with a fourth sensor if there is one.
+    fn orientation(
+        fourth: Option<[f64; 3]>,
+        slopes_per_deg_c: Vec<[f64; 3]>,
+        plays: Vec<AxesPlay>,
+        range_deg_c: [f64; 2],
+    ) -> Orientation {
+        let along = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let parts = OrientationParts {
             reference_deg_c: 20.0,
-            rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            slopes_per_deg_c: vec![],
-            plays: vec![AxesPlay { half_width_deg_c: 0.3, share: 0.5 }],
+            rows: along.into_iter().chain(fourth).collect(),
+            slopes_per_deg_c,
+            plays,
             weights: vec![],
-            range_deg_c: [0.0, 50.0],
+            range_deg_c,
             parity_limit: None,
             parity_confirm_ticks: 0,
         };
-        let orientation = Orientation::new(&parts).unwrap();
+        Orientation::new(&parts).unwrap()
+    }
+
+    /// What its sensors feel of a vector at a temperature.
+    fn felt(orientation: &Orientation, deg_c: f64, v: [f64; 3]) -> [f64; 4] {
+        let mut lanes = [0.0; 4];
+        lanes.iter_mut().zip(orientation.forward(deg_c, v)).for_each(|(lane, felt)| *lane = felt);
+        lanes
+    }
+
+    #[test]
+    fn readings_of_one_moment_act_together_in_whatever_order_they_come() {
+        let plays = vec![AxesPlay { half_width_deg_c: 0.3, share: 0.5 }];
+        let orientation = orientation(None, vec![], plays, [0.0, 50.0]);
         // The first of two channels leaves the mean at either; the second has been silent for long.
         let run = |firsts: [f64; 2], over: [Span; 2]| {
             let mut axes = Axes::new(&orientation, 20.0);
@@ -321,27 +341,15 @@ mod tests {
     #[test]
     fn a_change_of_sensors_on_the_way_is_all_that_steps() {
         let slopes = vec![[0.0, 1e-3, 0.0], [0.0, 0.0, 2e-3], [-1e-3, 0.0, 0.0], [0.0; 3]];
-        let parts = OrientationParts {
-            reference_deg_c: 20.0,
-            rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, 0.8]],
-            slopes_per_deg_c: slopes,
-            plays: vec![],
-            weights: vec![],
-            range_deg_c: [0.0, 50.0],
-            parity_limit: None,
-            parity_confirm_ticks: 0,
-        };
-        let orientation = Orientation::new(&parts).unwrap();
+        let orientation = orientation(Some([0.6, 0.0, 0.8]), slopes, vec![], [0.0, 50.0]);
         let truth = [1e-5, 4e-5, -2e-5];
         let mut axes = Axes::new(&orientation, 20.0);
         axes.update(&orientation, 20.0, seconds(0), TICK);
         axes.update(&orientation, 30.0, seconds(1), Span::from_ns(10 * TICK.as_ns()));
         for (s, sensors) in [(3, 3), (4, 4), (6, 3), (7, 4), (11, 3), (12, 4)] {
-            let mut lanes = [0.0; 4];
             let deg_c = f64::from(i32::try_from(20 + (s - 1).min(10)).unwrap());
-            let felt = orientation.forward(deg_c, truth);
-            lanes.iter_mut().zip(felt).for_each(|(lane, felt)| *lane = felt);
-            let (rate, _) = axes.resolve(&orientation, SensorMask::all(sensors), (&lanes, None), seconds(s));
+            let felt = felt(&orientation, deg_c, truth);
+            let (rate, _) = axes.resolve(&orientation, SensorMask::all(sensors), (&felt, None), seconds(s));
             let off = rate.iter().zip(truth).map(|(rate, truth)| (rate - truth).abs()).fold(0.0, f64::max);
             assert!(
                 off < 1e-17 && (axes.temperature_deg_c(seconds(s)) - deg_c).abs() < 1e-12,
@@ -355,26 +363,13 @@ mod tests {
         // Without the fourth, the first two come to point the same way at 30 °C.
         let skewed = libm::sqrt(1.0 / 3.0);
         let slope = 0.1;
-        let parts = OrientationParts {
-            reference_deg_c: 20.0,
-            rows: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [skewed, -skewed, skewed]],
-            slopes_per_deg_c: vec![[0.0, slope, 0.0], [slope, 0.0, 0.0], [0.0; 3], [0.0; 3]],
-            plays: vec![],
-            weights: vec![],
-            range_deg_c: [20.0, 50.0],
-            parity_limit: None,
-            parity_confirm_ticks: 0,
-        };
-        let orientation = Orientation::new(&parts).unwrap();
+        let slopes = vec![[0.0, slope, 0.0], [slope, 0.0, 0.0], [0.0; 3], [0.0; 3]];
+        let orientation = orientation(Some([skewed, -skewed, skewed]), slopes, vec![], [20.0, 50.0]);
         let (all, three) = (SensorMask::all(4), SensorMask::all(3));
         let truth = [1e-5, 4e-5, -2e-5];
         let resolve = |axes: &mut Axes, usable, s| {
-            let mut lanes = [0.0; 4];
-            lanes
-                .iter_mut()
-                .zip(orientation.forward(axes.temperature_deg_c(seconds(s)), truth))
-                .for_each(|(l, r)| *l = r);
-            axes.resolve(&orientation, usable, (&lanes, None), seconds(s))
+            let felt = felt(&orientation, axes.temperature_deg_c(seconds(s)), truth);
+            axes.resolve(&orientation, usable, (&felt, None), seconds(s))
         };
         let mut axes = Axes::new(&orientation, 20.0);
         axes.update(&orientation, 20.0, seconds(0), TICK);
