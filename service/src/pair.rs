@@ -54,6 +54,13 @@ struct Others {
     were_there: bool,
 }
 
+impl Others {
+    /// Whether some of them goes before this one.
+    fn go_before(&self, me: &Member) -> bool {
+        self.there.values().any(|other| other.goes_before(me))
+    }
+}
+
 /// This instance among the others.
 #[derive(Debug)]
 pub(crate) struct Pair {
@@ -186,7 +193,7 @@ impl Pair {
 
     /// Whether some other instance goes before this one.
     fn yields(&self) -> bool {
-        read(&self.others).there.values().any(|other| other.goes_before(&self.me))
+        read(&self.others).go_before(&self.me)
     }
 
     /// Whether a unit that nobody has heard before is this instance's to speak for.
@@ -207,14 +214,13 @@ impl Pair {
 
     /// What a unit needs to know of it.
     pub(crate) fn standing(&self) -> Standing {
-        let yields = self.yields();
-        let Others { alone_since, were_there, .. } = *read(&self.others);
+        let others = read(&self.others);
         Standing {
             takeover: self.takeover,
             active: self.me.mode == Mode::Active,
-            yields,
-            alone_since,
-            deserted: alone_since.is_some() && were_there,
+            yields: others.go_before(&self.me),
+            alone_since: others.alone_since,
+            deserted: others.alone_since.is_some() && others.were_there,
         }
     }
 
