@@ -298,12 +298,10 @@ impl Drawing {
         name: String,
         ink: Ink,
     ) -> Option<Series> {
-        let overall = finished.overall(index, scale)?;
-        self.rows.extend(
-            Some(overall)
-                .filter(|overall| overall.mean.is_finite())
-                .map(|Overall { min, max, mean }| vec![row, figure(min), figure(mean), figure(max)]),
-        );
+        let Overall { min, max, mean } = finished.overall(index, scale)?;
+        if mean.is_finite() {
+            self.rows.push(vec![row, figure(min), figure(mean), figure(max)]);
+        }
         Some(Series { name, ink, form: Form::Line, dashes: 0, samples: finished.samples(index, scale)? })
     }
 }

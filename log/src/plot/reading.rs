@@ -241,14 +241,7 @@ impl Plot {
                 }
             }
         }
-        let (mut words, mut refused_ticks) = (Vec::new(), 0);
-        for source in &self.logs {
-            let Some((stream, _)) = &source.corrects else { continue };
-            let counters = stream.unit().counters();
-            refused_ticks += counters.gyro_ticks_in.saturating_sub(counters.ticks_out);
-            words.extend(troubles(stream, 0).iter().map(|trouble| format!("{}: {trouble}", source.log.name)));
-        }
-        let summary = PlotSummary { troubles: words, refused_ticks, ..self.summary() };
+        let summary = self.summary();
         // The page's size is bounded by that of two units.
         let units = self.units.len();
         if units > 2 {
@@ -267,6 +260,13 @@ impl Plot {
     }
 
     fn summary(&self) -> PlotSummary {
+        let (mut words, mut refused_ticks) = (Vec::new(), 0);
+        for source in &self.logs {
+            let Some((stream, _)) = &source.corrects else { continue };
+            let counters = stream.unit().counters();
+            refused_ticks += counters.gyro_ticks_in.saturating_sub(counters.ticks_out);
+            words.extend(troubles(stream, 0).iter().map(|trouble| format!("{}: {trouble}", source.log.name)));
+        }
         let of = |shown: &UnitPlot| UnitSummary {
             raw_ticks: shown.gyro.as_ref().map_or(0, |raw| raw.track.ticks()),
             corrected_ticks: shown.corrected.as_ref().map_or(0, track::Track::ticks),
@@ -293,8 +293,8 @@ impl Plot {
             differences: differences.collect(),
             units_left_out: self.left_out.len() as u64,
             second_moved_ns: self.second_moved_ns,
-            troubles: Vec::new(),
-            refused_ticks: 0,
+            troubles: words,
+            refused_ticks,
         }
     }
 }
