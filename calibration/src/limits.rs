@@ -2,7 +2,7 @@
 
 /// Reads a number from one limit to another, both included.
 pub(crate) fn within(low: f64, high: f64) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
-    move |text| number(text, |value| (low..=high).contains(&value), &format!("from {low} to {high}"))
+    isotherm_cli::number("", low..=high)
 }
 
 /// Reads a number above 0.

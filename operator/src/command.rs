@@ -91,17 +91,22 @@ pub enum Action {
 #[derive(Debug, Clone, Args)]
 pub struct PlaceArgs {
     /// Geodetic latitude (°, −90…90)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0))]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees())]
     pub latitude: f64,
     /// Heading of the case's x axis from north (°)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0))]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees())]
     pub heading: f64,
     /// Pitch of the case (°) (default: levelled by the accelerometers)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0), requires = "roll")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees(), requires = "roll")]
     pub pitch: Option<f64>,
     /// Roll of the case (°) (default: levelled by the accelerometers)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = number(" of degrees", -360.0..=360.0), requires = "pitch")]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees(), requires = "pitch")]
     pub roll: Option<f64>,
+}
+
+/// For `value_parser`: an angle.
+fn degrees() -> impl Fn(&str) -> Result<f64, String> + Clone {
+    number(" of degrees", -360.0..=360.0)
 }
 
 impl PlaceArgs {

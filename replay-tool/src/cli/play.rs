@@ -67,13 +67,13 @@ pub(super) struct PlayArgs {
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=3_600_000), hide_short_help = true)]
     jitter_ms: u32,
     /// Share of messages to leave out (0…1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = number("", 0.0..=1.0), hide_short_help = true)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share(), hide_short_help = true)]
     loss: f64,
     /// Share of messages to send twice (0…1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = number("", 0.0..=1.0), hide_short_help = true)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share(), hide_short_help = true)]
     duplicate: f64,
     /// Share of messages to send after one to four later ones of their key (0…1)
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = number("", 0.0..=1.0), hide_short_help = true)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = share(), hide_short_help = true)]
     reorder: f64,
     /// Seed of these four faults
     #[arg(long, value_name = "S", default_value_t = 1, hide_short_help = true)]
@@ -137,6 +137,11 @@ fn remapping(text: &str) -> Result<(UnitId, UnitId), String> {
 /// Reads a key expression.
 pub(super) fn key_expression(text: &str) -> Result<OwnedKeyExpr, String> {
     OwnedKeyExpr::new(text).map_err(|error| isotherm_bus::words(&error))
+}
+
+/// For `value_parser`: a share.
+fn share() -> impl Fn(&str) -> Result<f64, String> + Clone {
+    number("", 0.0..=1.0)
 }
 
 impl PlayArgs {
